@@ -1,0 +1,19 @@
+"""SoftGround: ground that gives way under animated characters.
+
+`core` is the physics (numpy only), `blender` is everything that touches bpy. Nothing here imports bpy before
+`register()`, so that `softground_addon.core` works without Blender.
+"""
+
+
+def register() -> None:
+    """Register the add-on's classes, properties and command with Blender."""
+    from .blender import registration
+
+    registration.register()
+
+
+def unregister() -> None:
+    """Undo `register()`, in reverse order."""
+    from .blender import registration
+
+    registration.unregister()

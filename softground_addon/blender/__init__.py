@@ -1,0 +1,1 @@
+"""The Blender side of SoftGround: everything that imports bpy."""

@@ -1,0 +1,1 @@
+"""The physics of SoftGround: numpy only, SI units, Z up."""

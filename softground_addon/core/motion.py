@@ -1,0 +1,197 @@
+"""What a rig did: sole poses and joints over time, as plain arrays in SI units, Z up.
+
+This is the border between Blender and the physics. Everything that the core knows about a character is in one
+`CharacterMotion`; nothing in it refers to bones or objects.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SIMULATION_RATE = 120.0
+"""Lowest rate of the internal time grid, in Hz: at 24, 30, 60 and 120 fps the steps fall on the same instants."""
+
+_LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
+
+JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
+"""Names that `CharacterMotion.joints` may hold. `toe` is the tip of the foot; any may be missing."""
+
+
+@dataclass(frozen=True)
+class SolePatch:
+    """The underside of one rigid piece of a sole, as two maps over a regular grid.
+
+    The patch frame has x toward the toes, y left and z up when the foot is planted, with z = 0 at the underside's
+    lowest point. Node (row, column) of a map is at x = origin[0] + column·spacing, y = origin[1] + row·spacing.
+
+    Attributes
+    ----------
+    heights : (rows, columns) float array
+        Height of the underside in the patch frame [m], continued smoothly outside the outline.
+    signed_distance : (rows, columns) float array
+        Distance to the patch's outline [m], negative inside.
+    origin : (2,) float array
+        Position of node (0, 0) [m].
+    spacing : float
+        Distance between nodes [m].
+    """
+
+    heights: Array
+    signed_distance: Array
+    origin: Array
+    spacing: float
+
+    @property
+    def area(self) -> float:
+        """Area inside the outline [m²], with edge nodes counted by their covered fraction."""
+        return float(np.clip(0.5 - self.signed_distance / self.spacing, 0.0, 1.0).sum() * self.spacing**2)
+
+
+@dataclass(frozen=True)
+class Sole:
+    """One thing that can print: a foot, a hand, a snowshoe.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "" for neither.
+    patches : tuple of SolePatch
+        Rigid pieces from back to front, e.g. (foot, toes); their seams overlap a little, so that a bend leaves no gap.
+    landmarks : (L, 3) float array
+        Points of the underside that contact detection follows, from back to front (heel, ball, toe tip) [m], each in
+        the frame of its patch.
+    landmark_patch : (L,) int array
+        Index of the patch that each landmark belongs to.
+    outline : (N, 2) float array
+        The flat sole's outline in the frame of the first patch [m], counter-clockwise, for drawing.
+    """
+
+    name: str
+    side: str
+    patches: tuple[SolePatch, ...]
+    landmarks: Array
+    landmark_patch: NDArray[np.intp]
+    outline: Array
+
+    @property
+    def area(self) -> float:
+        """Area of the flat sole [m²], from its outline (shoelace formula)."""
+        x, y = self.outline.T
+        return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+
+@dataclass(frozen=True)
+class SoleMotion:
+    """A sole and the rigid pose of each of its patches over time.
+
+    Attributes
+    ----------
+    sole : Sole
+    transforms : (F, P, 4, 4) float array
+        Patch frame to world, rotation and translation only [m].
+    """
+
+    sole: Sole
+    transforms: Array
+
+    def landmark_positions(self) -> Array:
+        """World positions of the sole's landmarks, (F, L, 3) [m]."""
+        pose = self.transforms[:, self.sole.landmark_patch]
+        return np.einsum("flij,lj->fli", pose[..., :3, :3], self.sole.landmarks) + pose[..., :3, 3]
+
+
+@dataclass(frozen=True)
+class CharacterMotion:
+    """Everything the core knows about one character.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees: the armature's name.
+    mass : float
+        Body mass [kg].
+    leg_length : float
+        Hip to sole in the rest pose [m]; makes contact detection scale-free.
+    frames : (F,) float array
+        Scene frame numbers, evenly spaced.
+    frame_rate : float
+        Scene frames per second [Hz].
+    soles : tuple of SoleMotion
+    joints : dict of str to (F, 3) float array
+        World positions of those of `JOINTS` that are mapped [m].
+    gravity : float
+        Magnitude of gravity [m/s²].
+    """
+
+    name: str
+    mass: float
+    leg_length: float
+    frames: Array
+    frame_rate: float
+    soles: tuple[SoleMotion, ...]
+    joints: dict[str, Array] = field(default_factory=dict)
+    gravity: float = 9.81
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples [s], 0 at the first."""
+        return (self.frames - self.frames[0]) / self.frame_rate
+
+    @property
+    def time_step(self) -> float:
+        """Time between samples [s]."""
+        return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
+
+    def resampled(self, steps_per_frame: int) -> CharacterMotion:
+        """The same motion with `steps_per_frame` samples per frame, through C1 cubic interpolation.
+
+        The first sample of each frame is the given one, exactly.
+        """
+        if steps_per_frame == 1 or len(self.frames) < 2:
+            return self
+        count = (len(self.frames) - 1) * steps_per_frame + 1
+        position = np.arange(count) / steps_per_frame
+        soles = tuple(
+            dataclasses.replace(sole, transforms=_orthonormal(_interpolate(sole.transforms, position)))
+            for sole in self.soles
+        )
+        return dataclasses.replace(
+            self,
+            frames=np.interp(position, np.arange(len(self.frames)), self.frames),
+            soles=soles,
+            joints={name: _interpolate(path, position) for name, path in self.joints.items()},
+        )
+
+
+def steps_per_frame(frame_rate: float) -> int:
+    """Number of simulation steps in a frame, so that a step is at most 1/`SIMULATION_RATE` s long."""
+    return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
+
+
+def _interpolate(samples: Array, position: Array) -> Array:
+    """Catmull-Rom interpolation along the first axis at fractional sample indices."""
+    last = len(samples) - 1
+    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
+    u = (position - index).reshape(-1, *[1] * (samples.ndim - 1))
+    slope = np.gradient(samples, axis=0)
+    a, b = samples[index], samples[np.minimum(index + 1, last)]
+    da, db = slope[index], slope[np.minimum(index + 1, last)]
+    return a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db)))
+
+
+def _orthonormal(transforms: Array) -> Array:
+    """Nearly rigid transforms made rigid: one Newton step of the polar decomposition."""
+    rotation = transforms[..., :3, :3]
+    gram = np.swapaxes(rotation, -1, -2) @ rotation
+    transforms[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
+    transforms[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return transforms

@@ -1,0 +1,49 @@
+"""The motion that crosses from Blender into the core, and its resampling to the internal time grid."""
+
+import numpy as np
+import pytest
+
+from softground_addon.core import motion
+
+
+def rolling_sole(frames: int, rate: float) -> motion.CharacterMotion:
+    """A sole that pitches and moves smoothly, sampled at `rate`."""
+    times = np.arange(frames) / rate
+    angle = 0.6 * np.sin(3 * times)
+    transforms = np.tile(np.eye(4), (frames, 1, 1, 1))
+    transforms[:, 0, 0, 0] = transforms[:, 0, 2, 2] = np.cos(angle)
+    transforms[:, 0, 0, 2] = np.sin(angle)
+    transforms[:, 0, 2, 0] = -np.sin(angle)
+    transforms[:, 0, 0, 3] = times
+    sole = motion.Sole("foot", "", (), np.array([[0.1, 0.0, 0.0]]), np.array([0]), np.zeros((0, 2)))
+    return motion.CharacterMotion(
+        "walker",
+        70.0,
+        0.9,
+        np.arange(frames) + 1.0,
+        rate,
+        (motion.SoleMotion(sole, transforms),),
+        {"hips": transforms[:, 0, :3, 3]},
+    )
+
+
+def test_resampling_keeps_the_given_samples():
+    given = rolling_sole(30, 30.0)
+    fine = given.resampled(4)
+    assert np.allclose(fine.soles[0].transforms[::4], given.soles[0].transforms, atol=1e-12)
+    assert np.array_equal(fine.frames[::4], given.frames)
+
+
+def test_resampled_poses_are_rigid_and_on_the_true_path():
+    fine = rolling_sole(30, 30.0).resampled(4)
+    true = rolling_sole(29 * 4 + 1, 120.0)
+    rotation = fine.soles[0].transforms[..., :3, :3]
+    assert np.allclose(rotation @ np.swapaxes(rotation, -1, -2), np.eye(3), atol=1e-6)
+    assert np.abs(fine.soles[0].landmark_positions() - true.soles[0].landmark_positions()).max() < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("rate", "steps"), [(24, 5), (25, 5), (29.97, 5), (30, 4), (60, 2), (100, 2), (120, 1), (240, 1)]
+)
+def test_a_step_is_at_most_a_120th_of_a_second(rate, steps):
+    assert motion.steps_per_frame(rate) == steps
