@@ -1,0 +1,136 @@
+"""The undisturbed ground as a function of place: a plane, or the upper side of a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+UPWARD = 0.05
+"""Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
+
+SAME_LAYER = 1e-3
+"""Surfaces over one place that are closer than this are one [m]."""
+
+
+@dataclass(frozen=True)
+class MeshTerrain:
+    """The upper side of a triangle mesh, looked up by place.
+
+    Triangles are binned over the plane once; a look-up tests the few that share the point's bin. Where several
+    upward-facing surfaces lie over one place, the highest counts.
+
+    Attributes
+    ----------
+    corners : (T, 3, 3) float array
+        World positions of the upward-facing triangles' corners [m].
+    origin, bin_size : (2,) float arrays
+        Lower corner and size of the bins [m].
+    shape : (2,) int array
+        Number of bins along x and y.
+    first : (bins + 1,) int array
+        Where each bin's triangles start in `members`.
+    members : (M,) int array
+        Triangles by bin.
+    """
+
+    corners: Array
+    origin: Array
+    bin_size: Array
+    shape: Indices
+    first: Indices
+    members: Indices
+
+    @classmethod
+    def from_mesh(cls, vertices: Array, triangles: Indices, bounds: Array | None = None) -> MeshTerrain:
+        """Bin the triangles of a mesh.
+
+        Parameters
+        ----------
+        vertices : (V, 3) float array
+            World positions [m], Z up.
+        triangles : (T, 3) int array
+            Corners of each triangle, counter-clockwise from outside.
+        bounds : (2, 2) float array, optional
+            Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
+
+        Raises
+        ------
+        InputError
+            If no triangle faces upward within the bounds.
+        """
+        if bounds is not None and len(triangles):
+            place = vertices[:, :2]
+            beyond = np.stack([place < bounds[0], place > bounds[1]], axis=-1)
+            triangles = triangles[~beyond[triangles].all(axis=1).any(axis=(1, 2))]
+        corners = vertices[triangles].astype(np.float64)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        corners = corners[normal[:, 2] > UPWARD * np.maximum(length, 1e-300)]
+        if not len(corners):
+            raise InputError(
+                "The ground has no face that looks upward under the character's path: move it under the feet, or "
+                "recalculate its normals to point outside."
+            )
+        low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+        origin = low.min(axis=0)
+        extent = high.max(axis=0) - origin
+        bins_along = max(1.0, np.sqrt(len(corners) / 2))
+        size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
+        shape = np.floor(extent / size).astype(np.intp) + 1
+        from_bin = np.floor((low - origin) / size).astype(np.intp)
+        span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
+        triangle, within = _expand(span.prod(axis=1))
+        bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
+        bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
+        bin_index = bin_y * shape[0] + bin_x
+        order = np.argsort(bin_index, kind="stable")
+        first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
+        return cls(corners, origin, size, shape, first, triangle[order])
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
+        point, z = self._surfaces(np.ravel(x), np.ravel(y))
+        highest = np.full(np.size(x), -np.inf)
+        np.maximum.at(highest, point, z)
+        return np.where(np.isinf(highest), np.nan, highest).reshape(np.shape(x))
+
+    def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether no second upward-facing surface lies below the highest one, for each place."""
+        point, z = self._surfaces(np.ravel(x), np.ravel(y))
+        top = self.heights(np.ravel(x), np.ravel(y))
+        single = np.ones(np.size(x), dtype=bool)
+        single[point[z < top[point] - SAME_LAYER]] = False
+        return single.reshape(np.shape(x))
+
+    def _surfaces(self, x: Array, y: Array) -> tuple[Indices, Array]:
+        """Every (point, height) pair where a triangle lies over or under a point."""
+        place = np.stack([x, y], axis=-1)
+        at_bin = np.floor((place - self.origin) / self.bin_size)
+        inside = np.flatnonzero(((at_bin >= 0) & (at_bin < self.shape)).all(axis=1))
+        at_bin = at_bin[inside].astype(np.intp)
+        bin_index = at_bin[:, 1] * self.shape[0] + at_bin[:, 0]
+        start, stop = self.first[bin_index], self.first[bin_index + 1]
+        pair, within = _expand(stop - start)
+        triangle = self.members[start[pair] + within]
+        point = inside[pair]
+        a, b, c = (self.corners[triangle, k] for k in range(3))
+        ab, ac, ap = b - a, c - a, place[point] - a[:, :2]
+        area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+        u = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
+        v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
+        on_edge = 1e-9  # points on a shared edge belong to both triangles; without slack they could fall between
+        hit = (u >= -on_edge) & (v >= -on_edge) & (u + v <= 1 + on_edge)
+        return point[hit], (a[:, 2] + u * ab[:, 2] + v * ac[:, 2])[hit]
+
+
+def _expand(counts: Indices) -> tuple[Indices, Indices]:
+    """For counts (2, 3): owner (0, 0, 1, 1, 1) and number within the owner (0, 1, 0, 1, 2)."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)

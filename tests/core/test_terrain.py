@@ -1,0 +1,67 @@
+"""The undisturbed ground under a place, from a triangle mesh."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import Delaunay
+
+from softground_addon.core.errors import InputError
+from softground_addon.core.terrain import MeshTerrain
+
+
+def counter_clockwise(vertices, triangles):
+    a, b, c = (vertices[triangles[:, k], :2] for k in range(3))
+    turned = np.cross(b - a, c - a) < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return triangles
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(4, 300), scale=st.floats(0.01, 1000))
+def test_heights_are_those_of_scipys_linear_interpolation(seed, count, scale):
+    random = np.random.default_rng(seed)
+    vertices = random.uniform(-1, 1, (count, 3)) * [scale, scale, scale * 0.1]
+    delaunay = Delaunay(vertices[:, :2])
+    terrain = MeshTerrain.from_mesh(vertices, counter_clockwise(vertices, delaunay.simplices.astype(np.intp)))
+    x, y = random.uniform(-1.2, 1.2, (2, 400)) * scale
+    expected = LinearNDInterpolator(delaunay, vertices[:, 2])(x, y)
+    clear_of_slivers = ~np.isnan(terrain.heights(x, y))  # walls (near-vertical slivers) are no ground
+    assert np.allclose(terrain.heights(x, y)[clear_of_slivers], expected[clear_of_slivers], atol=1e-6 * scale)
+    assert np.isnan(terrain.heights(x, y)[np.isnan(expected)]).all()
+
+
+def slab(z):
+    vertices = np.array([[x, y, h] for h in (z - 1.0, z) for y in (0.0, 2.0) for x in (0.0, 2.0)])
+    top, bottom = [[4, 5, 7], [4, 7, 6]], [[0, 3, 1], [0, 2, 3]]
+    return vertices, np.array(top + bottom)
+
+
+def test_the_underside_of_a_slab_is_no_second_layer():
+    terrain = MeshTerrain.from_mesh(*slab(0.5))
+    x, y = np.array([1.0, 0.3, 5.0]), np.array([1.0, 1.7, 1.0])
+    assert np.array_equal(terrain.heights(x, y), [0.5, 0.5, np.nan], equal_nan=True)
+    assert terrain.is_height_field(x, y).all()
+
+
+def test_a_bridge_over_the_ground_is_found():
+    (v1, t1), (v2, t2) = slab(0.0), slab(3.0)
+    terrain = MeshTerrain.from_mesh(np.concatenate([v1, v2 * [0.5, 1, 1]]), np.concatenate([t1, t2 + len(v1)]))
+    x, y = np.array([0.5, 1.5]), np.array([1.0, 1.0])
+    assert np.array_equal(terrain.heights(x, y), [3.0, 0.0])
+    assert np.array_equal(terrain.is_height_field(x, y), [False, True])
+
+
+def test_only_triangles_within_the_bounds_are_kept():
+    vertices, triangles = slab(0.0)
+    far = np.concatenate([vertices, np.add(vertices, [100, 0, 0])])
+    both = np.concatenate([triangles, triangles + len(vertices)])
+    terrain = MeshTerrain.from_mesh(far, both, bounds=np.array([[0.0, 0.0], [3.0, 3.0]]))
+    assert len(terrain.corners) == 2
+
+
+def test_a_ground_that_faces_down_is_refused_with_the_remedy():
+    vertices, triangles = slab(0.0)
+    with pytest.raises(InputError, match="recalculate its normals"):
+        MeshTerrain.from_mesh(vertices, triangles[:2, ::-1])
