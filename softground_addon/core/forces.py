@@ -1,0 +1,126 @@
+"""Ground reaction forces on the soles of one character.
+
+Two models (MODEL.md section 3): the paper's impulse model, causal, and the whole-body model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centre_of_mass import centre_of_mass
+from .contacts import Contacts, runs
+from .load_sharing import share_by_moment
+from .motion import CharacterMotion
+
+Array = NDArray[np.float64]
+
+UP = np.array([0.0, 0.0, 1.0])
+PRESSURE_DEPTH = 0.01
+"""Landmarks this much higher than the lowest one bear e times less of the pressure, in leg lengths."""
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """Forces of the ground on every sole at each step.
+
+    Attributes
+    ----------
+    forces : (N, S, 3) float array
+        Ground reaction force on each sole [N].
+    total : (N, 3) float array
+        Their sum [N].
+    centre_of_pressure : (N, S, 3) float array
+        Where each force acts, on the sole's underside [m].
+    weight : (N, S) float array
+        Part of the force that carries the weight, for display [N].
+    momentum : (N, S) float array
+        Part of the force that stops a landing sole or accelerates the body, for display [N].
+    """
+
+    forces: Array
+    total: Array
+    centre_of_pressure: Array
+    weight: Array
+    momentum: Array
+
+
+def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> ContactForces:
+    """The paper's model, Eq. 3-8 with the corrections 1, 5 and 6 of MODEL.md section 2.
+
+    The weight is split by the projection of the centre of mass on the segment between the soles; a sole that lands
+    with velocity v into the ground adds share·mass·v/tau from the moment of contact on for tau. Causal: each step
+    depends on the steps before it only.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Of that motion.
+    characteristic_time : float
+        tau of the ground [s].
+
+    Returns
+    -------
+    ContactForces
+        A sole's momentum part lasts only while it touches.
+    """
+    pressure = centres_of_pressure(motion)
+    share = share_by_moment(pressure[..., :2], centre_of_mass(motion)[:, :2], contacts.touching)
+    weight = share * motion.mass * motion.gravity
+    momentum = share * motion.mass * _landing_deceleration(motion, contacts, characteristic_time)
+    forces = (weight + momentum)[..., None] * UP
+    return ContactForces(forces, forces.sum(axis=1), pressure, weight, momentum)
+
+
+def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactForces:
+    """Forces that accelerate the centre of mass as the motion shows: m·(g + a_com), where something touches.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Of that motion.
+    """
+    centre = centre_of_mass(motion)
+    pressure = centres_of_pressure(motion)
+    share = share_by_moment(pressure[..., :2], centre[:, :2], contacts.touching)
+    acceleration = np.gradient(np.gradient(centre, motion.time_step, axis=0), motion.time_step, axis=0)
+    total = motion.mass * (acceleration + motion.gravity * UP) * contacts.touching.any(axis=1)[:, None]
+    total *= (total[:, 2] > 0)[:, None]
+    forces = share[..., None] * total[:, None]
+    weight = np.minimum(share * motion.mass * motion.gravity, forces[..., 2])
+    return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)
+
+
+def centres_of_pressure(motion: CharacterMotion) -> Array:
+    """Where each sole presses, (N, S, 3) [m]: the mean of its landmarks, the lowest ones counting most."""
+    centres = []
+    for sole in motion.soles:
+        points = sole.landmark_positions()
+        height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+        nearness = np.exp(-height / (PRESSURE_DEPTH * motion.leg_length))
+        centres.append((nearness[..., None] * points).sum(axis=1) / nearness.sum(axis=1)[:, None])
+    return np.stack(centres, axis=1)
+
+
+def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> Array:
+    """v_n/tau of the sole that landed last, for tau after it did, (N, S) [m/s²]."""
+    step = motion.time_step
+    deceleration = np.zeros(contacts.touching.shape)
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        for first, last in zip(*runs(contacts.touching[:, index]), strict=True):
+            if first < 2:
+                continue  # it stood from the beginning, or landed too early to have a velocity
+            normal = contacts.normal[first, index]
+            landmark = (points[first] @ normal).argmin()
+            into_ground = (points[first - 2, landmark] - points[first - 1, landmark]) @ normal / step
+            # The part of each step that lies within tau, so that the impulse is mass·v at any frame rate.
+            lasting = np.clip(characteristic_time / step - np.arange(last - first), 0.0, 1.0)
+            deceleration[first:last, index] = max(into_ground, 0.0) / characteristic_time * lasting
+    return deceleration

@@ -1,0 +1,77 @@
+"""The centre of mass of bodies whose segments one can add up by hand."""
+
+import numpy as np
+import pytest
+
+from softground_addon.core.centre_of_mass import SEGMENTS, centre_of_mass
+from softground_addon.core.motion import JOINTS
+from tests.core.character import character, flat_sole
+
+SOLES = [flat_sole(np.zeros((1, 3)))]
+
+STANDING = {
+    "hips": (0, 0, 0.92),
+    "neck": (0, 0, 1.52),
+    "head": (0, 0, 1.62),
+    **{
+        f"{joint}_{side}": (x, sign * y, z)
+        for side, sign in (("l", 1), ("r", -1))
+        for joint, (x, y, z) in {
+            "shoulder": (0, 0.18, 1.44),
+            "elbow": (0, 0.18, 1.16),
+            "wrist": (0, 0.18, 0.89),
+            "hip": (0, 0.08, 0.92),
+            "knee": (0, 0.08, 0.50),
+            "ankle": (0, 0.08, 0.08),
+            "ball": (0.13, 0.08, 0.02),
+        }.items()
+    },
+}
+
+
+def com(joints):
+    paths = {name: np.array([place], dtype=float) for name, place in joints.items()}
+    hips = paths.pop("hips", None)
+    return centre_of_mass(character(SOLES, hips=None if hips is None else hips[0], **paths))[0]
+
+
+def test_the_fractions_add_up_to_the_whole_body():
+    assert sum(segment.mass_fraction for segment in SEGMENTS) + 0.0694 == pytest.approx(1.0, abs=1e-3)
+
+
+def test_every_segment_lies_between_joints_that_rigs_may_map():
+    assert {name for segment in SEGMENTS for name in (segment.proximal, segment.distal)} <= set(JOINTS)
+
+
+def test_a_standing_man_s_centre_is_at_55_percent_of_his_height_by_hand():
+    """Sum over the segments of STANDING, over the sum of the fractions."""
+    trunk = 0.4346 * (1.52 - 0.5138 * 0.60)
+    head = 0.0694 * (1.52 + 0.20 * 0.60)
+    arms = 2 * (0.0271 * (1.44 - 0.5772 * 0.28) + 0.0162 * (1.16 - 0.4574 * 0.27) + 0.0061 * (1.16 - 1.25 * 0.27))
+    legs = 2 * (0.1416 * (0.92 - 0.4095 * 0.42) + 0.0433 * (0.50 - 0.4395 * 0.42) + 0.0137 * (0.08 - 0.35 * 0.06))
+    fractions = 0.4346 + 0.0694 + 2 * (0.0271 + 0.0162 + 0.0061 + 0.1416 + 0.0433 + 0.0137)
+    place = com(STANDING)
+    assert place[2] == pytest.approx((trunk + head + arms + legs) / fractions)
+    assert place[2] / 1.75 == pytest.approx(0.56, abs=0.01)
+    assert place[1] == pytest.approx(0)
+
+
+@pytest.mark.parametrize("missing", [["head"], ["wrist_l", "wrist_r"], ["ball_l", "ball_r"], ["elbow_l", "wrist_l"]])
+def test_an_unmapped_end_moves_the_centre_by_centimetres_at_most(missing):
+    joints = {name: place for name, place in STANDING.items() if name not in missing}
+    assert np.linalg.norm(com(joints) - com(STANDING)) < 0.03
+
+
+def test_with_the_hips_only_the_mass_is_in_the_hips():
+    assert com({"hips": (1, 2, 3)}) == pytest.approx([1, 2, 3])
+
+
+def test_without_joints_the_soles_carry_the_mass():
+    assert com({}) == pytest.approx(np.mean([(-0.1, 0, 0), (0.06, 0, 0), (0.12, 0, 0)], axis=0))
+
+
+def test_the_centre_moves_with_the_body_whatever_is_mapped():
+    for names in (["hips"], ["hips", "neck"], ["hip_l", "hip_r", "knee_l"], ["head"], list(STANDING)):
+        joints = {name: np.array(STANDING[name], dtype=float) for name in names}
+        moved = {name: place + (1, 2, 3) for name, place in joints.items()}
+        assert com(moved) - com(joints) == pytest.approx([1, 2, 3])
