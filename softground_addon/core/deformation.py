@@ -1,0 +1,266 @@
+"""Compression and rim of the ground, step by step (MODEL.md section 4; the paper, Eq. 10-14 as corrected).
+
+Functions over arrays: whatever is said of a cell may be a number or an array over cells, so that a material that
+varies over the ground only changes what is passed in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LAYER_DEPTH = 0.30
+"""Depth of the loose layer [m] (the paper, section 5)."""
+RIM_REACH = 0.04
+"""Reach of the rim around a contact [m] (the paper, section 5)."""
+BLUR_SIGMA = 0.005
+"""Standard deviation of the display blur [m] (the paper, Table 1: snow)."""
+
+
+@dataclass(frozen=True)
+class GroundMaterial:
+    """What the ground is made of.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        Compaction modulus of the loose layer [Pa].
+    poisson_ratio : float
+        How much of the compressed volume rises as a rim, 0 (none) to 0.5 (all).
+    characteristic_time : float
+        Time that the ground takes to give way [s].
+    layer_depth : float
+        Depth of the loose layer, the most that it can be compressed by [m].
+    rim_reach : float
+        Reach of the rim around a contact [m].
+    blur_sigma : float
+        Standard deviation of the display blur [m].
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+    characteristic_time: float
+    layer_depth: float = LAYER_DEPTH
+    rim_reach: float = RIM_REACH
+    blur_sigma: float = BLUR_SIGMA
+
+
+@dataclass(frozen=True)
+class Sinking:
+    """How a sole sinks into the ground, at each of N steps.
+
+    Attributes
+    ----------
+    area : (N,) float array
+        Area of contact at the moment [m²].
+    target : (N,) float array
+        Compression that the stress of the moment would lead to [m].
+    sinkage : (N,) float array
+        How far the ground had given way under the sole's lowest point when the step began [m].
+    reached : float
+        The same after the last step [m].
+    """
+
+    area: Array
+    target: Array
+    sinkage: Array
+    reached: float
+
+
+def target_compression(stress: Array | float, material: GroundMaterial) -> Array:
+    """Compression that a lasting stress leads to [m]: stress·L0/E, at most the layer's depth (Eq. 10).
+
+    Parameters
+    ----------
+    stress : float array of any shape
+        Normal stress [Pa]; over cells where the pressure varies under the sole.
+    material : GroundMaterial
+
+    Examples
+    --------
+    >>> snow = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
+    >>> round(float(target_compression(21.9e3, snow)), 5)
+    0.02628
+    """
+    strain = np.minimum(np.asarray(stress) / material.youngs_modulus, 1.0)
+    return np.asarray(strain * material.layer_depth)
+
+
+def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> float:
+    """Depth at which the ground carries a lasting force on an area [m], in closed form.
+
+    For a standing character: the weight and the area of all its soles.
+    """
+    return float(target_compression(force / area, material))
+
+
+def compression_rate(step: float, material: GroundMaterial) -> float:
+    """Fraction of the target by which the ground gives way in a step of so many seconds (Eq. 11)."""
+    return step / material.characteristic_time
+
+
+def touching_fraction(clearance: Array, sinkage: Array | float, tolerance: float) -> Array:
+    """How much of each piece of a posed sole touches the ground, 0 to 1.
+
+    The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
+    ground too. A tolerance on top stands for what is not known: the softness of skin and shoe and the exact pose.
+    It ends in a ramp as wide as itself, so that the area is continuous over space and time.
+
+    Parameters
+    ----------
+    clearance : float array
+        Height above the undisturbed ground, less that of the sole's lowest point [m].
+    sinkage : float array
+        How far the ground has given way under the lowest point [m].
+    tolerance : float [m]
+    """
+    fraction = (sinkage - clearance) * (1.0 / tolerance) + 1.5
+    return np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
+
+
+def sink(
+    clearance: Array,
+    area: Array,
+    force: Array,
+    *,
+    tolerance: float,
+    step: float,
+    material: GroundMaterial,
+    sinkage: float = 0.0,
+) -> Sinking:
+    """Follow a loaded sole into the ground.
+
+    The ground under the sole's lowest point gives way like any cell: it is the cell that is in contact all along.
+
+    Parameters
+    ----------
+    clearance : (N, Q) float array
+        Height of Q points of the underside above the undisturbed ground, less that of the lowest [m].
+    area : (N, Q) float array
+        Horizontal area that each point stands for [m²], 0 where it does not face the ground.
+    force : (N,) float array
+        Normal force on the sole [N].
+    tolerance : float
+        See `touching_fraction` [m].
+    step : float
+        Time step [s].
+    material : GroundMaterial
+    sinkage : float
+        That reached before the first step [m].
+
+    Returns
+    -------
+    Sinking
+    """
+    steps = len(force)
+    touching_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
+    rate = compression_rate(step, material)
+    per_pascal = material.layer_depth / material.youngs_modulus
+    reached[0] = sinkage
+    for k in range(steps):
+        touching_area[k] = touching_fraction(clearance[k], sinkage, tolerance) @ area[k]
+        if force[k] > 0 and touching_area[k] > 0:
+            target[k] = min(force[k] / touching_area[k] * per_pascal, material.layer_depth)
+            sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
+        reached[k + 1] = sinkage
+    return Sinking(touching_area, target, reached[:-1], float(sinkage))
+
+
+def compress(compression: Array, coverage: Array, target: Array | float, rate: float) -> Array:
+    """How much further each cell is compressed in one step [m] (Eq. 11).
+
+    min(rate·target, target - compression) where that is positive. A cell that the contact covers in part is
+    compressed in that part only; what is kept is the mean over the cell.
+
+    Parameters
+    ----------
+    compression : (rows, columns) float array
+        Mean compression of each cell so far [m].
+    coverage : (rows, columns) float array
+        Fraction of each cell that is in contact.
+    target : float or float array
+        Compression that the stress leads to [m].
+    rate : float
+        From `compression_rate`.
+
+    Returns
+    -------
+    (rows, columns) float array, nowhere negative.
+
+    Examples
+    --------
+    It never overshoots, however long the step:
+
+    >>> round(float(compress(np.array([0.02]), np.array([1.0]), 0.03, rate=0.5)[0]), 6)  # 0.015 would be too much
+    0.01
+    """
+    aim = coverage * target
+    further = aim - compression
+    np.minimum(further, rate * aim, out=further)
+    return np.maximum(further, 0.0, out=further)
+
+
+def rim_weights(coverage: Array, reach: float, room: Array | None = None) -> Array:
+    """Shares of the cells that take up the volume a contact displaces, summing to 1 (Eq. 12-14).
+
+    All cells within reach of the contact take part alike, in so far as they are not in contact themselves.
+
+    Parameters
+    ----------
+    coverage : (N, rows, columns) float array
+        Fraction of each cell that is in contact, at each of N steps.
+    reach : float
+        Reach of the rim in cells; at least the next cells take part.
+    room : (rows, columns) float array, optional
+        Fraction of each cell that is ground at all.
+
+    Returns
+    -------
+    (N, rows, columns) float array, all 0 at a step whose contact has no free cell around it.
+
+    Examples
+    --------
+    >>> contact = np.zeros((1, 5, 5))
+    >>> contact[0, 2, 2] = 1.0
+    >>> rim_weights(contact, reach=1.0)[0, 1:4, 1:4]
+    array([[0.  , 0.25, 0.  ],
+           [0.25, 0.  , 0.25],
+           [0.  , 0.25, 0.  ]])
+    """
+    # Half-covered cells bound the contact; a contact smaller than a cell has none and is bounded by half its most.
+    bound = np.minimum(0.5, 0.5 * coverage.max(axis=(1, 2), keepdims=True))
+    weights = dilate((coverage >= bound) & (coverage > 0), reach) * (1.0 - coverage)
+    if room is not None:
+        weights *= room
+    total = weights.sum(axis=(1, 2), keepdims=True)
+    return np.divide(weights, total, out=weights, where=total > 0)
+
+
+def dilate(mask: Mask, reach: float) -> Mask:
+    """Cells within `reach` cells (at least one) of a marked cell, for each of N masks (N, rows, columns)."""
+    radius = max(1, int(reach + 1e-6))
+    reach_squared = max(reach + 1e-6, 1.0) ** 2
+    result = np.zeros_like(mask)
+    wider, half_width = mask.copy(), 0  # `wider` is the mask dilated along the row by half_width
+    for offset in range(radius, -1, -1):
+        reach_along_row = int(np.sqrt(reach_squared - offset**2))
+        for shift in range(half_width + 1, reach_along_row + 1):
+            wider[..., shift:] |= mask[..., :-shift]
+            wider[..., :-shift] |= mask[..., shift:]
+        half_width = reach_along_row
+        if offset:
+            result[:, offset:] |= wider[:, :-offset]
+            result[:, :-offset] |= wider[:, offset:]
+        else:
+            result |= wider
+    return result
+
+
+def displaced_volume(compressed_volume: Array | float, material: GroundMaterial) -> Array:
+    """Volume that leaves under a contact and rises around it: 2·nu·compressed volume (Eq. 12-13, correction 3)."""
+    return np.asarray(2.0 * material.poisson_ratio * np.asarray(compressed_volume))

@@ -1,0 +1,268 @@
+"""The ground as a height field over an endless plane, kept in sparse tiles.
+
+Cell (i, j), column along x and row along y, covers [i·cell_size, (i+1)·cell_size) and is centred half a cell further;
+the world origin is a corner of cell (0, 0). Tiles exist only where something was written, so that memory follows
+the touched ground and not its extent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TILE = 32
+"""Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""
+
+
+class Terrain(Protocol):
+    """The undisturbed ground."""
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m], NaN where there is no ground."""
+        ...
+
+
+class FlatTerrain:
+    """An endless horizontal plane.
+
+    Parameters
+    ----------
+    height : float
+        Its height [m].
+    """
+
+    def __init__(self, height: float = 0.0) -> None:
+        self.height = height
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m]."""
+        return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), float(self.height))
+
+
+class Window(NamedTuple):
+    """A rectangle of cells: its first column and row, and how many of each."""
+
+    column: int
+    row: int
+    columns: int
+    rows: int
+
+    @classmethod
+    def around(cls, low: Array, high: Array, cell_size: float) -> Window:
+        """The cells that the box from `low` to `high` (world x, y [m]) reaches into."""
+        first = np.floor(np.asarray(low[:2]) / cell_size).astype(int)
+        last = np.floor(np.asarray(high[:2]) / cell_size).astype(int)
+        return cls(int(first[0]), int(first[1]), int(last[0] - first[0]) + 1, int(last[1] - first[1]) + 1)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.columns * self.rows
+
+    def expanded(self, margin: int) -> Window:
+        """The window with `margin` more cells on every side."""
+        return Window(self.column - margin, self.row - margin, self.columns + 2 * margin, self.rows + 2 * margin)
+
+    def union(self, other: Window) -> Window:
+        """The smallest window that holds both."""
+        column, row = min(self.column, other.column), min(self.row, other.row)
+        end_column = max(self.column + self.columns, other.column + other.columns)
+        end_row = max(self.row + self.rows, other.row + other.rows)
+        return Window(column, row, end_column - column, end_row - row)
+
+    def intersects(self, other: Window) -> bool:
+        """Whether the two share a cell."""
+        return (
+            self.column < other.column + other.columns
+            and other.column < self.column + self.columns
+            and self.row < other.row + other.rows
+            and other.row < self.row + self.rows
+        )
+
+    def refined(self, factor: int) -> Window:
+        """The same rectangle in cells that are `factor` times smaller."""
+        return Window(self.column * factor, self.row * factor, self.columns * factor, self.rows * factor)
+
+    def centres(self, cell_size: float) -> tuple[Array, Array]:
+        """World x of the columns' centres (columns,) and y of the rows' centres (rows,) [m]."""
+        return (
+            (self.column + 0.5 + np.arange(self.columns)) * cell_size,
+            (self.row + 0.5 + np.arange(self.rows)) * cell_size,
+        )
+
+
+class SparseGrid:
+    """Values per cell over an endless plane, in square tiles that are made on demand.
+
+    Parameters
+    ----------
+    cell_size : float
+        Side of a cell [m].
+    channels : int
+        Number of values per cell.
+    fill : float
+        Value of cells that were never written.
+
+    Raises
+    ------
+    InputError
+        If the cell size is not a positive number.
+    """
+
+    def __init__(self, cell_size: float, *, channels: int, fill: float = 0.0) -> None:
+        if not (np.isfinite(cell_size) and cell_size > 0):
+            raise InputError(f"The cell size is {cell_size!r} m: set it to a positive length, such as 0.01 m.")
+        self.cell_size = float(cell_size)
+        self.channels = channels
+        self.fill = fill
+        self.tiles: dict[tuple[int, int], Array] = {}
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the cells' values [bytes]."""
+        return sum(tile.nbytes for tile in self.tiles.values())
+
+    def tile_windows(self) -> list[Window]:
+        """The windows of all tiles, in the order of their place."""
+        return [Window(column * TILE, row * TILE, TILE, TILE) for column, row in sorted(self.tiles)]
+
+    def read(self, window: Window) -> Array:
+        """A copy of the values of a window, (channels, rows, columns)."""
+        values = np.full((self.channels, window.rows, window.columns), self.fill)
+        for key, in_tile, in_window in _overlaps(window):
+            tile = self.tiles.get(key)
+            if tile is not None:
+                values[in_window] = tile[in_tile]
+        return values
+
+    def write(self, window: Window, values: Array) -> None:
+        """Set the values of a window, (channels, rows, columns). Tiles that would stay untouched are not made."""
+        for key, in_tile, in_window in _overlaps(window):
+            tile = self.tiles.get(key)
+            if tile is None:
+                if not (values[in_window] != self.fill).any():
+                    continue
+                tile = self.tiles[key] = np.full((self.channels, TILE, TILE), self.fill)
+            tile[in_tile] = values[in_window]
+
+    def sample(self, x: Array, y: Array) -> Array:
+        """Values at world positions of any shape, bilinear between cell centres: (channels, ...)."""
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        column, row = x.ravel() / self.cell_size - 0.5, y.ravel() / self.cell_size - 0.5
+        left, low = np.floor(column), np.floor(row)
+        u, v = column - left, row - low
+        left, low = left.astype(int), low.astype(int)
+        values = (self._gather(left, low) * (1 - u) + self._gather(left + 1, low) * u) * (1 - v)
+        values += (self._gather(left, low + 1) * (1 - u) + self._gather(left + 1, low + 1) * u) * v
+        return values.reshape(self.channels, *x.shape)
+
+    def nearest(self, x: Array, y: Array) -> Array:
+        """Values of the cells that hold the world positions of any shape: (channels, ...)."""
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        column, row = np.floor(x.ravel() / self.cell_size), np.floor(y.ravel() / self.cell_size)
+        return self._gather(column.astype(int), row.astype(int)).reshape(self.channels, *x.shape)
+
+    def _gather(self, column: NDArray[np.intp], row: NDArray[np.intp]) -> Array:
+        """Values of single cells, (channels, N)."""
+        if not self.tiles or not column.size:
+            return np.full((self.channels, column.size), self.fill)
+        keys = sorted(self.tiles)
+        slot_of = np.array(keys)
+        first = slot_of.min(axis=0)
+        span = slot_of.max(axis=0) - first + 1
+        order = (slot_of - first) @ (span[1], 1)
+        tile = np.stack([column // TILE, row // TILE], axis=-1) - first
+        wanted = tile @ (span[1], 1)
+        slot = np.minimum(np.searchsorted(order, wanted), len(keys) - 1)
+        known = (order[slot] == wanted) & (tile >= 0).all(axis=-1) & (tile < span).all(axis=-1)
+        values = np.full((self.channels, column.size), self.fill)
+        stack = np.stack([self.tiles[key] for key in keys])
+        values[:, known] = stack[slot[known], :, row[known] % TILE, column[known] % TILE].T
+        return values
+
+
+class HeightField(SparseGrid):
+    """The deformed ground: compression and rim height of every cell [m], 0 where nothing happened.
+
+    The ground's height is that of the undisturbed terrain, less the compression, plus the rim.
+    """
+
+    def __init__(self, cell_size: float) -> None:
+        super().__init__(cell_size, channels=2)
+
+    def volumes(self) -> tuple[float, float]:
+        """Compressed volume and rim volume [m³]."""
+        total = sum((tile.sum(axis=(1, 2)) for _, tile in sorted(self.tiles.items())), np.zeros(2))
+        return float(total[0]) * self.cell_size**2, float(total[1]) * self.cell_size**2
+
+
+class TerrainTiles:
+    """A terrain's heights and slopes at cell centres, looked up once per tile.
+
+    Parameters
+    ----------
+    terrain : Terrain
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, terrain: Terrain, cell_size: float) -> None:
+        self.terrain = terrain
+        self._heights = SparseGrid(cell_size, channels=1, fill=np.nan)
+
+    @property
+    def cell_size(self) -> float:
+        """Side of a cell [m]."""
+        return self._heights.cell_size
+
+    def heights(self, window: Window) -> Array:
+        """Heights of a window, (rows, columns) [m], NaN where there is no ground."""
+        for key, _, _ in _overlaps(window):
+            if key not in self._heights.tiles:
+                tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
+                x, y = np.meshgrid(*tile.centres(self.cell_size))
+                self._heights.tiles[key] = self.terrain.heights(x, y)[None]
+        values: Array = self._heights.read(window)[0]
+        return values
+
+    def slopes(self, window: Window) -> tuple[Array, Array, Array]:
+        """Heights and their slopes along x and y, each (rows, columns) [m, 1, 1].
+
+        The slope is the gentler of the two one-sided differences, so that the foot of a wall and the brink of a
+        gap count as the level ground they are.
+        """
+        heights = self.heights(window.expanded(1))
+        along_x = np.diff(heights[1:-1], axis=1) / self.cell_size
+        along_y = np.diff(heights[:, 1:-1], axis=0) / self.cell_size
+        return heights[1:-1, 1:-1], _gentler(along_x[:, :-1], along_x[:, 1:]), _gentler(along_y[:-1], along_y[1:])
+
+
+def _gentler(before: Array, after: Array) -> Array:
+    """Whichever slope is nearer to 0; where one is unknown the other, where both are 0."""
+    before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
+    return np.nan_to_num(np.where(np.abs(before) < np.abs(after), before, after))
+
+
+def _overlaps(window: Window) -> Iterator[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:
+    """Each tile that a window reaches into, with the shared cells as slices of the tile and of the window."""
+    for tile_row in range(window.row // TILE, (window.row + window.rows - 1) // TILE + 1):
+        first_row = max(window.row, tile_row * TILE)
+        last_row = min(window.row + window.rows, (tile_row + 1) * TILE)
+        tile_rows = slice(first_row - tile_row * TILE, last_row - tile_row * TILE)
+        window_rows = slice(first_row - window.row, last_row - window.row)
+        for tile_column in range(window.column // TILE, (window.column + window.columns - 1) // TILE + 1):
+            first = max(window.column, tile_column * TILE)
+            last = min(window.column + window.columns, (tile_column + 1) * TILE)
+            yield (
+                (tile_column, tile_row),
+                (slice(None), tile_rows, slice(first - tile_column * TILE, last - tile_column * TILE)),
+                (slice(None), window_rows, slice(first - window.column, last - window.column)),
+            )
