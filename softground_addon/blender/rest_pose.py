@@ -1,0 +1,175 @@
+"""Feet and limbs of a rig whose names say nothing, from the shape of its rest pose.
+
+Legs are the mirrored chains that reach lowest; left and right come from the way the feet point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.motion import Array
+
+Joints = dict[str, tuple[str, str]]
+Feet = list[tuple[str, str, str, str]]
+
+_LOW = 0.2
+"""A leaf counts as a foot when its lowest end is in this part of the rig's height."""
+
+_ANKLE_LEVEL = 0.3
+"""The foot starts below this part of the hip's height (the ankle of a human is at 0.08, the knee at 0.54)."""
+
+_MIRROR_TOLERANCE = 0.06
+"""Two points count as mirrored when they agree to this part of the rig's height."""
+
+
+@dataclass(frozen=True)
+class _Skeleton:
+    names: list[str]
+    parents: list[int]
+    heads: Array
+    tails: Array
+
+    @property
+    def height(self) -> float:
+        points = np.concatenate([self.heads, self.tails])
+        return float(np.ptp(points[:, 2])) or 1.0
+
+    def chain(self, bone: int) -> list[int]:
+        """From the root down to a bone."""
+        path = [bone]
+        while self.parents[path[-1]] >= 0:
+            path.append(self.parents[path[-1]])
+        return path[::-1]
+
+
+def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
+    """Joints and feet (name, side, bone, toe bone) from the rest pose, or None where no pair of legs shows.
+
+    Steering bones are left out: where some bones deform, only those count.
+    """
+    skeleton = _read_skeleton(armature)
+    pairs = _mirrored_legs(skeleton)
+    if not pairs:
+        return None
+    left_axis = _left_axis(skeleton, pairs)
+    joints: Joints = {}
+    feet: Feet = []
+    for index, pair in enumerate(pairs):
+        limb = ("hip", "knee", "ankle", "ball", "toe") if index == 0 else ("shoulder", "elbow", "wrist", "", "")
+        stem = "foot" if index == 0 else "forefoot"
+        sides = sorted(pair, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left_axis))
+        for leg, side in zip(sides, "LR", strict=True):
+            thigh, shin, foot, toe = _segments(skeleton, leg)
+            for joint, bone in zip(limb, (thigh, shin, foot, toe), strict=False):
+                if joint and bone is not None:
+                    joints[f"{joint}_{side.lower()}"] = (skeleton.names[bone], "head")
+            if limb[4]:
+                joints[f"toe_{side.lower()}"] = (skeleton.names[foot if toe is None else toe], "tail")
+            feet.append((f"{stem}.{side}", side, skeleton.names[foot], "" if toe is None else skeleton.names[toe]))
+    hips = skeleton.parents[pairs[0][0][0]]
+    if hips >= 0:
+        joints["hips"] = (skeleton.names[hips], "head")
+    return joints, feet
+
+
+def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
+    """The deforming bones in world axes, each hung from its nearest ancestor that deforms."""
+    bones = list(armature.data.bones)
+    deforming = [bone for bone in bones if bone.use_deform] or bones
+    index = {bone.name: place for place, bone in enumerate(deforming)}
+    parents = [next((index[p.name] for p in bone.parent_recursive if p.name in index), -1) for bone in deforming]
+    turn = np.array(armature.matrix_world.to_3x3())
+    return _Skeleton(
+        names=[bone.name for bone in deforming],
+        parents=parents,
+        heads=np.array([bone.head_local for bone in deforming]) @ turn.T,
+        tails=np.array([bone.tail_local for bone in deforming]) @ turn.T,
+    )
+
+
+def _mirrored_legs(skeleton: _Skeleton) -> list[tuple[list[int], list[int]]]:
+    """Pairs of chains, from below where they part to the lowest bones; the lowest and longest pair first."""
+    has_child = {parent for parent in skeleton.parents if parent >= 0}
+    floor = min(skeleton.heads[:, 2].min(), skeleton.tails[:, 2].min())
+    limit = floor + _LOW * skeleton.height
+    lowest = np.minimum(skeleton.heads[:, 2], skeleton.tails[:, 2])
+    low_leaves = [b for b in range(len(skeleton.names)) if b not in has_child and lowest[b] < limit]
+    chains = [skeleton.chain(leaf) for leaf in low_leaves]
+
+    pairs: list[tuple[list[int], list[int]]] = []
+    for i, first in enumerate(chains):
+        for second in chains[i + 1 :]:
+            fork = _shared_length(first, second)
+            left, right = first[fork:], second[fork:]
+            if fork and len(left) == len(right) >= 2 and _are_mirrored(skeleton, left, right):
+                pairs.append((left, right))
+    return _one_per_limb(skeleton, pairs)
+
+
+def _shared_length(first: Sequence[int], second: Sequence[int]) -> int:
+    count = 0
+    while count < min(len(first), len(second)) and first[count] == second[count]:
+        count += 1
+    return count
+
+
+def _are_mirrored(skeleton: _Skeleton, left: Sequence[int], right: Sequence[int]) -> bool:
+    """Whether two chains are images of each other in a vertical plane."""
+    a, b = skeleton.heads[list(left)], skeleton.heads[list(right)]
+    normal = (a - b).mean(axis=0) * (1, 1, 0)
+    gap = float(np.linalg.norm(normal))
+    tolerance = _MIRROR_TOLERANCE * skeleton.height
+    if gap < tolerance:
+        return False
+    normal /= gap
+    middle = (a + b).mean(axis=0) / 2
+    image = b - 2 * ((b - middle) @ normal)[:, None] * normal
+    return bool(np.abs(image - a).max() < tolerance)
+
+
+def _one_per_limb(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]]) -> list[tuple[list[int], list[int]]]:
+    """The longest pair of each limb: toes of one foot share their leg, so they make many pairs."""
+
+    def reach(pair: tuple[list[int], list[int]]) -> float:
+        return float(np.ptp(skeleton.heads[pair[0]][:, 2]))
+
+    chosen: list[tuple[list[int], list[int]]] = []
+    taken: set[int] = set()
+    for pair in sorted(pairs, key=reach, reverse=True):
+        roots = {pair[0][0], pair[1][0]}
+        if reach(pair) > _LOW * skeleton.height and not roots & taken:
+            taken |= roots
+            chosen.append(pair)
+    return chosen
+
+
+def _left_axis(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]]) -> Array:
+    """Horizontal unit vector to the character's left, from where its feet point; Blender's front view if they do not."""
+    left, right = pairs[0]
+    across = (skeleton.heads[left] - skeleton.heads[right]).mean(axis=0) * (1, 1, 0)
+    across /= np.linalg.norm(across)
+    forward = np.zeros(3)
+    for leg in pairs[0]:
+        foot = _segments(skeleton, leg)[2]
+        forward += (skeleton.tails[leg[-1]] - skeleton.heads[foot]) * (1, 1, 0)
+    if len(pairs) > 1:
+        forward = (skeleton.heads[pairs[1][0][0]] - skeleton.heads[left[0]]) * (1, 1, 0)
+    facing = np.cross((0.0, 0.0, 1.0), forward)
+    if abs(facing @ across) < 1e-3 * skeleton.height:
+        facing = np.array((1.0, 0.0, 0.0)) if abs(across[0]) > 0.5 else across
+    return across if facing @ across > 0 else -across
+
+
+def _segments(skeleton: _Skeleton, leg: Sequence[int]) -> tuple[int, int, int, int | None]:
+    """Thigh, shin, foot and toe bone of a leg chain."""
+    floor = min(skeleton.heads[leg[-1], 2], skeleton.tails[leg[-1], 2])
+    level = (skeleton.heads[list(leg), 2] - floor) / max(skeleton.heads[leg[0], 2] - floor, 1e-9)
+    low = [place for place in range(1, len(leg)) if level[place] < _ANKLE_LEVEL]
+    ankle = low[0] if low else len(leg) - 1
+    knee = min(range(1, ankle), key=lambda place: abs(level[place] - 0.54)) if ankle > 1 else 0
+    toe = leg[ankle + 1] if ankle + 1 < len(leg) else None
+    return leg[0], leg[knee], leg[ankle], toe

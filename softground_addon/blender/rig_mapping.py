@@ -1,0 +1,339 @@
+"""Which bone is what: joints and feet of an armature, from the names of the usual rigs, else from its rest pose.
+
+Names are compared whole, after taking off the side and what a family puts around the words, so that a control, pole or
+twist bone (`foot_ik.L`, `c_foot_roll.l`, `thigh_twist_01_l`) is never taken for the limb. Where several bones carry one
+name (Rigify's DEF-, ORG- and control layers), the one that deforms the mesh wins.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import bpy
+
+from ..core.errors import InputError
+from .rest_pose import map_by_rest_pose
+
+
+@dataclass(frozen=True)
+class SoleSource:
+    """What one sole is made from.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "".
+    bone : str
+        Bone of the armature that carries the sole; empty if an object does.
+    toe_bone : str
+        Bone of the toes; empty for a sole of one piece.
+    object : str
+        Name of an object that prints with its own mesh instead; empty if a bone does.
+    """
+
+    name: str
+    side: str = ""
+    bone: str = ""
+    toe_bone: str = ""
+    object: str = ""
+
+
+@dataclass(frozen=True)
+class RigMapping:
+    """What the parts of a rig are.
+
+    Attributes
+    ----------
+    joints : mapping of str to (str, str)
+        Canonical joint (`core.motion.JOINTS`) to bone name and end, "head" or "tail".
+    soles : tuple of SoleSource
+        What prints, feet first.
+    method : str
+        "names" or "rest pose", for the report.
+    """
+
+    joints: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    soles: tuple[SoleSource, ...] = ()
+    method: str = "names"
+
+
+_LIMBS: Mapping[str, tuple[str, ...]] = {
+    "thigh": (
+        "thigh", "upleg", "upperleg", "hip", "thightwist", "thighstretch", "thighbend", "femur", "upperthigh", "legupper",
+        "hipjoint",
+    ),
+    "shin": (
+        "shin", "calf", "lowerleg", "loleg", "lowleg", "leg", "knee", "legstretch", "crus", "tibia", "leglower", "kneejoint",
+    ),
+    "foot": ("foot", "ankle", "feet", "footjoint", "anklejoint"),
+    "toe": ("toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe", "toe11", "toejoint"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shoulder", "armstretch", "upperarmbend", "shldr", "shldrbend", "humerus", "armupper"),
+    "forearm": ("forearm", "lowerarm", "loarm", "lowarm", "elbow", "forearmstretch", "forearmbend", "armlower", "radius"),
+    "hand": ("hand", "wrist", "palm"),
+}  # fmt: skip
+"""Words for the segments of a limb, most telling first, as they read without side, number and decoration."""
+
+_TRUNK: Mapping[str, tuple[str, ...]] = {
+    "hips": ("hips", "pelvis", "hip", "root", "cog", "spine"),
+    "spine": (
+        "spine",
+        "abdomen",
+        "lowerback",
+        "torso",
+        "waist",
+        "chest",
+        "spinelower",
+        "abdomenlower",
+        "back",
+        "upperbody",
+    ),
+    "neck": ("neck", "lowerneck", "necklower", "spine4"),
+    "head": ("head", "skull", "spine6"),
+}
+
+_DECORATION = frozenset(
+    "def org mixamorig bip bip01 bip001 valvebiped j bn jnt joint jt bone bind bnd deform skin sk cc base rig armature skel".split()
+)
+"""Words that families put around a bone's name and that say nothing about what it is."""
+
+_DISTRACTIONS = frozenset(
+    "ik fk pole ctrl control ctl controller cntrl target tgt mch tweak vis wgt ref helper offset parent master spin pivot "
+    "heel roll snap switch socket end nub leaf effector locator track".split()
+)
+"""Words of bones that steer a rig; none of them is ever part of the body."""
+
+_SIDES = {"l": "L", "left": "L", "r": "R", "right": "R"}
+
+_WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+
+_COMMON_PREFIX_SHARE = 0.6
+"""A first word that so many bones share is the character's name, not a body part."""
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A bone's name, taken apart."""
+
+    bone: str
+    side: str
+    word: str
+    number: int
+    decoration: int
+    deforms: bool
+    depth: int
+
+
+def map_rig(armature: bpy.types.Object) -> RigMapping:
+    """Joints and feet of an armature.
+
+    Parameters
+    ----------
+    armature : bpy.types.Object
+        Only read; may be linked or overridden.
+
+    Returns
+    -------
+    RigMapping
+
+    Raises
+    ------
+    InputError
+        If the object is no armature, or no feet are found by name or by rest pose.
+    """
+    require_armature(armature)
+    bones = armature.data.bones
+    mapping = _map_by_names(bones)
+    if mapping is None:
+        mapping = map_by_rest_pose(armature)
+        mapping = mapping and RigMapping(
+            joints=mapping[0], soles=tuple(SoleSource(*foot) for foot in mapping[1]), method="rest pose"
+        )
+    if not mapping:
+        raise InputError(
+            f"No feet found in armature '{armature.name}': neither by bone names nor as mirrored lowest chains of the "
+            "rest pose. Choose the foot bones by hand in the character's list of soles."
+        )
+    return mapping
+
+
+def require_armature(armature: bpy.types.Object | None) -> None:
+    """Raise InputError unless the object is an armature with bones."""
+    if armature is None:
+        raise InputError("No armature is chosen: select the character's armature and add it again.")
+    if armature.type != "ARMATURE":
+        raise InputError(
+            f"'{armature.name}' is a {armature.type.lower()}, not an armature: select the character's armature."
+        )
+    if not armature.data.bones:
+        raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")
+
+
+def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
+    """The mapping that the names give, or None where they name no foot."""
+    readings = _read_names(bones)
+    by_name = {bone.name: bone for bone in bones}
+    joints: dict[str, tuple[str, str]] = {}
+    soles = []
+    for side, suffix in (("L", "_l"), ("R", "_r")):
+        limb = {segment: _best(readings, words, side) for segment, words in _LIMBS.items()}
+        _settle_ambiguities(limb, readings, by_name, side)
+        foot, toe = limb["foot"], limb["toe"]
+        for joint, segment in _JOINT_HEADS.items():
+            if bone := limb[segment]:
+                joints[joint + suffix] = (bone, "head")
+        if "wrist" + suffix not in joints and limb["forearm"]:
+            joints["wrist" + suffix] = (limb["forearm"], "tail")
+        if foot or toe:
+            joints["toe" + suffix] = (toe or foot, "tail")
+            soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
+    if not soles:
+        return None
+    joints.update(_map_trunk(readings, by_name, joints))
+    return RigMapping(joints=joints, soles=tuple(soles))
+
+
+_JOINT_HEADS = {
+    "hip": "thigh",
+    "knee": "shin",
+    "ankle": "foot",
+    "ball": "toe",
+    "shoulder": "upper_arm",
+    "elbow": "forearm",
+    "wrist": "hand",
+}
+"""Joint to the segment whose head it is."""
+
+
+def _settle_ambiguities(
+    limb: dict[str, str], readings: list[_Reading], bones: Mapping[str, bpy.types.Bone], side: str
+) -> None:
+    """Words that mean different bones in different families: `leg` above `knee`, `ankle` above `foot`, `shoulder` above `arm`."""
+    knee, leg = (_best(readings, (word,), side) for word in ("knee", "leg"))
+    if knee and leg and _is_ancestor(bones, leg, knee):
+        limb["shin"] = knee
+        limb["thigh"] = limb["thigh"] if limb["thigh"] and _is_ancestor(bones, limb["thigh"], leg) else leg
+    ankle, foot = (_best(readings, (word,), side) for word in ("ankle", "foot"))
+    if ankle and foot and _is_ancestor(bones, ankle, foot):
+        limb["foot"] = ankle
+        limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
+    if limb["toe"] and limb["foot"] and _is_ancestor(bones, limb["toe"], limb["foot"]):
+        limb["toe"] = ""
+
+
+def _map_trunk(
+    readings: list[_Reading], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, tuple[str, str]]
+) -> dict[str, tuple[str, str]]:
+    """Hips, spine, neck and head; the hips may also be where the thighs meet."""
+    found = {joint: _best(readings, words, "") for joint, words in _TRUNK.items()}
+    if not found["hips"]:
+        thighs = [limbs[joint][0] for joint in ("hip_l", "hip_r") if joint in limbs]
+        found["hips"] = _common_ancestor(bones, thighs)
+    top = found["neck"] or found["head"]
+    if found["hips"] and top:
+        chain = _ancestors(bones, top)
+        if found["hips"] in chain:
+            above = chain[: chain.index(found["hips"])]
+            words = {reading.bone: reading.word for reading in readings}
+            trunk = [bone for bone in above if words.get(bone) not in _TRUNK["neck"]]
+            found["spine"] = trunk[-1] if trunk else ""
+    if found["spine"] == found["hips"]:
+        spines = sorted(
+            (r.number, r.bone) for r in readings if r.word == "spine" and r.deforms and r.bone != found["hips"]
+        )
+        found["spine"] = spines[0][1] if spines else ""
+    return {joint: (bone, "head") for joint, bone in found.items() if bone}
+
+
+def _best(readings: list[_Reading], words: tuple[str, ...], side: str) -> str:
+    """Name of the bone that fits best: deforming, by the most telling word, unnumbered, undecorated; empty if none does."""
+    rank = {word: place for place, word in enumerate(words)}
+    fits = []
+    for reading in readings:
+        if reading.side != side:
+            continue
+        numbered = f"{reading.word}{reading.number}"
+        if numbered in rank:
+            fits.append((not reading.deforms, rank[numbered], 0, reading.decoration, reading.depth, reading.bone))
+        elif reading.word in rank:
+            number = max(reading.number, 0)
+            fits.append(
+                (not reading.deforms, rank[reading.word], number, reading.decoration, reading.depth, reading.bone)
+            )
+    return min(fits)[-1] if fits else ""
+
+
+def _read_names(bones: Iterable[bpy.types.Bone]) -> list[_Reading]:
+    """The bones whose names can name a part of the body."""
+    split = {bone.name: _split(bone.name) for bone in bones}
+    first = Counter(words[0] for words in split.values() if len(words) > 1)
+    shared = {word for word, count in first.items() if count > _COMMON_PREFIX_SHARE * len(split) and len(split) > 4}
+    readings = []
+    for bone in bones:
+        words = split[bone.name]
+        if words and words[0] in shared:
+            words = words[1:]
+        reading = _read(bone, words)
+        if reading:
+            readings.append(reading)
+    return readings
+
+
+def _split(name: str) -> list[str]:
+    """Lower-case words and numbers of a name, without its namespace."""
+    return [word.lower() for word in _WORDS.findall(name.rsplit(":", 1)[-1])]
+
+
+def _read(bone: bpy.types.Bone, words: list[str]) -> _Reading | None:
+    if not words or bone.name.startswith("c_") or _DISTRACTIONS.intersection(words):
+        return None
+    side, parts, numbers, decoration = "", [], [], 0
+    for word in words:
+        if word in _SIDES and not side:
+            side = _SIDES[word]
+        elif word.isdigit():
+            if parts:
+                numbers.append(int(word))
+        elif word in _DECORATION:
+            decoration += 1
+        elif word not in ("c", "x", "m", "center", "centre", "mid"):
+            parts.append(word)
+    word = "".join(parts)
+    if not side:
+        side, word = _glued_side(word)
+    number = int("".join(map(str, numbers))) if numbers else -1
+    return _Reading(bone.name, side, word, number, decoration, bone.use_deform, len(bone.parent_recursive))
+
+
+_BODY_WORDS = frozenset(word for words in (*_LIMBS.values(),) for word in words)
+
+
+def _glued_side(word: str) -> tuple[str, str]:
+    """Side and rest of a word such as `lhand` or `leftfoot`."""
+    for prefix in ("left", "right", "l", "r"):
+        if word.startswith(prefix) and word[len(prefix) :] in _BODY_WORDS:
+            return _SIDES[prefix], word[len(prefix) :]
+        if word.endswith(prefix) and word[: -len(prefix)] in _BODY_WORDS and len(prefix) > 1:
+            return _SIDES[prefix], word[: -len(prefix)]
+    return "", word
+
+
+def _ancestors(bones: Mapping[str, bpy.types.Bone], name: str) -> list[str]:
+    """Names of a bone's parents, nearest first."""
+    return [bone.name for bone in bones[name].parent_recursive]
+
+
+def _is_ancestor(bones: Mapping[str, bpy.types.Bone], ancestor: str, descendant: str) -> bool:
+    return ancestor in _ancestors(bones, descendant)
+
+
+def _common_ancestor(bones: Mapping[str, bpy.types.Bone], names: list[str]) -> str:
+    """Nearest bone that all of the given ones hang from; empty if there is none."""
+    if not names:
+        return ""
+    chains = [_ancestors(bones, name) for name in names]
+    return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")

@@ -1,0 +1,302 @@
+"""Soles of a rig: from the meshes that hang on its feet where there are any, else from the lengths of its bones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import InputError
+from ..core.foot_attitude import FlatFoot, ankle_height, flat_foot, foot_length
+from ..core.motion import Array
+from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_mesh, sole_from_underside
+from .rig_mapping import SoleSource
+
+_OWNED = 0.5
+"""A vertex belongs to the foot when the foot's bones hold more than this share of its weight."""
+
+_REST_IS_FLAT = np.radians(10.0)
+"""Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
+
+_FEWEST_TRIANGLES = 4
+
+
+@dataclass(frozen=True)
+class FootMesh:
+    """The part of the character's meshes that moves with one foot, in the rest pose.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        World positions in the rest pose [m].
+    toe_weight : (V,) float array
+        How much of each vertex moves with the toes.
+    triangles : (T, 3) int array
+    """
+
+    vertices: Array
+    toe_weight: Array
+    triangles: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class FootBones:
+    """A foot as its bones have it, in the rest pose and in motion.
+
+    Attributes
+    ----------
+    ankle, tail : (3,) float arrays
+        Ends of the foot bone in the rest pose, world [m].
+    ball, tip : (3,) float arrays or None
+        Ends of the toe bone; None without one.
+    forward : (3,) float array
+        Where the character faces, for feet whose bones point nowhere.
+    foot_rotations, toe_rotations : (F, 3, 3) float arrays
+        From the rest pose to each sample.
+    planted : (F,) bool array
+        When the foot stands.
+    leg : float
+        Thigh and shank together [m].
+    mirrored : bool
+        Whether the armature is mirrored (negative scale), so that a foot named left is shaped as a right one.
+    """
+
+    ankle: Array
+    tail: Array
+    ball: Array | None
+    tip: Array | None
+    forward: Array
+    foot_rotations: Array
+    toe_rotations: Array
+    planted: NDArray[np.bool_]
+    leg: float
+    mirrored: bool
+
+
+def foot_sole(source: SoleSource, bones: FootBones, mesh: FootMesh | None) -> tuple[PlacedSole, FlatFoot]:
+    """Sole of a foot and how its bones carry it.
+
+    Raises
+    ------
+    InputError
+        If the foot's mesh has no underside.
+    """
+    hinge = bones.tail if bones.ball is None else bones.ball
+    flat = flat_foot(
+        bones.ankle,
+        hinge,
+        _pointing(bones, hinge),
+        bones.foot_rotations,
+        bones.toe_rotations,
+        bones.planted,
+        trust_rest_within=_REST_IS_FLAT if mesh else 0.0,
+    )
+    ball = flat.ball if bones.ball is not None else None
+    if mesh is not None:
+        vertices = _flattened(mesh, flat)
+        return sole_from_underside(vertices, mesh.triangles, name=source.name, side=source.side, ball=ball), flat
+    return _bone_sole(source, bones, flat), flat
+
+
+def _pointing(bones: FootBones, hinge: Array) -> Array:
+    """Direction of the toes in the rest pose, the character's own where the foot bone is too short or too steep to tell."""
+    foot = hinge - bones.ankle
+    length = float(np.linalg.norm(foot))
+    if length < 0.02 * bones.leg:
+        return bones.forward
+    steepness = abs(float(foot @ _typical_up(bones))) / length
+    return bones.forward if steepness > 0.95 else foot
+
+
+def _typical_up(bones: FootBones) -> Array:
+    standing = bones.foot_rotations[bones.planted]
+    return np.median(standing[:, 2], axis=0) if len(standing) else np.array((0.0, 0.0, 1.0))
+
+
+def _bone_sole(source: SoleSource, bones: FootBones, flat: FlatFoot) -> PlacedSole:
+    """An anatomical sole under the bones."""
+    to_foot = np.linalg.inv(flat.foot_frame)
+    to_toe = np.linalg.inv(flat.toe_frame)
+    if bones.ball is not None and bones.tip is not None:
+        ball, tip = _moved(to_foot, bones.ball), _moved(to_toe, bones.tip)
+        length = foot_length(float(ball[0]), float(tip[0]), bones.leg)
+        lowest = -min(float(ball[2]), float(tip[2]))
+    else:
+        tip = _moved(to_foot, bones.tail)
+        length = foot_length(None, float(tip[0]), bones.leg)
+        lowest = -float(tip[2])
+    behind = ANKLE_POSITION * length
+    placed = anatomical_sole(
+        length,
+        name=source.name,
+        side=source.side,
+        ball=None if bones.ball is None else behind + flat.ball,
+        medial={"L": -1.0, "R": 1.0}.get(source.side, 0.0) * (-1 if bones.mirrored else 1),
+    )
+    placements = placed.placements.copy()
+    placements[:, 0, 3] -= behind
+    placements[:, 2, 3] -= ankle_height(lowest, length)
+    return PlacedSole(placed.sole, placements)
+
+
+def _flattened(mesh: FootMesh, flat: FlatFoot) -> Array:
+    """Vertices in the sole frame with foot and toes laid flat, by linear blend skinning."""
+    foot = _moved(np.linalg.inv(flat.foot_frame), mesh.vertices)
+    toe = _moved(np.linalg.inv(flat.toe_frame), mesh.vertices)
+    weight = mesh.toe_weight[:, None]
+    return (1 - weight) * foot + weight * toe
+
+
+def _moved(transform: Array, points: Array) -> Array:
+    return points @ transform[:3, :3].T + transform[:3, 3]
+
+
+def object_sole(source: SoleSource, thing: bpy.types.Object, scale: Array) -> PlacedSole:
+    """Sole of an object from its own mesh, its local axes taken as the sole frame after scaling.
+
+    Parameters
+    ----------
+    source : SoleSource
+    thing : bpy.types.Object
+    scale : (3,) float array
+        Size of a local unit along each axis [m].
+
+    Raises
+    ------
+    InputError
+        If the object has no mesh to print with.
+    """
+    if thing.type != "MESH":
+        raise InputError(f"'{thing.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")
+    vertices, triangles = _read_mesh(thing.data)
+    return sole_from_mesh(vertices * scale, triangles, name=source.name, side=source.side)
+
+
+def find_foot_meshes(
+    scene: bpy.types.Scene, armature: bpy.types.Object, sources: Iterable[SoleSource], rest_world: Array
+) -> dict[str, FootMesh]:
+    """The meshes on each foot, by name of the sole.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Where to look for meshes; only read.
+    armature : bpy.types.Object
+    sources : iterable of SoleSource
+    rest_world : (4, 4) float array
+        Armature space to world in the rest pose [m].
+    """
+    pieces: dict[str, list[FootMesh]] = {}
+    groups = {source.name: _bone_families(armature, source) for source in sources if source.bone}
+    for thing in scene.objects:
+        if thing.type != "MESH" or thing.hide_render:
+            continue
+        if _deformed_by(thing, armature):
+            to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
+            found = _weighted_parts(thing, groups, rest_world @ to_armature)
+        elif thing.parent == armature and thing.parent_type == "BONE":
+            found = _rigid_part(thing, armature, groups, rest_world)
+        else:
+            continue
+        for name, part in found.items():
+            pieces.setdefault(name, []).append(part)
+    return {name: _joined(parts) for name, parts in pieces.items() if sum(len(p.triangles) for p in parts) >= _FEWEST_TRIANGLES}
+
+
+def _bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
+    """Names of the bones that move with the foot and, of these, with the toes."""
+    bones = armature.data.bones
+    toes: frozenset[str] = frozenset()
+    if source.toe_bone in bones:
+        toe = bones[source.toe_bone]
+        toes = frozenset((toe.name, *(bone.name for bone in toe.children_recursive)))
+    foot = bones[source.bone]
+    return frozenset((foot.name, *(bone.name for bone in foot.children_recursive))) | toes, toes
+
+
+def _deformed_by(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return any(m.type == "ARMATURE" and m.object == armature for m in thing.modifiers) or (
+        thing.parent == armature and thing.parent_type == "ARMATURE"
+    )
+
+
+def _weighted_parts(
+    thing: bpy.types.Object, groups: Mapping[str, tuple[frozenset[str], frozenset[str]]], to_world: Array
+) -> dict[str, FootMesh]:
+    """Parts of a skinned mesh that belong to each foot."""
+    names = {group.index: group.name for group in thing.vertex_groups}
+    feet = frozenset(name for family, _ in groups.values() for name in family)
+    if not feet.intersection(names.values()):
+        return {}
+    bones = frozenset(names.values())
+    vertex, group, weight = _read_weights(thing.data)
+    vertices, triangles = _read_mesh(thing.data)
+    count = len(vertices)
+    group_name = np.array([names.get(index, "") for index in range(max(names, default=0) + 1)])
+    total = np.bincount(vertex, weight, count)
+    parts = {}
+    for name, (family, toes) in groups.items():
+        if not family & bones:
+            continue
+        in_foot = np.isin(group_name, list(family))[group]
+        in_toes = np.isin(group_name, list(toes))[group] if toes else np.zeros(len(group), dtype=bool)
+        foot_weight = np.bincount(vertex[in_foot], weight[in_foot], count)
+        toe_weight = np.bincount(vertex[in_toes], weight[in_toes], count)
+        owned = foot_weight > _OWNED * np.maximum(total, 1e-9)
+        chosen = triangles[owned[triangles].all(axis=1)]
+        if len(chosen):
+            share = toe_weight / np.maximum(foot_weight, 1e-9)
+            parts[name] = FootMesh(_moved(to_world, vertices), np.clip(share, 0.0, 1.0), chosen)
+    return parts
+
+
+def _rigid_part(
+    thing: bpy.types.Object,
+    armature: bpy.types.Object,
+    groups: Mapping[str, tuple[frozenset[str], frozenset[str]]],
+    rest_world: Array,
+) -> dict[str, FootMesh]:
+    """A mesh parented to a bone of a foot, as it sits in the rest pose."""
+    bone = armature.data.bones.get(thing.parent_bone)
+    if bone is None:
+        return {}
+    parent = np.eye(4)
+    if not bone.use_relative_parent:
+        parent = np.array(bone.matrix_local)
+        parent[:3, 3] += parent[:3, 1] * bone.length
+    to_world = rest_world @ parent @ np.array(thing.matrix_parent_inverse @ thing.matrix_basis)
+    vertices, triangles = _read_mesh(thing.data)
+    return {
+        name: FootMesh(_moved(to_world, vertices), np.full(len(vertices), float(bone.name in toes)), triangles)
+        for name, (family, toes) in groups.items()
+        if bone.name in family
+    }
+
+
+def _joined(parts: list[FootMesh]) -> FootMesh:
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return FootMesh(
+        vertices=np.concatenate([part.vertices for part in parts]),
+        toe_weight=np.concatenate([part.toe_weight for part in parts]),
+        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, first[:-1], strict=True)]),
+    )
+
+
+def _read_mesh(mesh: bpy.types.Mesh) -> tuple[Array, NDArray[np.intp]]:
+    """Vertices (V, 3) and triangles (T, 3) of a mesh as modelled."""
+    vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", vertices)
+    mesh.calc_loop_triangles()
+    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
+
+
+def _read_weights(mesh: bpy.types.Mesh) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Vertex, group and weight of every vertex weight."""
+    entries = [(vertex.index, group.group, group.weight) for vertex in mesh.vertices for group in vertex.groups]
+    table = np.array(entries, dtype=float).reshape(-1, 3)
+    return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]

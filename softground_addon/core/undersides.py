@@ -1,0 +1,182 @@
+"""The underside of a mesh as a map: a vectorised z-buffer seen from below."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .motion import Array
+
+_SUPERSAMPLING = 4
+"""Samples per node along each axis; edges are then known to a few per cent of the node distance."""
+
+_PAIR_BLOCK = 2_000_000
+"""Triangle-sample pairs handled at once, to bound memory."""
+
+_RELAXATIONS = 200
+"""Sweeps that smooth the continuation outside; it only has to be smooth near the edge."""
+
+
+def underside_map(
+    vertices: Array,
+    triangles: NDArray[np.intp],
+    origin: Array,
+    shape: tuple[int, int],
+    spacing: float,
+    *,
+    band: float = np.inf,
+) -> tuple[Array, Array]:
+    """Height of the lowest surface over each node of a grid, and how much of the node's cell it covers.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+        Positions, z up [m].
+    triangles : (T, 3) int array
+    origin : (2,) float array
+        Position of node (0, 0) [m].
+    shape : (rows, columns)
+    spacing : float
+        Distance between nodes [m].
+    band : float
+        Surfaces higher than this above the lowest one do not count [m].
+
+    Returns
+    -------
+    heights : (rows, columns) float array
+        Mean height of the underside in the node's cell [m], NaN where nothing counts.
+    coverage : (rows, columns) float array
+        Covered fraction of the node's cell.
+    """
+    fine = spacing / _SUPERSAMPLING
+    fine_origin = np.asarray(origin) - spacing / 2 + fine / 2
+    rows, columns = shape
+    lowest = _z_buffer(vertices, triangles, fine_origin, (rows * _SUPERSAMPLING, columns * _SUPERSAMPLING), fine)
+    counts = lowest <= lowest.min() + band if np.isfinite(lowest).any() else np.zeros(lowest.shape, dtype=bool)
+    counts &= np.isfinite(lowest)
+
+    cells = (rows, _SUPERSAMPLING, columns, _SUPERSAMPLING)
+    samples = counts.reshape(cells).sum(axis=(1, 3))
+    total = np.where(counts, lowest, 0.0).reshape(cells).sum(axis=(1, 3))
+    with np.errstate(invalid="ignore"):
+        heights = np.where(samples > 0, total / samples, np.nan)
+    return heights, samples / _SUPERSAMPLING**2
+
+
+def _z_buffer(
+    vertices: Array, triangles: NDArray[np.intp], origin: Array, shape: tuple[int, int], spacing: float
+) -> Array:
+    """Lowest z of the triangles over each node, infinite where there is none."""
+    rows, columns = shape
+    corners = vertices[triangles]
+    flat = (corners[..., :2] - origin) / spacing
+    first = np.clip(np.ceil(flat.min(axis=1)).astype(int), 0, (columns, rows))
+    last = np.clip(np.floor(flat.max(axis=1)).astype(int), -1, (columns - 1, rows - 1))
+    size = np.maximum(last - first + 1, 0)
+    count = size.prod(axis=1)
+    order = np.cumsum(count)
+
+    buffer = np.full(rows * columns, np.inf)
+    start = 0
+    while start < len(triangles):
+        done = order[start - 1] if start else 0
+        stop = max(start + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
+        block = slice(start, stop)
+        _draw(buffer, columns, flat[block], corners[block, :, 2], first[block], size[block], count[block])
+        start = stop
+    return buffer.reshape(shape)
+
+
+def _draw(
+    buffer: Array,
+    columns: int,
+    flat: Array,
+    z: Array,
+    first: NDArray[np.intp],
+    size: NDArray[np.intp],
+    count: NDArray[np.intp],
+) -> None:
+    """Lower the buffer to a block of triangles, all pairs of triangle and covered node at once."""
+    triangle = np.repeat(np.arange(len(count)), count)
+    within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    row, column = np.divmod(within, size[triangle, 0])
+    node = first[triangle] + np.column_stack([column, row])
+
+    a, b, c = (flat[:, corner] for corner in range(3))
+    determinant = _cross(b - a, c - a)
+    usable = np.abs(determinant) > 1e-12
+    determinant = np.where(usable, determinant, 1.0)
+    offset = node - a[triangle]
+    v = _cross(offset, (c - a)[triangle]) / determinant[triangle]
+    w = _cross((b - a)[triangle], offset) / determinant[triangle]
+    edge = 1e-9
+    covered = (v >= -edge) & (w >= -edge) & (v + w <= 1 + edge) & usable[triangle]
+    height = z[triangle, 0] + v * (z[:, 1] - z[:, 0])[triangle] + w * (z[:, 2] - z[:, 0])[triangle]
+    index = node[:, 1] * columns + node[:, 0]
+    np.minimum.at(buffer, index[covered], height[covered])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def continue_outside(heights: Array) -> Array:
+    """A map with its NaN nodes filled: the nearest known height first, then smoothed toward a harmonic continuation.
+
+    Parameters
+    ----------
+    heights : (rows, columns) float array
+
+    Returns
+    -------
+    (rows, columns) float array
+        Equal to the input where that is a number.
+    """
+    known = np.isfinite(heights)
+    filled = _spread_nearest(heights, known)
+    for _ in range(_RELAXATIONS):
+        border = np.pad(filled, 1, mode="edge")
+        mean = (border[:-2, 1:-1] + border[2:, 1:-1] + border[1:-1, :-2] + border[1:-1, 2:]) / 4
+        filled = np.where(known, heights, mean)
+    return filled
+
+
+def _spread_nearest(heights: Array, known: NDArray[np.bool_]) -> Array:
+    """Each unknown node takes the height of the nearest known one."""
+    source = np.argwhere(known)
+    target = np.argwhere(~known)
+    filled = heights.copy()
+    block = max(1, _PAIR_BLOCK // max(len(source), 1))
+    for first in range(0, len(target), block):
+        part = target[first : first + block]
+        nearest = ((part[:, None] - source) ** 2).sum(axis=-1).argmin(axis=1)
+        filled[tuple(part.T)] = heights[tuple(source[nearest].T)]
+    return filled
+
+
+def sample_map(values: Array, points: Array, origin: Array, spacing: float) -> Array:
+    """Values of a map at points, bilinear between nodes and constant beyond the border.
+
+    Parameters
+    ----------
+    values : (rows, columns) float array
+    points : (..., 2) float array
+        Positions [m].
+    origin : (2,) float array
+        Position of node (0, 0) [m].
+    spacing : float
+        Distance between nodes [m].
+
+    Returns
+    -------
+    (...) float array
+    """
+    rows, columns = values.shape
+    position = np.clip((np.asarray(points) - origin) / spacing, 0, (columns - 1, rows - 1))
+    corner = np.minimum(position.astype(int), (max(columns - 2, 0), max(rows - 2, 0)))
+    u, v = np.moveaxis(position - corner, -1, 0)
+    column, row = np.moveaxis(corner, -1, 0)
+    right, above = np.minimum(column + 1, columns - 1), np.minimum(row + 1, rows - 1)
+    return (1 - v) * ((1 - u) * values[row, column] + u * values[row, right]) + v * (
+        (1 - u) * values[above, column] + u * values[above, right]
+    )
