@@ -232,13 +232,21 @@ def rim_weights(coverage: Array, reach: float, room: Array | None = None) -> Arr
            [0.25, 0.  , 0.25],
            [0.  , 0.25, 0.  ]])
     """
-    # Half-covered cells bound the contact; a contact smaller than a cell has none and is bounded by half its most.
-    bound = np.minimum(0.5, 0.5 * coverage.max(axis=(1, 2), keepdims=True))
-    weights = dilate((coverage >= bound) & (coverage > 0), reach) * (1.0 - coverage)
+    weights = dilate(in_contact(coverage), reach) * (1.0 - coverage)
     if room is not None:
         weights *= room
     total = weights.sum(axis=(1, 2), keepdims=True)
     return np.divide(weights, total, out=weights, where=total > 0)
+
+
+def in_contact(coverage: Array) -> Mask:
+    """Cells that count as in contact at each of N steps: those covered by half.
+
+    A contact smaller than a cell covers none by half; then those count that it covers by half as much as any.
+    """
+    bound = np.minimum(0.5, 0.5 * coverage.max(axis=(1, 2), keepdims=True))
+    mask: Mask = (coverage >= bound) & (coverage > 0)
+    return mask
 
 
 def dilate(mask: Mask, reach: float) -> Mask:

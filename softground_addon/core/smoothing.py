@@ -1,0 +1,86 @@
+"""The display blur: a Gaussian over the touched ground that keeps every volume. It never feeds back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .heightfield import TILE, HeightField, SparseGrid, Window
+
+Array = NDArray[np.float64]
+
+CUT_OFF = 4.0
+"""The Gaussian ends at so many standard deviations, where it has fallen to 0.03 % of its peak."""
+
+
+def gaussian_kernel(sigma: float) -> Array:
+    """Weights of a Gaussian at whole cells, summing to 1.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation in cells; far below one cell only the middle is left.
+
+    Examples
+    --------
+    >>> gaussian_kernel(0.5).round(3)
+    array([0.   , 0.107, 0.786, 0.107, 0.   ])
+    >>> gaussian_kernel(0.0)
+    array([1.])
+    """
+    radius = int(CUT_OFF * sigma + 0.5)
+    if radius == 0:
+        return np.ones(1)
+    weights = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    return np.asarray(weights / weights.sum())
+
+
+def blurred_window(field: SparseGrid, window: Window, sigma: float) -> Array:
+    """Blurred values of a window, as two products with banded matrices.
+
+    Parameters
+    ----------
+    field : SparseGrid
+        Raw values; what lies around the window is blurred into it.
+    window : Window
+    sigma : float
+        Standard deviation [m].
+
+    Returns
+    -------
+    (channels, rows, columns) float array
+    """
+    kernel = gaussian_kernel(sigma / field.cell_size)
+    margin = len(kernel) // 2
+    if margin == 0:
+        return field.read(window)
+    values = field.read(window.expanded(margin))
+    blurred: Array = _band(kernel, window.rows) @ values @ _band(kernel, window.columns).T
+    return blurred
+
+
+def blurred(field: HeightField, sigma: float) -> HeightField:
+    """The whole height field blurred; its volumes are those of the raw one.
+
+    Parameters
+    ----------
+    field : HeightField
+    sigma : float
+        Standard deviation [m].
+    """
+    result = HeightField(field.cell_size)
+    spread = -(-(len(gaussian_kernel(sigma / field.cell_size)) // 2) // TILE)  # tiles that a touched one blurs into
+    around = range(-spread, spread + 1)
+    places = {(column + i, row + j) for column, row in field.tiles for i in around for j in around}
+    for column, row in sorted(places):
+        window = Window(column * TILE, row * TILE, TILE, TILE)
+        result.write(window, blurred_window(field, window, sigma))
+    return result
+
+
+def _band(kernel: Array, size: int) -> Array:
+    """Matrix (size, size + 2·margin) with the kernel along its diagonal."""
+    band = np.zeros((size, size + len(kernel) - 1))
+    for offset, weight in enumerate(kernel):
+        np.fill_diagonal(band[:, offset:], weight)
+    return band
