@@ -1,0 +1,121 @@
+"""A walking person in Blender: an armature, one weighted mesh, simple materials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from sample_scenes.body import BONES, Body
+from sample_scenes.figure import PARTS, hiker
+
+TO_BLENDER = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+"""Rotation from the body's frame (x forward) to Blender's custom (-Y forward, .L on +X)."""
+
+_LOOKS = {
+    "skin": ((0.52, 0.29, 0.20), 0.50),
+    "jacket": ((0.42, 0.055, 0.035), 0.75),
+    "trousers": ((0.055, 0.07, 0.095), 0.85),
+    "cap": ((0.60, 0.34, 0.06), 0.90),
+    "shoe": ((0.12, 0.065, 0.035), 0.55),
+    "sole": ((0.34, 0.31, 0.26), 0.70),
+}
+"""Base colour (linear) and roughness of each part."""
+
+
+def create_character(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A person in rest pose at the origin, facing -Y.
+
+    Returns
+    -------
+    The armature object; its mesh child is named `name` + " Figure".
+    """
+    armature = create_armature(name, body, collection)
+    figure = hiker(body)
+    mesh = bpy.data.meshes.new(f"{name} Figure")
+    faces = [quad[:3] if quad[2] == quad[3] else quad for quad in figure.quads.tolist()]
+    mesh.from_pydata((figure.vertices @ TO_BLENDER.T).tolist(), [], faces)
+    for part in PARTS:
+        mesh.materials.append(_material(part))
+    mesh.polygons.foreach_set("material_index", figure.parts.astype(np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(figure.parts), dtype=bool))
+    mesh.update()
+
+    skin = bpy.data.objects.new(mesh.name, mesh)
+    collection.objects.link(skin)
+    skin.parent = armature
+    _assign_weights(skin, figure.weights)
+    skin.modifiers.new("Armature", "ARMATURE").object = armature
+    return armature
+
+
+def create_armature(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
+    """The bones of `BONES` in rest pose at the origin, facing -Y."""
+    armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    collection.objects.link(armature)
+    view_layer = bpy.context.view_layer
+    previous = view_layer.objects.active
+    view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        edit_bones = armature.data.edit_bones
+        for bone, (head, tail, parent) in BONES.items():
+            edit_bone = edit_bones.new(bone)
+            edit_bone.head, edit_bone.tail = TO_BLENDER @ body.joints[head], TO_BLENDER @ body.joints[tail]
+            if parent:
+                edit_bone.parent = edit_bones[parent]
+                edit_bone.use_connect = bool(np.allclose(body.joints[head], body.joints[BONES[parent][1]]))
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        view_layer.objects.active = previous
+    return armature
+
+
+def copy_character(armature: bpy.types.Object, name: str, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A second object of the same character: armature data, action and mesh are shared."""
+    twin = armature.copy()
+    twin.name = name
+    collection.objects.link(twin)
+    for child in _meshes(armature):
+        skin = child.copy()
+        skin.name = f"{name} Figure"
+        collection.objects.link(skin)
+        skin.parent = twin
+        for modifier in skin.modifiers:
+            if modifier.type == "ARMATURE":
+                modifier.object = twin
+    return twin
+
+
+def _meshes(armature: bpy.types.Object) -> Iterable[bpy.types.Object]:
+    return [child for child in armature.children if child.type == "MESH"]
+
+
+def _assign_weights(skin: bpy.types.Object, weights: np.ndarray) -> None:
+    """Write weights bone by bone, small ones dropped; equal values go in one call, on a grid of 1/500."""
+    steps = 500
+    kept = np.round(
+        np.where(weights < 0.01, 0.0, weights) / np.where(weights < 0.01, 0, weights).sum(1, keepdims=True) * steps
+    )
+    strongest = kept.argmax(axis=1)
+    kept[np.arange(len(kept)), strongest] += steps - kept.sum(axis=1)
+    for column, bone in enumerate(BONES):
+        group = skin.vertex_groups.new(name=bone)
+        for level in np.unique(kept[:, column]):
+            if level > 0:
+                group.add(np.flatnonzero(kept[:, column] == level).tolist(), float(level / steps), "REPLACE")
+
+
+def _material(part: str) -> bpy.types.Material:
+    name = f"SoftGround Sample {part}"
+    material = bpy.data.materials.get(name)
+    if material is None:
+        colour, roughness = _LOOKS[part]
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        shader.inputs["Base Color"].default_value = (*colour, 1.0)
+        shader.inputs["Roughness"].default_value = roughness
+        material.diffuse_color = (*colour, 1.0)
+    return material

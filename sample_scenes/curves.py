@@ -1,0 +1,44 @@
+"""Curves through a few numbers, for shapes and motions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def monotone_cubic(x: ArrayLike, knots: ArrayLike, values: ArrayLike) -> Array:
+    """Piecewise cubic that never overshoots its knots, so that level stretches stay level (Fritsch & Carlson 1980).
+
+    Knots must increase; outside them the end values continue.
+    """
+    knots, values = np.asarray(knots, float), np.asarray(values, float)
+    width = np.diff(knots)
+    secant = np.diff(values) / width
+    same_sign = secant[:-1] * secant[1:] > 0
+    w1, w2 = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        harmonic = (w1 + w2) / (w1 / secant[:-1] + w2 / secant[1:])
+    slope = np.concatenate([secant[:1], np.where(same_sign, harmonic, 0.0), secant[-1:]])
+    x = np.clip(np.asarray(x, float), knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(width) - 1)
+    u = (x - knots[i]) / width[i]
+    a, b, da, db = values[i], values[i + 1], slope[i] * width[i], slope[i + 1] * width[i]
+    return a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db)))
+
+
+def periodic_cubic(phase: ArrayLike, knots: ArrayLike, values: ArrayLike) -> Array:
+    """`monotone_cubic` over phases of a cycle of length 1; knots lie in [0, 1)."""
+    knots, values = np.asarray(knots, float), np.asarray(values, float)
+    around = np.concatenate([knots[-2:] - 1, knots, knots[:2] + 1])
+    return monotone_cubic(np.mod(phase, 1.0), around, np.concatenate([values[-2:], values, values[:2]]))
+
+
+def quintic(u: ArrayLike, start: ArrayLike, end: ArrayLike, start_slope: ArrayLike, end_slope: ArrayLike) -> Array:
+    """Fifth-degree curve over u in [0, 1] with given ends and slopes, and no curvature at either end."""
+    u = np.asarray(u, float)
+    rise = u**3 * (10 - 15 * u + 6 * u**2)
+    leave = u - u**3 * (6 - 8 * u + 3 * u**2)
+    arrive = -(u**3) * (4 - 7 * u + 3 * u**2)
+    return (1 - rise) * start + rise * end + leave * start_slope + arrive * end_slope
