@@ -77,7 +77,14 @@ def test_a_foot_touches_the_ground_exactly_during_its_footfalls(body, gait):
         expected = np.zeros(300, dtype=bool)
         for fall in motion.footfalls:
             expected |= (fall.side == side) & (times > fall.strike) & (times < fall.leave)
-        edge = np.convolve(np.abs(np.diff(expected.astype(int), prepend=expected[0])), np.ones(7), "same") > 0
+        edge = (
+            np.convolve(
+                np.abs(np.diff(expected.astype(int), prepend=expected[0])),
+                np.ones(2 * round(0.05 * gait.stride_time(body) * RATE) + 1),
+                "same",
+            )
+            > 0
+        )
         assert (lowest[expected] < 1e-5).all()
         assert (lowest[~expected & ~edge] > 1e-3).all()
 
