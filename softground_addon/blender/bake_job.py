@@ -1,0 +1,404 @@
+"""The bake from settings to pressed ground: one generator, driven by a timer, an operator, or the command line.
+
+Everything is read, checked and computed first; the ground is written at the very end. A bake that is closed, fails or
+is refused before that has changed nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import asdict, dataclass
+from typing import TypeVar
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import record, report
+from ..core.contacts import detect_contacts
+from ..core.deformation import GroundMaterial
+from ..core.errors import BakeError, InputError
+from ..core.footprints import QUANTUM, Footprint
+from ..core.heightfield import FlatTerrain, Terrain
+from ..core.motion import CharacterMotion
+from ..core.pressed_ground import PressedGround
+from ..core.simulation import CharacterLoads, estimate_loads, simulate
+from ..core.terrain import MeshTerrain
+from . import ground_mesh, settings
+from .character_setup import mapping_of
+from .ground_mesh import GroundPlan, GroundSurface, Indices
+from .materials import ensure_material
+from .properties import SoftGroundCharacter
+from .rig_sampling import sample_character
+
+Array = NDArray[np.float64]
+Result = TypeVar("Result")
+
+STAGES = {"sample": 0.6, "simulate": 0.3, "write": 0.1}
+"""Stages in their order, and the share of the whole time that each takes about."""
+
+GROUND_MARGIN = 2.0
+"""How far a created ground reaches beyond the feet, in lengths of the longest sole."""
+
+LOW_PERCENTILE = 10.0
+"""A sole is on its ground for at least this share of a shot, so that its lowest points tell the ground's height."""
+
+COARSEST_SPACING = 0.25
+"""Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""
+
+RIM_TOLERANCE = 1e-6
+"""Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a bake is.
+
+    Attributes
+    ----------
+    stage : str
+        One of `STAGES`.
+    fraction : float
+        Of this stage, 0 to 1.
+    """
+
+    stage: str
+    fraction: float
+
+    @property
+    def overall(self) -> float:
+        """Of the whole bake, 0 to 1."""
+        stages = list(STAGES)
+        before = sum(STAGES[stage] for stage in stages[: stages.index(self.stage)])
+        return before + STAGES[self.stage] * self.fraction
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What a bake leaves behind, apart from the ground itself.
+
+    Attributes
+    ----------
+    report : dict
+        For JSON (see `core.report`).
+    footprints : tuple of Footprint
+    """
+
+    report: dict[str, object]
+    footprints: tuple[Footprint, ...]
+
+
+Job = Generator[Progress, None, Result]
+
+
+def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Result:
+    """Drive a job to its end."""
+    while True:
+        try:
+            progress = next(job)
+        except StopIteration as finished:
+            result: Result = finished.value
+            return result
+        if show:
+            show(progress)
+
+
+def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
+    """Bake the scene's characters into its ground.
+
+    Without a ground in the settings, one is created that fits the walk.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Its `softground` settings say what to do.
+    write : bool
+        False computes and reports only, and changes nothing.
+
+    Raises
+    ------
+    InputError
+        If something that the user gave cannot be used; names it and the remedy.
+    BakeError
+        If the result fails a check.
+    """
+    started = time.perf_counter()
+    options = scene.softground
+    characters = [character for character in options.characters if character.armature]
+    check_settings(scene, characters)
+    material = settings.material_of(scene)
+    unit_scale = scene.unit_settings.scale_length
+    motions = yield from _sample(scene, characters)
+    sampled = time.perf_counter()
+
+    ground: bpy.types.Object | None = options.ground
+    surface = ground_mesh.undisturbed_surface(ground, unit_scale) if ground else None
+    plan = plan_ground(motions)
+    terrain = surface.terrain(np.stack([plan.lower, plan.upper])) if surface else FlatTerrain(plan.height)
+    loads = [
+        estimate_loads(motion, terrain, force_model=character.force_model, material=material)
+        for motion, character in zip(motions, characters, strict=True)
+    ]
+    _check_contacts(loads, terrain, ground)
+    footprints, forces = yield from _simulate(loads, terrain, material, options.cell_size)
+    check_volumes(footprints, material)
+    simulated = time.perf_counter()
+
+    yield Progress("write", 0.0)
+    pressed = PressedGround.at(
+        footprints,
+        frame=float(options.frame_end),
+        frame_rate=motions[0].frame_rate,
+        cell_size=options.cell_size,
+        blur_sigma=material.blur_sigma,
+    )
+    if ground and surface:
+        index = _pressed_vertices(ground, surface, pressed, terrain, loads)
+    elif write:
+        ground = create_ground(scene, plan)
+        surface = ground_mesh.undisturbed_surface(ground, unit_scale)
+        index = surface.pressed_vertices(pressed, terrain)
+    inputs = _inputs(scene, characters, material)
+    geometry = None if surface is None else (surface.vertices, surface.triangles)
+    input_hash = report.hash_inputs(inputs, motions, geometry)
+    if write and ground and surface:
+        sample = pressed.sample(*surface.vertices[index, :2].T)
+        stored = record.dump(footprints, {"inputs": inputs, "input_hash": input_hash})
+        ground_mesh.write(ground, index, sample, stored, unit_scale)
+    finished = time.perf_counter()
+    frames = options.frame_end - options.frame_start + 1
+    result = report.build(
+        inputs=inputs,
+        input_hash=input_hash,
+        footprints=footprints,
+        offsets_mm=_offsets_mm(loads),
+        timings={
+            "sample": sampled - started,
+            "simulate": simulated - sampled,
+            "write": finished - simulated,
+            "frames_per_second": frames / (finished - started),
+        },
+        warnings=_warnings(footprints),
+        forces=forces if options.keep_forces else None,
+    )
+    yield Progress("write", 1.0)
+    return BakeResult(result, tuple(footprints))
+
+
+def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
+    """A new flat ground with the material of the scene's preset, set as the scene's ground."""
+    ground = ground_mesh.create_grid(scene, plan, scene.softground.cell_size, scene.unit_settings.scale_length)
+    ground_mesh.mesh_of(ground).materials.append(ensure_material(scene.softground.material.surface))
+    scene.softground.ground = ground
+    for layer in scene.view_layers:
+        layer.update()
+    return ground
+
+
+def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
+    """The flat ground that fits the walk of the scene's characters.
+
+    Raises
+    ------
+    InputError
+        If the characters cannot be read.
+    """
+    characters = [character for character in scene.softground.characters if character.armature]
+    check_settings(scene, characters)
+    motions = yield from _sample(scene, characters)
+    return plan_ground(motions)
+
+
+def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
+    """The flat ground under the lowest positions of the soles, with a margin around all of their paths."""
+    paths = [sole.landmark_positions() for motion in motions for sole in motion.soles]
+    lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
+    upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
+    margin = GROUND_MARGIN * max(_length(sole.sole.outline) for motion in motions for sole in motion.soles)
+    low = float(np.median([np.percentile(path[..., 2].min(axis=1), LOW_PERCENTILE) for path in paths]))
+    floats = [detect_contacts(motion, FlatTerrain(low)).offset for motion in motions]
+    return GroundPlan(lower - margin, upper + margin, low + float(np.median(np.concatenate(floats))))
+
+
+def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
+    """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
+    options = scene.softground
+    if not characters:
+        raise InputError("No character is set up: select an animated armature and press Add Character.")
+    if options.frame_end <= options.frame_start:
+        raise InputError(
+            f"The frame range {options.frame_start}-{options.frame_end} is empty: set End after Start in the Bake "
+            "panel."
+        )
+    if options.ground is not None:
+        ground_mesh.check_usable(options.ground)
+
+
+def _sample(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> Job[list[CharacterMotion]]:
+    """The motion of each character."""
+    motions = []
+    options = scene.softground
+    count = options.frame_end - options.frame_start + 1
+    for number, character in enumerate(characters):
+        job = sample_character(
+            scene,
+            character.armature,
+            mapping_of(character),
+            frame_start=options.frame_start,
+            frame_end=options.frame_end,
+            mass=character.mass,
+        )
+        while True:
+            try:
+                read = next(job)
+            except StopIteration as finished:
+                motions.append(finished.value)
+                break
+            yield Progress("sample", (number + read / count) / len(characters))
+    return motions
+
+
+def _simulate(
+    loads: Sequence[CharacterLoads], terrain: Terrain, material: GroundMaterial, cell_size: float
+) -> Job[tuple[list[Footprint], dict[str, object]]]:
+    """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
+    footprints: list[Footprint] = []
+    frames: list[float] = []
+    forces: list[tuple[Array, ...]] = []
+    count = max(len(character.motion.frames) for character in loads)
+    for result in simulate(loads, terrain, material, cell_size):
+        footprints += result.footprints
+        frames.append(result.frame)
+        forces.append(result.forces)
+        yield Progress("simulate", min(1.0, len(frames) * _steps_per_frame(loads) / count))
+    footprints.sort(key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
+    return footprints, _force_table(loads, frames, forces)
+
+
+def _steps_per_frame(loads: Sequence[CharacterLoads]) -> float:
+    frames = loads[0].motion.frames
+    return 1.0 / float(frames[1] - frames[0])
+
+
+def _force_table(
+    loads: Sequence[CharacterLoads], frames: list[float], forces: list[tuple[Array, ...]]
+) -> dict[str, object]:
+    characters: dict[str, dict[str, list[list[float]]]] = {}
+    for number, character in enumerate(loads):
+        of_character = np.array([at_frame[number] for at_frame in forces])
+        names = [sole.sole.name for sole in character.motion.soles]
+        characters[character.motion.name] = {
+            name: np.round(of_character[:, sole], 3).tolist() for sole, name in enumerate(names)
+        }
+    return {"frames": frames, "characters": characters}
+
+
+def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: bpy.types.Object | None) -> None:
+    """Raise InputError if nothing touches the ground, or where the ground has two layers under a foot."""
+    place = np.concatenate(
+        [
+            sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
+            for character in loads
+            for number, sole in enumerate(character.motion.soles)
+        ]
+    )
+    name = f"'{ground.name}'" if ground else "the ground"
+    if not len(place):
+        characters = ", ".join(f"'{character.motion.name}'" for character in loads)
+        raise InputError(
+            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
+            "feet in the Character panel."
+        )
+    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
+        raise InputError(
+            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
+            "separate the layer that is walked on into an object of its own."
+        )
+
+
+def _pressed_vertices(
+    ground: bpy.types.Object,
+    surface: GroundSurface,
+    pressed: PressedGround,
+    terrain: Terrain,
+    loads: Sequence[CharacterLoads],
+) -> Indices:
+    """The vertices that the bake moves; InputError if they are too few to show a foot."""
+    index = surface.pressed_vertices(pressed, terrain)
+    length = min(_length(sole.sole.outline) for character in loads for sole in character.motion.soles)
+    compression = pressed.raw.sample(*surface.vertices[index, :2].T)[0]
+    cells = sum(int((tile[0] > 0).sum()) for tile in pressed.raw.tiles.values())
+    under_prints = cells * pressed.raw.cell_size**2
+    spacing = np.sqrt(under_prints / max(1, int((compression > 0).sum())))
+    if spacing > COARSEST_SPACING * length:
+        raise InputError(
+            f"Ground '{ground.name}' is too coarse: its vertices are about {spacing * 100:.0f} cm apart under soles of "
+            f"{length * 100:.0f} cm. Subdivide it, or remove it from the Ground panel and let Bake create one."
+        )
+    return index
+
+
+def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial) -> None:
+    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4."""
+    for footprint in footprints:
+        raised = footprint.rim_m3 + footprint.unplaced_rim_m3
+        displaced = 2.0 * material.poisson_ratio * footprint.compressed_m3
+        rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
+        if not abs(raised - displaced) <= RIM_TOLERANCE * displaced + rounding:
+            raise BakeError(
+                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
+                f"{displaced:.6g} m³ were displaced; nothing was written. Please report this shot."
+            )
+        if footprint.max_depth_m > material.layer_depth * (1 + 1e-9):
+            raise BakeError(
+                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
+                "was written. Please report this shot."
+            )
+
+
+def _warnings(footprints: Sequence[Footprint]) -> list[str]:
+    unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
+    if unplaced <= 0:
+        return []
+    return [f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."]
+
+
+def _offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
+    return {
+        character.motion.name: {
+            sole.sole.name: round(float(offset) * 1e3, 3)
+            for sole, offset in zip(character.motion.soles, character.contacts.offset, strict=True)
+        }
+        for character in loads
+    }
+
+
+def _inputs(
+    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], material: GroundMaterial
+) -> dict[str, object]:
+    options = scene.softground
+    return {
+        "file": bpy.data.filepath,
+        "scene": scene.name,
+        "ground": options.ground.name if options.ground else None,
+        "characters": [
+            {
+                "armature": character.armature.name,
+                "mass_kg": character.mass,
+                "force_model": character.force_model,
+                "joints": {joint: list(place) for joint, place in mapping_of(character).joints.items()},
+                "soles": [asdict(source) for source in mapping_of(character).soles],
+            }
+            for character in characters
+        ],
+        "preset": options.material.preset,
+        "material": asdict(material),
+        "cell_size_m": options.cell_size,
+        "frames": [options.frame_start, options.frame_end],
+        "frame_rate": scene.render.fps / scene.render.fps_base,
+    }
+
+
+def _length(outline: Array) -> float:
+    return float(np.ptp(outline[:, 0]))

@@ -1,0 +1,208 @@
+"""The command line: `softground bake`, the same inside `blender --command` and with the bpy module."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..core import files, presets, report
+from ..core.errors import BakeError, InputError, SoftGroundError
+from . import bake_job, settings
+from .character_setup import set_up_automatically
+
+EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
+
+Show = Callable[[bake_job.Progress], None]
+
+
+def run_in_blender(arguments: Sequence[str]) -> int:
+    """Entry of `blender -b shot.blend --command softground ...`: acts on the open file."""
+    return _run(_parser(standalone=False), arguments)
+
+
+def run_standalone(arguments: Sequence[str]) -> int:
+    """Entry of `python -m softground_addon ...`: registers the add-on, opens the file, and cleans up after itself."""
+    from .. import register, unregister  # noqa: PLC0415  (imports this module)
+
+    register()
+    try:
+        return _run(_parser(standalone=True), arguments)
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        unregister()
+
+
+def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
+    previous = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        options = parser.parse_args(list(arguments))
+        _bake(options)
+    except SystemExit as leaving:  # argparse has printed its message
+        return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
+    except BakeError as error:
+        print(f"softground: {error}", file=sys.stderr)
+        return EXIT_FAILED_CHECK
+    except SoftGroundError as error:
+        print(f"softground: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        print("softground: interrupted; nothing was written.", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+    return EXIT_DONE
+
+
+def _interrupt(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser(*, standalone: bool) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="softground", description="Physically based footprints for animated characters."
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    bake = commands.add_parser("bake", help="bake the footprints of a shot")
+    if standalone:
+        bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
+    bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
+    bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
+    bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
+    bake.add_argument(
+        "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",
+        help="a setting under scene.softground, e.g. material.youngs_modulus=4e5; may be repeated",
+    )  # fmt: skip
+    destination = bake.add_mutually_exclusive_group()
+    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
+    destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
+    bake.add_argument("--report", type=Path, metavar="FILE.json", help="write the report to this file")
+    bake.add_argument(
+        "--progress", choices=("plain", "json", "openjd", "none"), default="plain", help="how to show progress"
+    )
+    bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
+    bake.set_defaults(blend=None)
+    return parser
+
+
+def _frame_range(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is no frame range like 1-250")
+    return int(match[1]), int(match[2])
+
+
+def _override(text: str) -> tuple[str, str]:
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip():
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form PATH=VALUE")
+    return path.strip(), value.strip()
+
+
+def _bake(options: argparse.Namespace) -> None:
+    if not (options.save or options.in_place or options.report or options.dry_run):
+        raise InputError("Nothing would be kept: give --save FILE.blend, --in-place, --report FILE.json or --dry-run.")
+    if options.blend is not None:
+        _open(options.blend)
+    scene = settings.scene_of(bpy.context)
+    target = _save_target(options)
+    set_up_automatically(scene)
+    if options.preset:
+        settings.apply_preset(scene, _preset(options.preset))
+    if options.frames:
+        scene.softground.frame_start, scene.softground.frame_end = options.frames
+    if options.cell_size is not None:
+        settings.assign(scene.softground, "cell_size", str(options.cell_size))
+    for path, value in options.overrides:
+        settings.assign(scene.softground, path, value)
+    show = _PROGRESS[options.progress]
+    result = bake_job.run(bake_job.bake(scene, write=not options.dry_run), show)
+    if options.report:
+        files.write_text(options.report, report.dump(result.report))
+    if target and not options.dry_run:
+        save(target)
+    if options.progress in ("plain", "openjd"):
+        print(report.summary(result.report), flush=True)
+
+
+def _open(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(f"There is no file '{path}'.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise InputError(f"'{path}' could not be opened as a .blend file: {str(error).strip()}") from None
+
+
+def _preset(name_or_path: str) -> presets.Preset:
+    path = Path(name_or_path)
+    return presets.load(path) if path.suffix.lower() == ".json" else presets.find(name_or_path)
+
+
+def _save_target(options: argparse.Namespace) -> Path | None:
+    """Where the shot goes; checked before any work is done."""
+    if options.in_place:
+        if not bpy.data.filepath:
+            raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
+        return Path(bpy.data.filepath)
+    if options.save and not options.save.resolve().parent.is_dir():
+        raise InputError(f"The folder of '{options.save}' does not exist: create it first.")
+    return options.save.resolve() if options.save else None
+
+
+def save(path: Path) -> None:
+    """Save the open file under `path`, whole or not at all, compressed if the opened file was.
+
+    Raises
+    ------
+    InputError
+        If it could not be written; a file of that name is then as it was.
+    """
+    with files.replacing(path) as partial:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, compress=_is_compressed(bpy.data.filepath))
+        except RuntimeError as error:
+            raise InputError(f"'{path}' could not be saved: {str(error).strip()}") from None
+
+
+def _is_compressed(path: str) -> bool:
+    if not path or not Path(path).is_file():
+        return False
+    with Path(path).open("rb") as blend:
+        return blend.read(7) != b"BLENDER"
+
+
+class _Plain:
+    """A line for each stage and each tenth of it."""
+
+    def __init__(self) -> None:
+        self.shown = ""
+
+    def __call__(self, progress: bake_job.Progress) -> None:
+        line = f"{progress.stage} {int(progress.fraction * 10) * 10} %"
+        if line != self.shown:
+            self.shown = line
+            print(line, flush=True)
+
+
+def _json(progress: bake_job.Progress) -> None:
+    print(json.dumps({"stage": progress.stage, "fraction": round(progress.fraction, 4)}), flush=True)
+
+
+def _openjd(progress: bake_job.Progress) -> None:
+    print(f"openjd_progress: {progress.overall * 100:.1f}\nopenjd_status: {progress.stage}", flush=True)
+
+
+def _none(_progress: bake_job.Progress) -> None:
+    pass
+
+
+_PROGRESS: dict[str, Any] = {"plain": _Plain(), "json": _json, "openjd": _openjd, "none": _none}

@@ -1,0 +1,341 @@
+"""The ground as a mesh: its undisturbed surface in, the pressed ground out, and back to what it was.
+
+While a bake is on a ground, its mesh carries: the undisturbed positions (attribute `softground_rest`), the raw heights
+(shape key Basis), the blurred heights (shape key `SoftGround Display`), the shading attributes, and the record of
+footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ..core.errors import InputError
+from ..core.footprints import NEVER
+from ..core.heightfield import Terrain
+from ..core.pressed_ground import GroundSample, PressedGround
+from ..core.terrain import MeshTerrain
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+REST = "softground_rest"
+DISPLAY_KEY = "SoftGround Display"
+COMPRESSION = "softground_compression"
+RIM = "softground_rim"
+AGE = "softground_age"
+SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
+RECORD = "softground_record"
+
+ON_SURFACE = 2e-3
+"""Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
+
+MAX_GRID_VERTICES = 4_000_000
+"""Most vertices that a created grid gets; a larger walk gets a coarser mesh (the physics keeps its cells)."""
+
+
+@dataclass(frozen=True)
+class GroundSurface:
+    """The undisturbed ground in world space.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        World positions of the vertices that the bake moves [m].
+    surface_vertices : (W, 3) float array
+        World positions of the evaluated surface [m]: the same, unless modifiers add vertices.
+    triangles : (T, 3) int array
+        Triangles of the evaluated surface.
+    """
+
+    vertices: Array
+    surface_vertices: Array
+    triangles: Indices
+
+    def pressed_vertices(self, pressed: PressedGround, terrain: Terrain) -> Indices:
+        """Vertices that lie on top of the surface where the ground may have changed, (K,)."""
+        near = np.flatnonzero(pressed.covers(self.vertices[:, 0], self.vertices[:, 1]))
+        x, y, z = self.vertices[near].T
+        return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
+
+    def terrain(self, bounds: Array | None = None) -> MeshTerrain:
+        """The surface as a function of place, within bounds in the plane [m]."""
+        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds)
+
+
+def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh of a mesh object."""
+    return cast("bpy.types.Mesh", ground.data)
+
+
+def check_usable(ground: bpy.types.Object) -> None:
+    """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
+    name = ground.name
+    mesh = mesh_of(ground)
+    if ground.type != "MESH":
+        raise InputError(f"Ground '{name}' is no mesh: choose a mesh object, or press Create Ground.")
+    if ground.library or mesh.library or ground.override_library:
+        raise InputError(
+            f"Ground '{name}' is linked from another file and cannot be changed here: make it local "
+            "(Object > Relations > Make Local), or bake in the file that it comes from."
+        )
+    if mesh.users - mesh.use_fake_user > 1:
+        raise InputError(
+            f"Ground '{name}' shares its mesh with other objects: make it single-user first "
+            "(Object > Relations > Make Single User > Object & Data)."
+        )
+    if ground.mode == "EDIT":
+        raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
+    if not len(mesh.polygons):
+        raise InputError(f"Ground '{name}' has no faces: choose a surface, or press Create Ground.")
+    if mesh.shape_keys and not is_baked(ground):
+        raise InputError(
+            f"Ground '{name}' has shape keys of its own: apply them (Object > Apply > Visual Geometry to Mesh), or "
+            "choose a copy without them."
+        )
+    if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
+        raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")
+    moved_by = _what_moves(ground)
+    if moved_by:
+        raise InputError(f"Ground '{name}' moves: {moved_by} is animated. Only ground that stands still takes prints.")
+
+
+def _what_moves(ground: bpy.types.Object) -> str:
+    """Name of the object whose animation moves the ground, or an empty text."""
+    node: bpy.types.Object | None = ground
+    while node:
+        animation = node.animation_data
+        if animation and (animation.action or animation.drivers or any(not t.mute for t in animation.nla_tracks)):
+            return f"'{node.name}'"
+        node = node.parent
+    return ""
+
+
+def is_baked(ground: bpy.types.Object) -> bool:
+    """Whether a bake is on this ground."""
+    return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSurface:
+    """The ground as it is without any bake, in world space and metres.
+
+    Raises
+    ------
+    InputError
+        If the surface has points that are no numbers.
+    """
+    mesh = mesh_of(ground)
+    to_world = np.array(ground.matrix_world, dtype=np.float64)
+    to_world[:3] *= unit_scale
+    rest = _rest_positions(mesh)
+    vertices = _transform(to_world, rest)
+    if not np.isfinite(vertices).all():
+        raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
+    if not any(modifier.show_viewport for modifier in ground.modifiers):
+        surface, triangles = vertices, _triangles(mesh)
+    else:
+        with _undisturbed_copy(ground, rest) as evaluated:
+            surface = _transform(to_world, _positions(evaluated))
+            triangles = _triangles(evaluated)
+        if len(surface) == len(vertices):
+            vertices = surface
+    if np.linalg.det(to_world[:3, :3]) < 0:
+        triangles = triangles[:, ::-1]
+    return GroundSurface(vertices, surface, triangles)
+
+
+@contextmanager
+def _undisturbed_copy(ground: bpy.types.Object, rest: NDArray[np.float32]) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh of the ground with its modifiers but without its bake."""
+    scene = bpy.data.scenes.new("SoftGround Evaluation")
+    copy, mesh = ground.copy(), mesh_of(ground).copy()
+    try:
+        copy.data = mesh
+        copy.shape_key_clear()
+        _write_positions(mesh, rest)
+        scene.collection.objects.link(copy)
+        layer = scene.view_layers[0]
+        layer.update()
+        yield mesh_of(copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph)))
+    finally:
+        bpy.data.objects.remove(copy)
+        bpy.data.meshes.remove(mesh)
+        bpy.data.scenes.remove(scene)
+
+
+@dataclass(frozen=True)
+class GroundPlan:
+    """A flat ground that fits a walk.
+
+    Attributes
+    ----------
+    lower, upper : (2,) float arrays
+        Corners of the area to cover, in world space [m].
+    height : float
+        World height of the ground [m].
+    """
+
+    lower: Array
+    upper: Array
+    height: float
+
+
+def create_grid(scene: bpy.types.Scene, plan: GroundPlan, cell_size: float, unit_scale: float) -> bpy.types.Object:
+    """A new flat ground whose vertices sit on the centres of the cells.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Gets the object in its master collection.
+    plan : GroundPlan
+    cell_size : float
+        Size of the physics' cells [m]; the mesh takes a whole multiple of it where it would exceed
+        `MAX_GRID_VERTICES`.
+    unit_scale : float
+        Metres per Blender unit.
+    """
+    cells = np.ceil((plan.upper - plan.lower) / cell_size)
+    stride = int(np.ceil(np.sqrt(max(1.0, cells.prod() / MAX_GRID_VERTICES))))
+    spacing = cell_size * stride
+    first = np.floor(plan.lower / spacing - 0.5)
+    columns, rows = (np.ceil(plan.upper / spacing - 0.5) - first).astype(int) + 1
+    x = (first[0] + np.arange(columns) + 0.5) * spacing
+    y = (first[1] + np.arange(rows) + 0.5) * spacing
+    centre = np.array([x.mean(), y.mean(), plan.height])
+    positions = np.zeros((rows, columns, 3), dtype=np.float32)
+    positions[..., 0] = (x - centre[0]) / unit_scale
+    positions[..., 1] = ((y - centre[1]) / unit_scale)[:, None]
+
+    mesh = bpy.data.meshes.new("SoftGround")
+    mesh.vertices.add(rows * columns)
+    _write_positions(mesh, positions.reshape(-1, 3))
+    faces = (rows - 1) * (columns - 1)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = corner[:, None] + np.array([0, 1, columns + 1, columns])
+    mesh.loops.add(faces * 4)
+    mesh.loops.foreach_set("vertex_index", quads.ravel().astype(np.int32))
+    mesh.polygons.add(faces)
+    mesh.polygons.foreach_set("loop_start", np.arange(faces, dtype=np.int32) * 4)
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    _add_uv(mesh, quads, positions.reshape(-1, 3))
+    ground = bpy.data.objects.new("SoftGround", mesh)
+    ground.location = tuple(centre / unit_scale)
+    scene.collection.objects.link(ground)
+    return ground
+
+
+def _add_uv(mesh: bpy.types.Mesh, quads: Indices, positions: NDArray[np.float32]) -> None:
+    """A UV map over the whole grid, its longer side from 0 to 1."""
+    place = positions[:, :2] - positions[:, :2].min(axis=0)
+    uv = (place / place.max()).astype(np.float32)
+    layer = mesh.uv_layers.new(name="UVMap")
+    layer.uv.foreach_set("vector", uv[quads.ravel()].ravel())
+
+
+def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, record: bytes, unit_scale: float) -> None:
+    """Put a bake on the ground, in place of the one that may be there.
+
+    The raw heights become the mesh's positions and Basis, the blurred ones the shape key `DISPLAY_KEY` at value 1.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    index : (K,) int array
+        Vertices of its mesh that the bake moves.
+    pressed : GroundSample
+        What it does to each of them.
+    record : bytes
+        The footprints, from `core.record`.
+    unit_scale : float
+        Metres per Blender unit.
+    """
+    mesh = mesh_of(ground)
+    rest = _rest_positions(mesh)
+    if REST not in mesh.attributes:
+        _add_attribute(mesh, REST, "FLOAT_VECTOR").data.foreach_set("vector", rest.ravel())
+    up = np.array(ground.matrix_world.to_3x3().inverted() @ Vector((0.0, 0.0, 1.0))) / unit_scale
+    raw, display = rest.copy(), rest.copy()
+    raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
+    display[index] += (pressed.display[:, None] * up).astype(np.float32)
+
+    if not mesh.shape_keys:
+        ground.shape_key_add(name="Basis", from_mix=False)
+        ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
+    basis, key = mesh.shape_keys.reference_key, mesh.shape_keys.key_blocks[DISPLAY_KEY]
+    basis.points.foreach_set("co", raw.ravel())
+    key.points.foreach_set("co", display.ravel())
+    for name, values, default in (
+        (COMPRESSION, pressed.compression, 0.0),
+        (RIM, pressed.rim, 0.0),
+        (AGE, pressed.age, NEVER),
+    ):
+        whole = np.full(len(mesh.vertices), default, dtype=np.float32)
+        whole[index] = values
+        attribute = mesh.attributes.get(name) or _add_attribute(mesh, name, "FLOAT")
+        attribute.data.foreach_set("value", whole)
+    mesh[RECORD] = record
+    _write_positions(mesh, raw)
+
+
+def restore(ground: bpy.types.Object) -> None:
+    """Take the bake off the ground: its mesh is what it was before, bit for bit. Without a bake nothing happens."""
+    if not is_baked(ground):
+        return
+    mesh = mesh_of(ground)
+    rest = _rest_positions(mesh)
+    ground.shape_key_clear()
+    for name in (REST, *SHADING_ATTRIBUTES):
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+    del mesh[RECORD]
+    _write_positions(mesh, rest)
+
+
+def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> bpy.types.Attribute:
+    """A new point attribute; the one that the user has active stays so."""
+    active = mesh.attributes.active_index
+    attribute = mesh.attributes.new(name, kind, "POINT")
+    mesh.attributes.active_index = active
+    return mesh.attributes[attribute.name]
+
+
+def _rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """Positions without the bake, (V, 3) in the object's own space and units."""
+    attribute = mesh.attributes.get(REST)
+    if attribute is None or len(attribute.data) != len(mesh.vertices):
+        return _positions(mesh)
+    rest = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    attribute.data.foreach_get("vector", rest)
+    return rest.reshape(-1, 3)
+
+
+def _positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", positions)
+    return positions.reshape(-1, 3)
+
+
+def _write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
+    mesh.attributes["position"].data.foreach_set("vector", positions.ravel())
+    first = mesh.vertices[0]
+    first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
+    mesh.update()
+
+
+def _triangles(mesh: bpy.types.Mesh) -> Indices:
+    mesh.calc_loop_triangles()
+    triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    return triangles.reshape(-1, 3).astype(np.intp)
+
+
+def _transform(matrix: Array, points: NDArray[np.float32]) -> Array:
+    return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -1,0 +1,145 @@
+"""What the buttons do. Each operator is thin: it calls one function and turns its errors into a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
+
+import bpy
+from bpy.props import StringProperty
+
+from ..core import presets
+from ..core.errors import SoftGroundError
+from . import bake_job, character_setup, ground_mesh, settings
+
+Operator = TypeVar("Operator", bound=bpy.types.Operator)
+
+
+def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -> Callable[..., set[str]]:
+    """Turn a `SoftGroundError` into a report and CANCELLED; nothing else is caught."""
+
+    @wraps(execute)
+    def guarded(self: Operator, context: bpy.types.Context) -> set[str]:
+        try:
+            return execute(self, context)
+        except SoftGroundError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    return guarded
+
+
+class SOFTGROUND_OT_add_character(bpy.types.Operator):
+    """Add the active armature: its feet, hips and limbs are recognised by their names or by the rest pose"""
+
+    bl_idname = "softground.add_character"
+    bl_label = "Add Character"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        armature = _armature_of(context.active_object)
+        character = character_setup.add_character(settings.scene_of(context), armature)
+        names = ", ".join(sole.name for sole in character.soles)
+        self.report({"INFO"}, f"Added '{character.name}' with {names}")
+        return {"FINISHED"}
+
+
+def _armature_of(thing: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The object itself, or the armature that deforms it: clicking a character mostly selects its mesh."""
+    if thing is not None and thing.type == "MESH":
+        return thing.find_armature() or thing
+    return thing
+
+
+class SOFTGROUND_OT_create_ground(bpy.types.Operator):
+    """Take the selected mesh as the ground as it is; with none selected, create a grid that fits the walk"""
+
+    bl_idname = "softground.create_ground"
+    bl_label = "Create Ground"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        chosen = _selected_ground(context)
+        if chosen is not None:
+            ground_mesh.check_usable(chosen)
+            settings.scene_of(context).softground.ground = chosen
+            self.report({"INFO"}, f"'{chosen.name}' is the ground")
+            return {"FINISHED"}
+        plan = bake_job.run(bake_job.fit_ground(settings.scene_of(context)))
+        ground = bake_job.create_ground(settings.scene_of(context), plan)
+        self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
+        return {"FINISHED"}
+
+
+def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a selected mesh that no character wears."""
+    thing = context.active_object
+    if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
+        return None
+    return thing
+
+
+class SOFTGROUND_OT_load_preset(bpy.types.Operator):
+    """Set the ground's material to a preset"""
+
+    bl_idname = "softground.load_preset"
+    bl_label = "Load Ground Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", description="Name of a preset that comes with SoftGround")
+    filepath: StringProperty(name="File", description="Preset file, instead of a name", subtype="FILE_PATH")
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = bpy.path.abspath(self.filepath)
+        preset = presets.load(presets.Path(path)) if path else presets.find(self.name)
+        settings.apply_preset(settings.scene_of(context), preset)
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_bake(bpy.types.Operator):
+    """Press the footprints of all characters into the ground"""
+
+    bl_idname = "softground.bake"
+    bl_label = "Bake Footprints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        result = bake_job.run(bake_job.bake(settings.scene_of(context)))
+        totals: Any = result.report["totals"]
+        self.report({"INFO"}, f"{totals['steps']} steps, deepest print {totals['max_depth_m'] * 100:.1f} cm")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
+    """Take the footprints off the ground: it is again what it was before the bake"""
+
+    bl_idname = "softground.clear_bake"
+    bl_label = "Clear Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        ground = settings.scene_of(context).softground.ground
+        if ground is None or not ground_mesh.is_baked(ground):
+            cls.poll_message_set("There is no bake on the ground")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        ground_mesh.restore(settings.scene_of(context).softground.ground)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    SOFTGROUND_OT_add_character,
+    SOFTGROUND_OT_create_ground,
+    SOFTGROUND_OT_load_preset,
+    SOFTGROUND_OT_bake,
+    SOFTGROUND_OT_clear_bake,
+)

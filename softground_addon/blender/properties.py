@@ -1,0 +1,191 @@
+"""What the user sets: `scene.softground`, saved with the .blend. Lengths are metres whatever the scene's units."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..core.presets import MATERIAL_RANGES, SURFACES
+
+DEFAULT_MASS = 77.5
+"""Body mass of the paper's character [kg]."""
+
+DEFAULT_CELL_SIZE = 0.01
+"""Fine enough for the edge of a human print [m]."""
+
+
+def _is_armature(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "ARMATURE"
+
+
+def _is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "MESH"
+
+
+def _limits(field: str) -> dict[str, float]:
+    low, high = MATERIAL_RANGES[field]
+    return {"min": low, "max": high}
+
+
+class SoftGroundJoint(bpy.types.PropertyGroup):
+    """Which bone carries one joint of the body; `name` is the joint."""
+
+    bone: StringProperty(name="Bone", description="Bone that carries this joint")
+    end: EnumProperty(
+        name="End",
+        description="Which end of the bone is the joint",
+        items=[
+            ("HEAD", "Head", "The joint is at the bone's head"),
+            ("TAIL", "Tail", "The joint is at the bone's tail"),
+        ],
+    )
+
+
+class SoftGroundSole(bpy.types.PropertyGroup):
+    """One thing that prints; `name` is what the report calls it."""
+
+    side: EnumProperty(
+        name="Side",
+        description="Side of the body",
+        items=[("LEFT", "Left", ""), ("RIGHT", "Right", ""), ("NONE", "None", "Neither left nor right")],
+        default="NONE",
+    )
+    bone: StringProperty(name="Foot", description="Bone that carries the sole from heel to ball")
+    toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
+
+
+class SoftGroundCharacter(bpy.types.PropertyGroup):
+    """A rig that walks on the ground."""
+
+    armature: PointerProperty(
+        name="Armature",
+        description="Animated armature that leaves the prints",
+        type=bpy.types.Object,
+        poll=_is_armature,
+    )
+    mass: FloatProperty(
+        name="Mass (kg)",
+        description="Body mass in kilograms, with clothes and load. The depth of the prints grows with it",
+        default=DEFAULT_MASS,
+        min=0.0,
+        soft_min=0.1,
+        soft_max=500.0,
+        precision=1,
+    )
+    force_model: EnumProperty(
+        name="Forces",
+        description="How the force under each foot is estimated from the animation",
+        items=[
+            ("WHOLE_BODY", "Whole Body", "From the acceleration of the body's centre of mass: best for baking"),
+            (
+                "IMPULSE",
+                "Impulse",
+                "Weight plus the momentum of the landing foot, as in the paper; needs no look-ahead",
+            ),
+        ],
+        default="WHOLE_BODY",
+    )
+    joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
+    soles: CollectionProperty(name="Soles", type=SoftGroundSole)
+    active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})
+
+
+class SoftGroundMaterial(bpy.types.PropertyGroup):
+    """The ground's physics; see `core.deformation.GroundMaterial`."""
+
+    preset: StringProperty(name="Preset", description="Preset that was loaded last", default="Snow")
+    surface: EnumProperty(
+        name="Look",
+        description="Render material that a created ground gets",
+        items=[(name, name.capitalize(), "") for name in SURFACES],
+        default="snow",
+    )
+    youngs_modulus: FloatProperty(
+        name="Young's Modulus (Pa)",
+        description=(
+            "Stiffness of the loose layer, in pascals: prints are half as deep at twice the value. An effective "
+            "modulus for compaction, far below the elastic one from textbooks"
+        ),
+        default=375e3,
+        precision=0,
+        step=1000000,
+        **_limits("youngs_modulus"),
+    )
+    poisson_ratio: FloatProperty(
+        name="Poisson's Ratio",
+        description="How much of the pressed-down volume rises around the foot: none at 0, all of it at 0.5 (sand)",
+        default=0.05,
+        precision=3,
+        **_limits("poisson_ratio"),
+    )
+    characteristic_time: FloatProperty(
+        name="Time",
+        description="How long the ground takes to give way under a steady load",
+        default=0.2,
+        precision=3,
+        unit="TIME_ABSOLUTE",
+        **_limits("characteristic_time"),
+    )
+    layer_depth: FloatProperty(
+        name="Layer Depth (m)",
+        description="Thickness of the loose layer, in metres. No print is deeper",
+        default=0.3,
+        precision=3,
+        soft_max=2.0,
+        **_limits("layer_depth"),
+    )
+    rim_reach: FloatProperty(
+        name="Rim Reach (m)",
+        description="How far around the foot the displaced ground rises, in metres",
+        default=0.04,
+        precision=3,
+        soft_max=0.5,
+        **_limits("rim_reach"),
+    )
+    blur_sigma: FloatProperty(
+        name="Smoothing (m)",
+        description="Width of the blur that the shown ground gets, in metres. Forces and depths do not see it",
+        default=0.005,
+        precision=4,
+        soft_max=0.05,
+        **_limits("blur_sigma"),
+    )
+
+
+class SoftGroundSettings(bpy.types.PropertyGroup):
+    """Everything that a bake reads."""
+
+    ground: PointerProperty(
+        name="Ground", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=_is_mesh
+    )
+    characters: CollectionProperty(name="Characters", type=SoftGroundCharacter)
+    active_character: IntProperty(name="Active Character", options={"HIDDEN"})
+    material: PointerProperty(name="Material", type=SoftGroundMaterial)
+    cell_size: FloatProperty(
+        name="Cell Size (m)",
+        description="Size of the cells in which the ground is computed, in metres",
+        default=DEFAULT_CELL_SIZE,
+        min=1e-4,
+        max=1.0,
+        soft_min=0.002,
+        soft_max=0.05,
+        precision=4,
+    )
+    frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
+    frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    keep_forces: BoolProperty(
+        name="Forces in Report",
+        description="Write the force under each sole at each frame into the report",
+        default=False,
+    )
+
+
+CLASSES = (SoftGroundJoint, SoftGroundSole, SoftGroundCharacter, SoftGroundMaterial, SoftGroundSettings)

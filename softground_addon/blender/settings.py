@@ -1,0 +1,119 @@
+"""Filling `scene.softground`: from a rig, from a preset, from `PATH=VALUE`; and reading it as the core's types."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, cast
+
+import bpy
+
+from ..core.deformation import GroundMaterial
+from ..core.errors import InputError
+from ..core.presets import Preset
+
+MATERIAL_FIELDS = ("youngs_modulus", "poisson_ratio", "characteristic_time", "layer_depth", "rim_reach", "blur_sigma")
+
+
+def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
+    """The context's scene, which an operator or a panel always has."""
+    return cast("bpy.types.Scene", context.scene)
+
+
+def material_of(scene: bpy.types.Scene) -> GroundMaterial:
+    """The scene's ground material as the core's type."""
+    values = scene.softground.material
+    return GroundMaterial(**{field: getattr(values, field) for field in MATERIAL_FIELDS})
+
+
+def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:
+    """Set the scene's ground material to a preset's."""
+    target = scene.softground.material
+    for field in MATERIAL_FIELDS:
+        setattr(target, field, getattr(preset.material, field))
+    target.preset, target.surface = preset.name, preset.surface
+
+
+_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\]")
+
+
+def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:
+    """Set one setting by its path below `scene.softground`, e.g. `characters[0].mass` to `80`.
+
+    Raises
+    ------
+    InputError
+        If there is no such setting, or the value is none that it takes; says which there are.
+    """
+    owner: Any = settings
+    steps = _parse(path)
+    for step in steps[:-1]:
+        owner = _descend(owner, step, path)
+    name = steps[-1]
+    properties = getattr(owner, "bl_rna", None) and owner.bl_rna.properties
+    if not properties or not isinstance(name, str) or name not in properties or properties[name].is_readonly:
+        raise InputError(f"There is no setting '{path}'. {_choices(owner)}")
+    setattr(owner, name, _value(properties[name], text, path))
+
+
+def _parse(path: str) -> list[str | int]:
+    steps: list[str | int] = []
+    position = 0
+    while position < len(path):
+        match = _STEP.match(path, position)
+        if not match or (match[0].startswith(".") and not steps):
+            raise InputError(f"'{path}' is no path to a setting, like material.youngs_modulus or characters[0].mass.")
+        name, index, *quoted = match.groups()
+        steps.append(int(index) if index else name or next(text for text in quoted if text is not None))
+        position = match.end()
+    if not steps:
+        raise InputError("An empty path names no setting.")
+    return steps
+
+
+def _descend(owner: Any, step: str | int, path: str) -> Any:
+    is_list = isinstance(owner, bpy.types.bpy_prop_collection) or not hasattr(owner, "bl_rna")
+    try:
+        if is_list:
+            return owner[step]
+        if isinstance(step, str) and step in owner.bl_rna.properties and step not in ("rna_type", "armature", "ground"):
+            return getattr(owner, step)
+    except (KeyError, IndexError, TypeError):
+        pass
+    raise InputError(f"There is no setting '{path}' ({step!r} is unknown). {_choices(owner)}")
+
+
+def _choices(owner: Any) -> str:
+    properties = getattr(owner, "bl_rna", None) and owner.bl_rna.properties
+    if not properties:
+        return ""
+    return "There are: " + ", ".join(key for key in properties.keys() if key not in ("rna_type", "name")) + "."  # noqa: SIM118
+
+
+def _value(setting: bpy.types.Property, text: str, path: str) -> Any:
+    kind = setting.type
+    if kind in ("FLOAT", "INT"):
+        try:
+            number = float(text) if kind == "FLOAT" else int(text)
+        except ValueError:
+            number = float("nan")
+        if not setting.hard_min <= number <= setting.hard_max:
+            raise InputError(
+                f"'{path}' cannot be {text!r}: it takes a number from {setting.hard_min:g} to {setting.hard_max:g}."
+            )
+        return number
+    if kind == "BOOLEAN":
+        if text.lower() not in ("true", "false", "1", "0", "on", "off"):
+            raise InputError(f"'{path}' cannot be {text!r}: it takes true or false.")
+        return text.lower() in ("true", "1", "on")
+    if kind == "ENUM":
+        names = [item.identifier for item in setting.enum_items]
+        if text not in names:
+            raise InputError(f"'{path}' cannot be {text!r}: it takes one of {', '.join(names)}.")
+        return text
+    if kind == "STRING":
+        return text
+    if kind == "POINTER" and setting.fixed_type.identifier == "Object":
+        if text not in bpy.data.objects:
+            raise InputError(f"'{path}' cannot be {text!r}: there is no object of that name.")
+        return bpy.data.objects[text]
+    raise InputError(f"'{path}' is a group of settings: name one of those in it.")

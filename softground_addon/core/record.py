@@ -1,0 +1,72 @@
+"""The record of a bake as bytes: a zip of plain arrays and one JSON text, with a checksum each. No pickles."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .errors import InputError
+from .footprints import Footprint, from_arrays, to_arrays
+
+FORMAT = 1
+"""Version of the bytes' layout."""
+
+_TEXT = "record.json"
+_FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
+
+
+def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
+    """The footprints and what is known about them (numbers and texts, for JSON) as bytes."""
+    names, arrays = to_arrays(footprints)
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        text = json.dumps({"format": FORMAT, "footprints": names, "about": dict(about)}, ensure_ascii=False)
+        archive.writestr(zipfile.ZipInfo(_TEXT, _FIXED_DATE), text, zipfile.ZIP_DEFLATED)
+        for key, values in arrays.items():
+            member = io.BytesIO()
+            np.save(member, values, allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE), member.getvalue(), zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
+
+
+def load(record: bytes) -> tuple[list[Footprint], dict[str, object]]:
+    """The footprints and what is known about them, from `dump`.
+
+    Raises
+    ------
+    InputError
+        If the bytes are cut short, damaged, or of another version.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(record)) as archive:
+            content = json.loads(archive.read(_TEXT))
+            if content["format"] != FORMAT:
+                raise InputError(
+                    f"The stored record of the footprints is of version {content['format']}; this SoftGround reads "
+                    f"version {FORMAT}: bake again, or update SoftGround."
+                )
+            names, about = content["footprints"], dict(content["about"])
+            arrays = {
+                name.removesuffix(".npy"): np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
+                for name in archive.namelist()
+                if name.endswith(".npy")
+            }
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        KeyError,
+        ValueError,
+        TypeError,
+        EOFError,
+        OSError,
+        NotImplementedError,
+    ) as error:
+        raise InputError(
+            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
+        ) from None
+    return from_arrays(names, arrays), about

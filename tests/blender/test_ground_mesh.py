@@ -1,0 +1,169 @@
+"""The ground as a mesh: read, pressed, and given back bit for bit."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler
+
+from softground_addon.blender import ground_mesh
+from softground_addon.core.errors import InputError
+from softground_addon.core.pressed_ground import GroundSample
+from tests.blender import fingerprints
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
+    half = np.array([size, size]) / 2
+    ground = ground_mesh.create_grid(scene, ground_mesh.GroundPlan(-half, half, height), spacing, unit_scale)
+    bpy.context.view_layer.update()
+    return ground
+
+
+def world(ground, key=None):
+    mesh = ground.data
+    points = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    (mesh.shape_keys.key_blocks[key].points if key else mesh.vertices).foreach_get("co", points)
+    matrix = np.array(ground.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def pressed(index, raw, display):
+    count = len(index)
+    sample = GroundSample(
+        np.full(count, raw), np.full(count, display), np.full(count, -raw), np.zeros(count), np.ones(count)
+    )
+    return np.asarray(index), sample
+
+
+@pytest.mark.parametrize("unit_scale", [1.0, 0.01])
+def test_vertices_of_a_created_grid_sit_on_cell_centres(scene, unit_scale):
+    ground = grid(scene, height=0.3, unit_scale=unit_scale)
+    place = world(ground) * unit_scale
+    assert np.allclose((place[:, :2] / 0.02) % 1, 0.5, atol=1e-3)
+    assert np.allclose(place[:, 2], 0.3, atol=1e-6)
+    assert place[:, :2].min() <= -1.0
+    assert place[:, :2].max() >= 1.0
+
+
+def test_a_created_grid_is_a_valid_mesh_of_upward_quads_with_uvs(scene):
+    mesh = grid(scene).data
+    assert not mesh.validate(verbose=True)
+    assert all(polygon.normal.z > 0.999 for polygon in mesh.polygons)
+    assert len(mesh.uv_layers) == 1
+
+
+def test_an_absurdly_large_grid_is_made_coarser_instead_of_filling_the_memory(scene, monkeypatch):
+    monkeypatch.setattr(ground_mesh, "MAX_GRID_VERTICES", 10_000)
+    mesh = ground_mesh.create_grid(scene, ground_mesh.GroundPlan(np.zeros(2), np.full(2, 10.0), 0.0), 0.01, 1.0).data
+    assert len(mesh.vertices) < 11_000
+
+
+@pytest.mark.parametrize("transform", ["plain", "tilted", "scaled", "mirrored", "parented"])
+def test_vertices_move_along_world_z_whatever_the_objects_transform(scene, transform):
+    ground = grid(scene)
+    if transform == "tilted":
+        ground.rotation_euler = Euler((0.3, 0.2, 1.0))
+    elif transform == "scaled":
+        ground.scale = (0.5, 2.0, 3.0)
+    elif transform == "mirrored":
+        ground.scale = (1.0, -1.0, 1.0)
+    elif transform == "parented":
+        parent = bpy.data.objects.new("parent", None)
+        scene.collection.objects.link(parent)
+        parent.rotation_euler, parent.scale = Euler((0.1, 0.4, 0.0)), (2.0, 2.0, 2.0)
+        ground.parent = parent
+    bpy.context.view_layer.update()
+    before = world(ground)
+    index = np.arange(100, 200)
+    ground_mesh.write(ground, *pressed(index, -0.05, -0.03), b"record", 1.0)
+    for key, change in (("Basis", -0.05), (ground_mesh.DISPLAY_KEY, -0.03)):
+        expected = before.copy()
+        expected[index, 2] += change
+        assert np.allclose(world(ground, key), expected, atol=1e-5)
+    height = ground_mesh.undisturbed_surface(ground, 1.0).terrain().heights(before[:, 0], before[:, 1])
+    inside = np.isfinite(height)
+    assert inside.mean() > 0.9
+    assert np.allclose(height[inside], before[inside, 2], atol=1e-5)
+
+
+def test_restoring_gives_the_same_bytes_back(scene):
+    ground = grid(scene)
+    ground.data.attributes.new("mine", "FLOAT", "POINT")
+    ground.data.attributes.active_index = 3
+    before = fingerprints.of_file()
+    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", 1.0)
+    assert fingerprints.of_file() != before
+    ground_mesh.write(ground, *pressed(np.arange(30, 70), -0.02, -0.02), b"other", 1.0)
+    ground_mesh.restore(ground)
+    assert fingerprints.of_file() == before
+
+
+def test_a_second_bake_replaces_the_first(scene):
+    ground = grid(scene)
+    before = world(ground)
+    ground_mesh.write(ground, *pressed(np.arange(50), -0.05, -0.03), b"record", 1.0)
+    ground_mesh.write(ground, *pressed(np.arange(50, 60), -0.02, -0.01), b"other", 1.0)
+    moved = np.flatnonzero(world(ground, "Basis")[:, 2] != before[:, 2])
+    assert np.array_equal(moved, np.arange(50, 60))
+    assert ground.data[ground_mesh.RECORD] == b"other"
+
+
+def test_the_undisturbed_surface_includes_the_users_modifiers_but_not_the_bake(scene):
+    ground = grid(scene)
+    displace = ground.modifiers.new("lift", "DISPLACE")
+    displace.mid_level, displace.strength = 0.0, 0.25
+    ground_mesh.write(ground, *pressed(np.arange(len(ground.data.vertices)), -0.05, -0.05), b"record", 1.0)
+    before = fingerprints.of_file()
+    surface = ground_mesh.undisturbed_surface(ground, 1.0)
+    assert np.allclose(surface.vertices[:, 2], 0.25, atol=1e-6)
+    assert fingerprints.of_file() == before
+
+
+def no_faces(ground):
+    ground.data.clear_geometry()
+
+
+def own_shape_key(ground):
+    ground.shape_key_add(name="Basis")
+
+
+def shared_mesh(ground):
+    bpy.data.objects.new("twin", ground.data)
+
+
+def animated(ground):
+    ground.keyframe_insert("location", frame=1)
+
+
+def animated_parent(ground):
+    ground.parent = bpy.data.objects.new("platform", None)
+    ground.parent.keyframe_insert("location", frame=1)
+
+
+def flattened(ground):
+    ground.scale = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "remedy"),
+    [
+        (no_faces, "no faces.*Create Ground"),
+        (own_shape_key, "shape keys.*apply them"),
+        (shared_mesh, "Make Single User"),
+        (animated, "stands still"),
+        (animated_parent, "'platform' is animated"),
+        (flattened, "scale"),
+    ],
+)
+def test_an_unusable_ground_is_named_with_the_remedy(scene, spoil, remedy):
+    ground = grid(scene)
+    ground_mesh.check_usable(ground)
+    spoil(ground)
+    with pytest.raises(InputError, match=f"'SoftGround'.*{remedy}"):
+        ground_mesh.check_usable(ground)
