@@ -148,7 +148,7 @@ def _one_per_limb(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]])
 
 
 def _left_axis(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]]) -> Array:
-    """Horizontal unit vector to the character's left, from where its feet point; Blender's front view if they do not."""
+    """Horizontal unit vector to the character's left, by where its feet point; Blender's front view if they do not."""
     left, right = pairs[0]
     across = (skeleton.heads[left] - skeleton.heads[right]).mean(axis=0) * (1, 1, 0)
     across /= np.linalg.norm(across)

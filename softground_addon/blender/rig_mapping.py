@@ -64,16 +64,25 @@ class RigMapping:
 
 _LIMBS: Mapping[str, tuple[str, ...]] = {
     "thigh": (
-        "thigh", "upleg", "upperleg", "hip", "thightwist", "thighstretch", "thighbend", "femur", "upperthigh", "legupper",
-        "hipjoint",
+        "thigh", "upleg", "upperleg", "hip", "thightwist", "thighstretch", "thighbend", "femur", "upperthigh",
+        "legupper", "hipjoint",
     ),
     "shin": (
-        "shin", "calf", "lowerleg", "loleg", "lowleg", "leg", "knee", "legstretch", "crus", "tibia", "leglower", "kneejoint",
+        "shin", "calf", "lowerleg", "loleg", "lowleg", "leg", "knee", "legstretch", "crus", "tibia", "leglower",
+        "kneejoint",
     ),
     "foot": ("foot", "ankle", "feet", "footjoint", "anklejoint"),
-    "toe": ("toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe", "toe11", "toejoint"),
-    "upper_arm": ("upperarm", "uparm", "arm", "shoulder", "armstretch", "upperarmbend", "shldr", "shldrbend", "humerus", "armupper"),
-    "forearm": ("forearm", "lowerarm", "loarm", "lowarm", "elbow", "forearmstretch", "forearmbend", "armlower", "radius"),
+    "toe": (
+        "toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe", "toe11",
+        "toejoint",
+    ),
+    "upper_arm": (
+        "upperarm", "uparm", "arm", "shoulder", "armtwist", "armstretch", "upperarmbend", "shldr", "shldrbend",
+        "humerus", "armupper",
+    ),
+    "forearm": (
+        "forearm", "lowerarm", "loarm", "lowarm", "elbow", "forearmstretch", "forearmbend", "armlower", "radius",
+    ),
     "hand": ("hand", "wrist", "palm"),
 }  # fmt: skip
 """Words for the segments of a limb, most telling first, as they read without side, number and decoration."""
@@ -81,30 +90,27 @@ _LIMBS: Mapping[str, tuple[str, ...]] = {
 _TRUNK: Mapping[str, tuple[str, ...]] = {
     "hips": ("hips", "pelvis", "hip", "root", "cog", "spine"),
     "spine": (
-        "spine",
-        "abdomen",
-        "lowerback",
-        "torso",
-        "waist",
-        "chest",
-        "spinelower",
-        "abdomenlower",
-        "back",
-        "upperbody",
+        "spine", "abdomen", "lowerback", "torso", "waist", "chest", "spinelower", "abdomenlower", "back", "upperbody",
     ),
     "neck": ("neck", "lowerneck", "necklower", "spine4"),
     "head": ("head", "skull", "spine6"),
-}
+}  # fmt: skip
 
 _DECORATION = frozenset(
-    "def org mixamorig bip bip01 bip001 valvebiped j bn jnt joint jt bone bind bnd deform skin sk cc base rig armature skel".split()
-)
+    (
+        "def", "org", "mixamorig", "bip", "valvebiped", "j", "bn", "jnt", "joint", "jt", "bone", "bind", "bnd",
+        "deform", "skin", "sk", "cc", "base", "rig", "armature", "skel",
+    )
+)  # fmt: skip
 """Words that families put around a bone's name and that say nothing about what it is."""
 
 _DISTRACTIONS = frozenset(
-    "ik fk pole ctrl control ctl controller cntrl target tgt mch tweak vis wgt ref helper offset parent master spin pivot "
-    "heel roll snap switch socket end nub leaf effector locator track".split()
-)
+    (
+        "ik", "fk", "pole", "ctrl", "control", "ctl", "controller", "cntrl", "target", "tgt", "mch", "tweak", "vis",
+        "wgt", "ref", "helper", "offset", "parent", "master", "spin", "pivot", "heel", "roll", "snap", "switch",
+        "socket", "end", "nub", "leaf", "effector", "locator", "track",
+    )
+)  # fmt: skip
 """Words of bones that steer a rig; none of them is ever part of the body."""
 
 _SIDES = {"l": "L", "left": "L", "r": "R", "right": "R"}
@@ -149,11 +155,11 @@ def map_rig(armature: bpy.types.Object) -> RigMapping:
     bones = armature.data.bones
     mapping = _map_by_names(bones)
     if mapping is None:
-        mapping = map_by_rest_pose(armature)
-        mapping = mapping and RigMapping(
-            joints=mapping[0], soles=tuple(SoleSource(*foot) for foot in mapping[1]), method="rest pose"
-        )
-    if not mapping:
+        shape = map_by_rest_pose(armature)
+        if shape is not None:
+            joints, feet = shape
+            mapping = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
+    if mapping is None:
         raise InputError(
             f"No feet found in armature '{armature.name}': neither by bone names nor as mirrored lowest chains of the "
             "rest pose. Choose the foot bones by hand in the character's list of soles."
@@ -212,7 +218,7 @@ _JOINT_HEADS = {
 def _settle_ambiguities(
     limb: dict[str, str], readings: list[_Reading], bones: Mapping[str, bpy.types.Bone], side: str
 ) -> None:
-    """Words that mean different bones in different families: `leg` above `knee`, `ankle` above `foot`, `shoulder` above `arm`."""
+    """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
     knee, leg = (_best(readings, (word,), side) for word in ("knee", "leg"))
     if knee and leg and _is_ancestor(bones, leg, knee):
         limb["shin"] = knee
@@ -250,7 +256,7 @@ def _map_trunk(
 
 
 def _best(readings: list[_Reading], words: tuple[str, ...], side: str) -> str:
-    """Name of the bone that fits best: deforming, by the most telling word, unnumbered, undecorated; empty if none does."""
+    """Name of the bone that fits best: deforming, most telling word, lowest number, least decoration; empty if none."""
     rank = {word: place for place, word in enumerate(words)}
     fits = []
     for reading in readings:
@@ -291,7 +297,9 @@ def _split(name: str) -> list[str]:
 def _read(bone: bpy.types.Bone, words: list[str]) -> _Reading | None:
     if not words or bone.name.startswith("c_") or _DISTRACTIONS.intersection(words):
         return None
-    side, parts, numbers, decoration = "", [], [], 0
+    side, decoration = "", 0
+    parts: list[str] = []
+    numbers: list[int] = []
     for word in words:
         if word in _SIDES and not side:
             side = _SIDES[word]
@@ -309,7 +317,7 @@ def _read(bone: bpy.types.Bone, words: list[str]) -> _Reading | None:
     return _Reading(bone.name, side, word, number, decoration, bone.use_deform, len(bone.parent_recursive))
 
 
-_BODY_WORDS = frozenset(word for words in (*_LIMBS.values(),) for word in words)
+_BODY_WORDS = frozenset(word for words in _LIMBS.values() for word in words)
 
 
 def _glued_side(word: str) -> tuple[str, str]:

@@ -8,22 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.errors import InputError
-from ..core.foot_attitude import planted_instants
-from ..core.motion import Array, CharacterMotion, SoleMotion
+from ..core.motion import CharacterMotion
+from .motion_assembly import Recording, assemble_motion
 from .rig_mapping import RigMapping, SoleSource, require_armature
-from .sole_extraction import FootBones, FootMesh, find_foot_meshes, foot_sole, object_sole
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
-
-STANDARD_GRAVITY = 9.81
-"""For scenes whose gravity is switched off [m/s²]."""
 
 _SCALE_TOLERANCE = 1e-3
 """Relative difference of scale between axes, and cosine between them, that still counts as uniform."""
@@ -81,16 +77,11 @@ def sample_character(
             f"The frame range {frame_start} to {frame_end} in steps of {frame_step} is empty: "
             "set a start before the end and a positive step."
         )
-    wanted = list(dict.fromkeys([b for b, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)]))
-    things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
-    metre = scene.unit_settings.scale_length
-
-    record = _Record.empty(len(frames), wanted, things)
-    for done in _evaluate(scene, armature.name_full, frames, record):
-        yield done
-    record.scale_lengths(metre)
-    _check_record(armature, record, frames)
-    return _motion_from_record(scene, armature, mapping, record, mass=mass, frames=frames.astype(float))
+    bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
+    things = dict.fromkeys(source.object for source in mapping.soles if source.object)
+    recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
+    _check_recording(armature.name, recording)
+    return assemble_motion(scene, armature, mapping, recording, mass=mass)
 
 
 def sample_character_now(
@@ -125,40 +116,14 @@ def _bones(source: SoleSource) -> list[str]:
     return [bone for bone in (source.bone, source.toe_bone) if bone]
 
 
-@dataclass(frozen=True)
-class _Record:
-    """Matrices as evaluated, to world; lengths in Blender units until `scale_lengths`."""
-
-    bones: list[str]
-    things: list[str]
-    bone_matrices: Array  # (F, B, 4, 4)
-    thing_matrices: Array  # (F, T, 4, 4)
-    object_matrices: Array  # (F, 4, 4)
-
-    @classmethod
-    def empty(cls, count: int, bones: list[str], things: list[str]) -> _Record:
-        return cls(
-            bones,
-            things,
-            np.empty((count, len(bones), 4, 4)),
-            np.empty((count, len(things), 4, 4)),
-            np.empty((count, 4, 4)),
-        )
-
-    def scale_lengths(self, metre: float) -> None:
-        """Turn Blender units into metres and bone matrices from armature space to world."""
-        self.bone_matrices[:] = self.object_matrices[:, None] @ self.bone_matrices
-        for matrices in (self.bone_matrices, self.thing_matrices, self.object_matrices):
-            matrices[..., :3, :] *= metre
-
-    def of(self, bone: str) -> Array:
-        """(F, 4, 4) matrices of a bone."""
-        return self.bone_matrices[:, self.bones.index(bone)]
-
-
-def _evaluate(scene: bpy.types.Scene, armature: str, frames: Array, record: _Record) -> Iterator[int]:
-    """Fill the record frame by frame, yielding the number of frames done."""
-    with _sampling_scene(scene, [armature, *record.things]) as name:
+def _evaluate(
+    scene: bpy.types.Scene, armature: str, frames: NDArray[np.int_], bones: Sequence[str], things: Sequence[str]
+) -> Generator[int, None, Recording]:
+    """Record the matrices frame by frame, yielding the number of frames done."""
+    bone_matrices = np.empty((len(frames), len(bones), 4, 4))
+    thing_matrices = np.empty((len(frames), len(things), 4, 4))
+    armature_matrices = np.empty((len(frames), 4, 4))
+    with _sampling_scene(scene, [armature, *things]) as name:
         for done, frame in enumerate(frames):
             temporary = bpy.data.scenes.get(name)
             if temporary is None:
@@ -167,18 +132,32 @@ def _evaluate(scene: bpy.types.Scene, armature: str, frames: Array, record: _Rec
                 temporary.frame_set(int(frame))
             depsgraph = temporary.view_layers[0].depsgraph
             evaluated = _object_named(armature).evaluated_get(depsgraph)
-            record.object_matrices[done] = evaluated.matrix_world
+            armature_matrices[done] = evaluated.matrix_world
             pose = evaluated.pose.bones
-            for place, bone in enumerate(record.bones):
-                record.bone_matrices[done, place] = pose[bone].matrix
-            for place, thing in enumerate(record.things):
-                record.thing_matrices[done, place] = _object_named(thing).evaluated_get(depsgraph).matrix_world
+            if done == 0:
+                places = [pose.find(bone) for bone in bones]
+                buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
+            pose.foreach_get("matrix", buffer.reshape(-1))
+            bone_matrices[done] = buffer[places]
+            for place, thing in enumerate(things):
+                thing_matrices[done, place] = _object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1
+
+    metre = scene.unit_settings.scale_length
+    bone_matrices = armature_matrices[:, None] @ np.swapaxes(bone_matrices, -1, -2)  # foreach_get goes by columns
+    for matrices in (bone_matrices, thing_matrices, armature_matrices):
+        matrices[..., :3, :] *= metre
+    return Recording(
+        frames=frames.astype(float),
+        bones={bone: bone_matrices[:, place] for place, bone in enumerate(bones)},
+        things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
+        armature=armature_matrices,
+    )
 
 
 @contextmanager
 def _sampling_scene(scene: bpy.types.Scene, objects: Sequence[str]) -> Iterator[str]:
-    """Name of a scene that holds only the given objects and keeps the user's time; gone afterwards, whatever happens."""
+    """Name of a scene with only the given objects that keeps the user's time; gone afterwards, whatever happens."""
     temporary = bpy.data.scenes.new("SoftGround Sampling")
     name = temporary.name
     try:
@@ -231,7 +210,11 @@ def _check_input(armature: bpy.types.Object, mapping: RigMapping, mass: float) -
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
         if source.object and source.object not in bpy.data.objects:
             raise InputError(f"Sole '{source.name}' of '{name}': object '{source.object}' is gone, choose another one.")
-    missing = [b for b in [*(b for s in mapping.soles for b in _bones(s)), *(b for b, _ in mapping.joints.values())] if b not in bones]
+    missing = [
+        b
+        for b in [*(b for s in mapping.soles for b in _bones(s)), *(b for b, _ in mapping.joints.values())]
+        if b not in bones
+    ]
     if missing:
         raise InputError(f"Armature '{name}' has no bone '{missing[0]}': choose the bones of the character again.")
     if armature.mode == "EDIT":
@@ -255,16 +238,15 @@ def _is_animated(armature: bpy.types.Object) -> bool:
     return bool(armature.data.animation_data)
 
 
-def _check_record(armature: bpy.types.Object, record: _Record, frames: Array) -> None:
-    name = armature.name
-    for matrices in (record.object_matrices[:, None], record.bone_matrices, record.thing_matrices):
-        bad = ~np.isfinite(matrices).all(axis=(1, 2, 3))
+def _check_recording(name: str, recording: Recording) -> None:
+    for matrices in (recording.armature, *recording.bones.values(), *recording.things.values()):
+        bad = ~np.isfinite(matrices).all(axis=(1, 2))
         if bad.any():
             raise InputError(
-                f"'{name}' has no finite pose at frame {int(frames[bad.argmax()])}: "
+                f"'{name}' has no finite pose at frame {int(recording.frames[bad.argmax()])}: "
                 "look for broken keys (NaN or infinite values) in its action and delete them."
             )
-    axes = record.object_matrices[:, :3, :3]
+    axes = recording.armature[:, :3, :3]
     gram = np.swapaxes(axes, -1, -2) @ axes
     size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
     if (size < 1e-9).any():
@@ -273,184 +255,8 @@ def _check_record(armature: bpy.types.Object, record: _Record, frames: Array) ->
     cosines = gram / (size[:, :, None] * size[:, None, :])
     sheared = np.abs(cosines - np.eye(3)).max(axis=(1, 2)) > _SCALE_TOLERANCE
     if spread.any() or sheared.any():
+        values = ", ".join(f"{value:.4g}" for value in size[spread | sheared][0])
         raise InputError(
-            f"'{name}' is stretched or sheared (scale {', '.join(f'{value:.4g}' for value in size[spread | sheared][0])}): "
+            f"'{name}' is stretched or sheared (scale {values}): "
             "make its scale the same along all axes, or apply it (Object > Apply > Scale), also on its parents."
         )
-
-
-def _motion_from_record(
-    scene: bpy.types.Scene,
-    armature: bpy.types.Object,
-    mapping: RigMapping,
-    record: _Record,
-    *,
-    mass: float,
-    frames: Array,
-) -> CharacterMotion:
-    rest = _RestPose(armature, record.object_matrices[0])
-    frame_rate = scene.render.fps / scene.render.fps_base
-    gravity = float(np.linalg.norm(scene.gravity)) if scene.use_gravity else 0.0
-    gravity = gravity or STANDARD_GRAVITY
-
-    joints = {
-        joint: _end_path(record.of(bone), 0.0 if end == "head" else armature.data.bones[bone].length)
-        for joint, (bone, end) in mapping.joints.items()
-    }
-    leg = rest.leg_length(mapping)
-    feet = [source for source in mapping.soles if source.bone and not source.object]
-    points = [_foot_points(record, source, armature) for source in feet]
-    planted = planted_instants(
-        points, frame_rate=frame_rate / _step(frames), leg_length=leg, gravity=gravity
-    )
-    meshes = find_foot_meshes(scene, armature, feet, rest.world)
-    forward = rest.facing(mapping)
-
-    motions: dict[str, SoleMotion] = {}
-    heights = []
-    for source, stands in zip(feet, planted, strict=True):
-        motions[source.name], height = _foot_motion(
-            armature, source, record, rest, meshes.get(source.name), stands, leg=leg, forward=forward
-        )
-        heights.append(height)
-    for source in mapping.soles:
-        if source.object:
-            motions[source.name] = _object_motion(source, record)
-    return CharacterMotion(
-        name=armature.name,
-        mass=mass,
-        leg_length=leg + (float(np.mean(heights)) if heights else 0.0),
-        frames=frames,
-        frame_rate=frame_rate,
-        soles=tuple(motions[source.name] for source in mapping.soles),
-        joints=joints,
-        gravity=gravity,
-    )
-
-
-def _step(frames: Array) -> float:
-    return float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
-
-
-@dataclass(frozen=True)
-class _RestPose:
-    """The rig at rest, placed in the world as at the first frame [m]."""
-
-    armature: bpy.types.Object
-    world: Array
-
-    def matrix(self, bone: str) -> Array:
-        return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
-
-    def end(self, bone: str, end: str) -> Array:
-        point = self.armature.data.bones[bone]
-        local = np.array(point.head_local if end == "head" else point.tail_local)
-        return self.world[:3, :3] @ local + self.world[:3, 3]
-
-    def leg_length(self, mapping: RigMapping) -> float:
-        """Thigh and shank together, or about half the rig's height where they are not mapped."""
-        lengths = []
-        for side in "lr":
-            points = [self.end(*mapping.joints[j]) for j in (f"hip_{side}", f"knee_{side}", f"ankle_{side}") if j in mapping.joints]
-            if len(points) == 3:
-                lengths.append(sum(float(np.linalg.norm(b - a)) for a, b in zip(points, points[1:], strict=False)))
-        if lengths and min(lengths) > 0:
-            return float(np.mean(lengths))
-        ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
-        return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
-
-    def facing(self, mapping: RigMapping) -> Array:
-        """Horizontal direction in which the character faces; Blender's front where left and right do not show."""
-        left = self._across(mapping)
-        ahead = np.cross(left, (0.0, 0.0, 1.0))
-        if np.linalg.det(self.world[:3, :3]) < 0:
-            ahead = -ahead
-        length = float(np.linalg.norm(ahead))
-        return ahead / length if length > 1e-9 else np.array((0.0, -1.0, 0.0))
-
-    def _across(self, mapping: RigMapping) -> Array:
-        joints = mapping.joints
-        for joint in ("hip", "shoulder", "knee", "ankle"):
-            if f"{joint}_l" in joints and f"{joint}_r" in joints:
-                across = self.end(*joints[f"{joint}_l"]) - self.end(*joints[f"{joint}_r"])
-                if np.linalg.norm(across[:2]) > 1e-9:
-                    return across
-        return np.zeros(3)
-
-
-def _foot_points(record: _Record, source: SoleSource, armature: bpy.types.Object) -> Array:
-    """Paths of ankle and ball, (F, 2, 3)."""
-    foot = record.of(source.bone)
-    ball = (
-        record.of(source.toe_bone)[:, :3, 3]
-        if source.toe_bone
-        else _end_path(foot, armature.data.bones[source.bone].length)
-    )
-    return np.stack([foot[:, :3, 3], ball], axis=1)
-
-
-def _end_path(matrices: Array, along: float) -> Array:
-    """Path of the point at a distance along the bone, (F, 3)."""
-    return matrices[:, :3, 1] * along + matrices[:, :3, 3]
-
-
-def _foot_motion(
-    armature: bpy.types.Object,
-    source: SoleSource,
-    record: _Record,
-    rest: _RestPose,
-    mesh: FootMesh | None,
-    planted: Array,
-    *,
-    leg: float,
-    forward: Array,
-) -> tuple[SoleMotion, float]:
-    """A foot's sole in motion, and the height of its ankle."""
-    foot_motion = _rigid_motion(record.of(source.bone), rest.matrix(source.bone))
-    toe_motion = foot_motion
-    if source.toe_bone:
-        toe_motion = _rigid_motion(record.of(source.toe_bone), rest.matrix(source.toe_bone))
-    ankle = rest.end(source.bone, "head")
-    bones = FootBones(
-        ankle=ankle,
-        tail=rest.end(source.bone, "tail"),
-        ball=rest.end(source.toe_bone, "head") if source.toe_bone else None,
-        tip=rest.end(source.toe_bone, "tail") if source.toe_bone else None,
-        forward=forward,
-        foot_rotations=foot_motion[:, :3, :3],
-        toe_rotations=toe_motion[:, :3, :3],
-        planted=planted,
-        leg=leg,
-        mirrored=bool(np.linalg.det(rest.world[:3, :3]) < 0),
-    )
-    placed, flat = foot_sole(source, bones, mesh)
-    carriers = [foot_motion @ flat.foot_frame, toe_motion @ flat.toe_frame][: len(placed.placements)]
-    transforms = np.stack([c @ p for c, p in zip(carriers, placed.placements, strict=True)], axis=1)
-    return SoleMotion(placed.sole, transforms), max(-float(placed.placements[:, 2, 3].min()), 0.0)
-
-
-def _rigid_motion(matrices: Array, rest: Array) -> Array:
-    """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
-    turn = _nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
-    motion = np.zeros_like(matrices)
-    motion[:, :3, :3] = turn
-    motion[:, :3, 3] = matrices[:, :3, 3] - turn @ rest[:3, 3]
-    motion[:, 3, 3] = 1.0
-    return motion
-
-
-def _nearest_rotation(matrices: Array) -> Array:
-    """Rotations closest to the given matrices (polar decomposition)."""
-    u, _, vh = np.linalg.svd(matrices)
-    handed = np.ones(matrices.shape[:-1])
-    handed[..., 2] = np.sign(np.linalg.det(u @ vh))
-    return (u * handed[..., None, :]) @ vh
-
-
-def _object_motion(source: SoleSource, record: _Record) -> SoleMotion:
-    matrices = record.thing_matrices[:, record.things.index(source.object)]
-    scale = np.linalg.norm(matrices[0, :3, :3], axis=0)
-    placed = object_sole(source, _object_named(source.object), scale)
-    rigid = matrices.copy()
-    rigid[:, :3, :3] = _nearest_rotation(matrices[:, :3, :3] / scale)
-    return SoleMotion(placed.sole, (rigid @ placed.placements[0])[:, None])

@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import InputError
-from ..core.foot_attitude import FlatFoot, ankle_height, flat_foot, foot_length
+from ..core.foot_attitude import FlatFoot, FootSize
 from ..core.motion import Array
 from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_mesh, sole_from_underside
 from .rig_mapping import SoleSource
 
 _OWNED = 0.5
 """A vertex belongs to the foot when the foot's bones hold more than this share of its weight."""
-
-_REST_IS_FLAT = np.radians(10.0)
-"""Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
 
 _FEWEST_TRIANGLES = 4
 
@@ -42,104 +39,52 @@ class FootMesh:
     triangles: NDArray[np.intp]
 
 
-@dataclass(frozen=True)
-class FootBones:
-    """A foot as its bones have it, in the rest pose and in motion.
+def foot_sole(
+    source: SoleSource, flat: FlatFoot, size: FootSize, mesh: FootMesh | None, *, has_toes: bool, mirrored: bool
+) -> PlacedSole:
+    """Sole of a foot, in the frame of `flat`.
 
-    Attributes
+    Parameters
     ----------
-    ankle, tail : (3,) float arrays
-        Ends of the foot bone in the rest pose, world [m].
-    ball, tip : (3,) float arrays or None
-        Ends of the toe bone; None without one.
-    forward : (3,) float array
-        Where the character faces, for feet whose bones point nowhere.
-    foot_rotations, toe_rotations : (F, 3, 3) float arrays
-        From the rest pose to each sample.
-    planted : (F,) bool array
-        When the foot stands.
-    leg : float
-        Thigh and shank together [m].
+    source : SoleSource
+    flat : FlatFoot
+        How the foot stands.
+    size : FootSize
+        What the bones tell; not used where there is a mesh.
+    mesh : FootMesh or None
+    has_toes : bool
+        Whether the toes bend.
     mirrored : bool
-        Whether the armature is mirrored (negative scale), so that a foot named left is shaped as a right one.
-    """
-
-    ankle: Array
-    tail: Array
-    ball: Array | None
-    tip: Array | None
-    forward: Array
-    foot_rotations: Array
-    toe_rotations: Array
-    planted: NDArray[np.bool_]
-    leg: float
-    mirrored: bool
-
-
-def foot_sole(source: SoleSource, bones: FootBones, mesh: FootMesh | None) -> tuple[PlacedSole, FlatFoot]:
-    """Sole of a foot and how its bones carry it.
+        Whether the armature is mirrored (negative scale), so that a foot named left has the shape of a right one.
 
     Raises
     ------
     InputError
         If the foot's mesh has no underside.
     """
-    hinge = bones.tail if bones.ball is None else bones.ball
-    flat = flat_foot(
-        bones.ankle,
-        hinge,
-        _pointing(bones, hinge),
-        bones.foot_rotations,
-        bones.toe_rotations,
-        bones.planted,
-        trust_rest_within=_REST_IS_FLAT if mesh else 0.0,
-    )
-    ball = flat.ball if bones.ball is not None else None
     if mesh is not None:
-        vertices = _flattened(mesh, flat)
-        return sole_from_underside(vertices, mesh.triangles, name=source.name, side=source.side, ball=ball), flat
-    return _bone_sole(source, bones, flat), flat
-
-
-def _pointing(bones: FootBones, hinge: Array) -> Array:
-    """Direction of the toes in the rest pose, the character's own where the foot bone is too short or too steep to tell."""
-    foot = hinge - bones.ankle
-    length = float(np.linalg.norm(foot))
-    if length < 0.02 * bones.leg:
-        return bones.forward
-    steepness = abs(float(foot @ _typical_up(bones))) / length
-    return bones.forward if steepness > 0.95 else foot
-
-
-def _typical_up(bones: FootBones) -> Array:
-    standing = bones.foot_rotations[bones.planted]
-    return np.median(standing[:, 2], axis=0) if len(standing) else np.array((0.0, 0.0, 1.0))
-
-
-def _bone_sole(source: SoleSource, bones: FootBones, flat: FlatFoot) -> PlacedSole:
-    """An anatomical sole under the bones."""
-    to_foot = np.linalg.inv(flat.foot_frame)
-    to_toe = np.linalg.inv(flat.toe_frame)
-    if bones.ball is not None and bones.tip is not None:
-        ball, tip = _moved(to_foot, bones.ball), _moved(to_toe, bones.tip)
-        length = foot_length(float(ball[0]), float(tip[0]), bones.leg)
-        lowest = -min(float(ball[2]), float(tip[2]))
-    else:
-        tip = _moved(to_foot, bones.tail)
-        length = foot_length(None, float(tip[0]), bones.leg)
-        lowest = -float(tip[2])
-    behind = ANKLE_POSITION * length
+        return sole_from_underside(
+            _flattened(mesh, flat),
+            mesh.triangles,
+            name=source.name,
+            side=source.side,
+            ball=flat.ball if has_toes else None,
+        )
+    behind = ANKLE_POSITION * size.length
     placed = anatomical_sole(
-        length,
+        size.length,
         name=source.name,
         side=source.side,
-        ball=None if bones.ball is None else behind + flat.ball,
-        medial={"L": -1.0, "R": 1.0}.get(source.side, 0.0) * (-1 if bones.mirrored else 1),
+        ball=behind + flat.ball if has_toes else None,
+        medial={"L": -1.0, "R": 1.0}.get(source.side, 0.0) * (-1 if mirrored else 1),
     )
-    placements = placed.placements.copy()
-    placements[:, 0, 3] -= behind
-    placements[:, 2, 3] -= ankle_height(lowest, length)
-    return PlacedSole(placed.sole, placements)
+    return PlacedSole(placed.sole, placed.placements + _shift(-behind, -size.ankle_height))
+
+
+def _shift(x: float, z: float) -> Array:
+    shift = np.zeros((4, 4))
+    shift[0, 3], shift[2, 3] = x, z
+    return shift
 
 
 def _flattened(mesh: FootMesh, flat: FlatFoot) -> Array:
@@ -171,7 +116,7 @@ def object_sole(source: SoleSource, thing: bpy.types.Object, scale: Array) -> Pl
     """
     if thing.type != "MESH":
         raise InputError(f"'{thing.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")
-    vertices, triangles = _read_mesh(thing.data)
+    vertices, triangles = _read_mesh(thing)
     return sole_from_mesh(vertices * scale, triangles, name=source.name, side=source.side)
 
 
@@ -203,7 +148,11 @@ def find_foot_meshes(
             continue
         for name, part in found.items():
             pieces.setdefault(name, []).append(part)
-    return {name: _joined(parts) for name, parts in pieces.items() if sum(len(p.triangles) for p in parts) >= _FEWEST_TRIANGLES}
+    return {
+        name: _joined(parts)
+        for name, parts in pieces.items()
+        if sum(len(p.triangles) for p in parts) >= _FEWEST_TRIANGLES
+    }
 
 
 def _bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
@@ -232,8 +181,8 @@ def _weighted_parts(
     if not feet.intersection(names.values()):
         return {}
     bones = frozenset(names.values())
-    vertex, group, weight = _read_weights(thing.data)
-    vertices, triangles = _read_mesh(thing.data)
+    vertex, group, weight = _read_weights(thing)
+    vertices, triangles = _read_mesh(thing)
     count = len(vertices)
     group_name = np.array([names.get(index, "") for index in range(max(names, default=0) + 1)])
     total = np.bincount(vertex, weight, count)
@@ -268,7 +217,7 @@ def _rigid_part(
         parent = np.array(bone.matrix_local)
         parent[:3, 3] += parent[:3, 1] * bone.length
     to_world = rest_world @ parent @ np.array(thing.matrix_parent_inverse @ thing.matrix_basis)
-    vertices, triangles = _read_mesh(thing.data)
+    vertices, triangles = _read_mesh(thing)
     return {
         name: FootMesh(_moved(to_world, vertices), np.full(len(vertices), float(bone.name in toes)), triangles)
         for name, (family, toes) in groups.items()
@@ -285,8 +234,9 @@ def _joined(parts: list[FootMesh]) -> FootMesh:
     )
 
 
-def _read_mesh(mesh: bpy.types.Mesh) -> tuple[Array, NDArray[np.intp]]:
-    """Vertices (V, 3) and triangles (T, 3) of a mesh as modelled."""
+def _read_mesh(thing: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
+    """Vertices (V, 3) and triangles (T, 3) of a mesh object as modelled."""
+    mesh = _mesh_of(thing)
     vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.vertices.foreach_get("co", vertices)
     mesh.calc_loop_triangles()
@@ -295,8 +245,16 @@ def _read_mesh(mesh: bpy.types.Mesh) -> tuple[Array, NDArray[np.intp]]:
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
 
 
-def _read_weights(mesh: bpy.types.Mesh) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _read_weights(thing: bpy.types.Object) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Vertex, group and weight of every vertex weight."""
-    entries = [(vertex.index, group.group, group.weight) for vertex in mesh.vertices for group in vertex.groups]
+    entries = [
+        (vertex.index, group.group, group.weight) for vertex in _mesh_of(thing).vertices for group in vertex.groups
+    ]
     table = np.array(entries, dtype=float).reshape(-1, 3)
     return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
+
+
+def _mesh_of(thing: bpy.types.Object) -> bpy.types.Mesh:
+    mesh = thing.data
+    assert isinstance(mesh, bpy.types.Mesh), thing.name
+    return mesh

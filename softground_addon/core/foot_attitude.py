@@ -37,10 +37,16 @@ _MOST_SPREAD = np.radians(20.0)
 
 _FEWEST_INSTANTS = 3
 
+_HOLD = 1e-6
+"""Displacement over leg length below which a pose is a hold, such as the frames beyond the last key."""
+
 _ANKLE_HEIGHTS = (0.12, 0.55)
 """Heights of the ankle over foot length that a foot can have; outside, the bones do not reach the ground."""
 
-_TIP_TRUST = (0.7, 1.45)
+_LEAST_FOOT = 0.3
+"""Foot length over the one that fits the leg, below which the bones are stubs that tell nothing."""
+
+_TIP_TRUST = (0.8, 1.3)
 """Foot length from the toe tip over that from the ball, within which the tip is where the toes end; tips of leaf
 bones are often made up by importers."""
 
@@ -64,6 +70,8 @@ def planted_instants(
     Returns
     -------
     list of (F,) bool arrays
+        A pose that is held without any motion counts once, at its first instant; a foot that stands for too few
+        instants to be sure of is never planted.
     """
     if not feet:
         return []
@@ -72,16 +80,35 @@ def planted_instants(
     lowest = [foot[..., 2].min(axis=1) for foot in feet]
     floors = [_moving_minimum(height, half_window) for height in lowest]
     common_floor = np.minimum.reduce(floors)
-    planted = []
-    for foot, height, floor in zip(feet, lowest, floors, strict=True):
-        if len(foot) > 1:
-            speed = np.linalg.norm(np.gradient(foot, axis=0), axis=-1).max(axis=1) * frame_rate / froude
-        else:
-            speed = np.zeros(len(foot))
-        low = (height <= floor + _LOW_CLEARANCE * leg_length) & (height <= common_floor + _STEP_CLEARANCE * leg_length)
-        limit = max(_STILL_SPEED, float(np.quantile(speed[low], _STILL_SHARE))) if low.any() else 0.0
-        planted.append(low & (speed <= limit))
-    return planted
+    held = _held(np.concatenate(feet, axis=1), _HOLD * leg_length)
+    speeds = [_fastest(foot) * frame_rate / froude for foot in feet]
+    low = [
+        ~held
+        & (height <= floor + _LOW_CLEARANCE * leg_length)
+        & (height <= common_floor + _STEP_CLEARANCE * leg_length)
+        for height, floor in zip(lowest, floors, strict=True)
+    ]
+    planted = [near & (speed <= _STILL_SPEED) for near, speed in zip(low, speeds, strict=True)]
+    if sum(int(still.sum()) for still in planted) < _FEWEST_INSTANTS:
+        planted = [
+            near & (speed <= np.quantile(speed[near], _STILL_SHARE)) if near.any() else near
+            for near, speed in zip(low, speeds, strict=True)
+        ]
+    fewest = min(_FEWEST_INSTANTS, int((~held).sum()))
+    return [stands & (stands.sum() >= fewest) for stands in planted]
+
+
+def _held(points: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Samples at which nothing has moved since the one before."""
+    moved = np.abs(np.diff(points, axis=0)).max(axis=(1, 2)) > tolerance
+    return np.concatenate([[False], ~moved])
+
+
+def _fastest(points: Array) -> Array:
+    """Largest displacement per sample among a foot's points, (F,)."""
+    if len(points) < 2:
+        return np.zeros(len(points))
+    return np.linalg.norm(np.gradient(points, axis=0), axis=-1).max(axis=1)
 
 
 def _moving_minimum(values: Array, half_window: int) -> Array:
@@ -92,7 +119,7 @@ def _moving_minimum(values: Array, half_window: int) -> Array:
 
 
 def typical_direction(directions: Array) -> Array | None:
-    """Unit vector that most of the given ones agree on, or None if there are too few of them.
+    """Unit vector that most of the given ones agree on, or None if they do not.
 
     Parameters
     ----------
@@ -103,13 +130,11 @@ def typical_direction(directions: Array) -> Array | None:
     -------
     (3,) float array or None
     """
-    if len(directions) < 1:
+    if not len(directions):
         return None
     centre = _unit(np.median(directions, axis=0))
     near = directions @ centre >= np.cos(_MOST_SPREAD)
-    if near.sum() < min(_FEWEST_INSTANTS, len(directions)):
-        return None
-    return _unit(directions[near].mean(axis=0))
+    return _unit(directions[near].mean(axis=0)) if near.any() else None
 
 
 @dataclass(frozen=True)
@@ -131,15 +156,35 @@ class FlatFoot:
     ball: float
 
 
+def standing_up(own: Array, others: Sequence[Array] = (), *, trust_rest_within: float = 0.0) -> Array:
+    """World up as a standing foot's bone has it in the rest pose.
+
+    Parameters
+    ----------
+    own : (K, 3, 3) float array
+        Rotations of the bone from the rest pose to each planted instant.
+    others : sequence of (K, 3, 3) float arrays
+        The same of feet that are this one's mirror image, reflected; used where they do not contradict.
+    trust_rest_within : float
+        A rest pose that is flat within this angle is taken as flat [rad].
+
+    Returns
+    -------
+    (3,) float array
+        Unit vector; the rest pose's own up where the motion does not tell.
+    """
+    samples = own[:, 2, :]
+    up = typical_direction(samples)
+    for other in others:
+        image = typical_direction(other[:, 2, :])
+        if image is not None and (up is None or up @ image >= np.cos(_MOST_SPREAD)):
+            samples = np.concatenate([samples, other[:, 2, :]])
+            up = typical_direction(samples)
+    return UP if up is None or up @ UP >= np.cos(trust_rest_within) else up
+
+
 def flat_foot(
-    ankle: Array,
-    ball: Array,
-    forward: Array,
-    foot_rotations: Array,
-    toe_rotations: Array,
-    planted: NDArray[np.bool_],
-    *,
-    trust_rest_within: float = 0.0,
+    ankle: Array, ball: Array, forward: Array, *, foot_up: Array, toe_up: Array, toe_turns: Array
 ) -> FlatFoot:
     """The attitude of a flat sole relative to its bones.
 
@@ -149,27 +194,20 @@ def flat_foot(
         Joints in the rest pose [m]. The ball is where the toes bend, or else the tip of the foot.
     forward : (3,) float array
         Direction toward the toes in the rest pose.
-    foot_rotations, toe_rotations : (F, 3, 3) float arrays
-        Rotations from the rest pose to each sample.
-    planted : (F,) bool array
-        When the foot stands.
-    trust_rest_within : float
-        A rest pose that is flat within this angle is taken as flat [rad].
+    foot_up, toe_up : (3,) float arrays
+        World up while standing, as the foot and the toe bone have it in the rest pose.
+    toe_turns : (K, 3, 3) float array
+        Rotations of the foot relative to the toes at planted instants, in the rest pose.
 
     Returns
     -------
     FlatFoot
         With the origin at the height of the ankle.
     """
-    foot_up = _standing_up(foot_rotations[planted], trust_rest_within)
-    toe_up = _standing_up(toe_rotations[planted], trust_rest_within)
     forward = _unit(forward - (forward @ foot_up) * foot_up)
     foot_axes = np.column_stack([forward, np.cross(foot_up, forward), foot_up])
-
-    carried = typical_direction(
-        np.einsum("fji,fjk,k->fi", toe_rotations[planted], foot_rotations[planted], foot_axes[:, 0])
-    )
-    toe_forward = foot_axes[:, 0] if carried is None or np.allclose(toe_up, foot_up) else carried
+    carried = typical_direction(toe_turns @ forward)
+    toe_forward = forward if carried is None else carried
     toe_forward = _unit(toe_forward - (toe_forward @ toe_up) * toe_up)
     toe_axes = np.column_stack([toe_forward, np.cross(toe_up, toe_forward), toe_up])
 
@@ -181,50 +219,59 @@ def flat_foot(
     )
 
 
-def _standing_up(rotations: Array, trust_rest_within: float) -> Array:
-    """World up as seen from the rest pose while standing; the rest pose's own up where the motion does not tell."""
-    up = typical_direction(rotations[:, 2, :])
-    if up is None or up @ UP >= np.cos(trust_rest_within):
-        return UP
-    return up
+def reflection(normal: Array) -> Array:
+    """(3, 3) matrix that mirrors in the plane across a direction."""
+    unit = _unit(normal)
+    return np.eye(3) - 2 * np.outer(unit, unit)
 
 
-def foot_length(ankle_to_ball: float | None, ankle_to_tip: float | None, leg: float) -> float:
-    """Length of a foot from what its bones tell.
+@dataclass(frozen=True)
+class FootSize:
+    """Size of a foot without a mesh: its length and the height of the ankle above the sole [m]."""
+
+    length: float
+    ankle_height: float
+
+
+def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: float) -> FootSize:
+    """Size of a foot from what its bones tell.
 
     Parameters
     ----------
-    ankle_to_ball, ankle_to_tip : float or None
-        Distances along the flat sole [m]; None or not positive where the rig does not have the joint. A tip without a
-        ball may turn out to be the ball.
+    flat : FlatFoot
+    ankle_tip : (3,) float array
+        End of the last bone of the foot in the rest pose [m].
+    ball : (3,) float array or None
+        Joint of the toes in the rest pose [m]; None if they do not bend, and then the tip may turn out to be the ball.
     leg : float
         Thigh and shank together [m].
 
     Returns
     -------
-    float
-        [m]
+    FootSize
     """
-    expected = FOOT_TO_LEG * leg
-    to_tip = 1 - ANKLE_POSITION
-    to_ball = BALL_POSITION - ANKLE_POSITION
-    smallest = 0.25 * expected
-    from_ball = ankle_to_ball / to_ball if ankle_to_ball and ankle_to_ball > smallest * to_ball else None
-    from_tip = ankle_to_tip / to_tip if ankle_to_tip and ankle_to_tip > smallest * to_tip else None
-    if from_ball and from_tip:
-        return from_tip if _TIP_TRUST[0] < from_tip / from_ball < _TIP_TRUST[1] else from_ball
-    if from_ball:
-        return from_ball
-    if from_tip:
-        as_ball = from_tip * to_tip / to_ball
-        return min(from_tip, as_ball, key=lambda length: abs(np.log(length / expected)))
-    return expected
-
-
-def ankle_height(lowest_joint: float, length: float) -> float:
-    """Height of the ankle above the sole [m], from the depth of the lowest joint of the foot below it."""
+    frame = flat.foot_frame if ball is None else flat.toe_frame
+    tip = np.linalg.inv(frame) @ np.append(ankle_tip, 1.0)
+    joint = None if ball is None else np.linalg.inv(flat.foot_frame) @ np.append(ball, 1.0)
+    length = _foot_length(None if joint is None else float(joint[0]), float(tip[0]), leg)
+    depth = -float(tip[2] if joint is None else min(joint[2], tip[2]))
     low, high = _ANKLE_HEIGHTS
-    return lowest_joint if low * length <= lowest_joint <= high * length else ANKLE_HEIGHT * length
+    return FootSize(length, depth if low * length <= depth <= high * length else ANKLE_HEIGHT * length)
+
+
+def _foot_length(ankle_to_ball: float | None, ankle_to_tip: float, leg: float) -> float:
+    """Foot length from distances along the flat sole; where they say nothing, from the length of the leg."""
+    expected = FOOT_TO_LEG * leg
+    from_tip = ankle_to_tip / (1 - ANKLE_POSITION)
+    tip_as_ball = ankle_to_tip / (BALL_POSITION - ANKLE_POSITION)
+    least = _LEAST_FOOT * expected
+    if ankle_to_ball is not None:
+        from_ball = ankle_to_ball / (BALL_POSITION - ANKLE_POSITION)
+        if from_ball > least:
+            return from_tip if _TIP_TRUST[0] < from_tip / from_ball < _TIP_TRUST[1] else from_ball
+    if from_tip > least:
+        return from_tip if from_tip * tip_as_ball >= expected**2 else tip_as_ball
+    return expected
 
 
 def _frame(axes: Array, origin: Array) -> Array:
@@ -234,4 +281,5 @@ def _frame(axes: Array, origin: Array) -> Array:
 
 
 def _unit(vector: Array) -> Array:
-    return vector / max(float(np.linalg.norm(vector)), np.finfo(float).tiny)
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 0 else vector

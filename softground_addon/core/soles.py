@@ -206,7 +206,7 @@ class _Grid:
     @property
     def nodes(self) -> Array:
         row, column = np.indices(self.shape)
-        return self.origin + self.spacing * np.stack([column, row], axis=-1)
+        return np.asarray(self.origin + self.spacing * np.stack([column, row], axis=-1), dtype=float)
 
 
 def _assemble(
@@ -215,11 +215,17 @@ def _assemble(
     """Cut the flat sole at the ball, give each piece its own frame, and mark heel, ball and toe tip."""
     distance = signed_distance(grid.nodes, loops)
     x = grid.nodes[..., 0]
-    back, front = (float(end) for end in (min(loop[:, 0].min() for loop in loops), max(loop[:, 0].max() for loop in loops)))
+    back, front = (
+        float(end) for end in (min(loop[:, 0].min() for loop in loops), max(loop[:, 0].max() for loop in loops))
+    )
     length = front - back
     split = split and back + 0.3 * length < ball < front - 0.05 * length
     half_seam = _SEAM * length / 2
-    pieces = [np.maximum(distance, x - ball - half_seam), np.maximum(distance, ball - half_seam - x)] if split else [distance]
+    pieces = (
+        [np.maximum(distance, x - ball - half_seam), np.maximum(distance, ball - half_seam - x)]
+        if split
+        else [distance]
+    )
 
     patches, placements = [], []
     for piece in pieces:
@@ -274,14 +280,15 @@ def _middle(grid: _Grid, distance: Array, station: float) -> float:
 def _outline_for(medial: float) -> Array:
     """Control points of the outline with the arch on the given side, counter-clockwise."""
     if medial < 0:
-        return _OUTLINE[::-1]
-    mirrored = _OUTLINE * (1, -1)
+        return _OUTLINE[::-1].copy()
+    mirrored: Array = _OUTLINE * (1.0, -1.0)
     if medial > 0:
         return mirrored
     half = len(_OUTLINE) // 2 + 1
     breadth = (np.abs(_OUTLINE[1:half, 1]) + np.abs(_OUTLINE[: half - 1 : -1, 1])[: half - 1]) / 2
     right = np.column_stack([_OUTLINE[1:half, 0], -breadth])
-    return np.concatenate([[(0.0, 0.0)], right, [(1.0, 0.0)], (right * (1, -1))[::-1]])
+    ends = np.array([[(0.0, 0.0)], [(1.0, 0.0)]])
+    return np.concatenate([ends[0], right, ends[1], (right * (1, -1))[::-1]])
 
 
 def _smooth_loop(control: Array, samples: int = 6) -> Array:

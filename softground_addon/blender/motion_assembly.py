@@ -1,0 +1,317 @@
+"""From recorded matrices to a `CharacterMotion`: which sole each foot has and how its bones carry it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.foot_attitude import (
+    FlatFoot,
+    FootSize,
+    flat_foot,
+    foot_size,
+    planted_instants,
+    reflection,
+    standing_up,
+)
+from ..core.motion import Array, CharacterMotion, SoleMotion
+from .rig_mapping import RigMapping, SoleSource
+from .sole_extraction import find_foot_meshes, foot_sole, object_sole
+
+STANDARD_GRAVITY = 9.81
+"""For scenes whose gravity is switched off [m/s²]."""
+
+_REST_IS_FLAT = np.radians(10.0)
+"""Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
+
+_MIRROR_TOLERANCE = 0.2
+"""Distance between the direction of a foot bone and the other's mirror image, up to which both feet are alike."""
+
+_SAME_SIZE = 0.2
+"""Relative difference of foot bones up to which both feet are given one size."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """World matrices of bones and objects over time [m], as evaluated; a bone's y axis points from head to tail.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+    bones, things : mapping of str to (F, 4, 4) float array
+        By name.
+    armature : (F, 4, 4) float array
+    """
+
+    frames: Array
+    bones: Mapping[str, Array]
+    things: Mapping[str, Array]
+    armature: Array
+
+
+def assemble_motion(
+    scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, recording: Recording, *, mass: float
+) -> CharacterMotion:
+    """The character's motion with the soles of its mapping.
+
+    Raises
+    ------
+    InputError
+        If a mesh that should print has no underside.
+    """
+    rest = RestPose(armature, recording.armature[0])
+    frame_rate = scene.render.fps / scene.render.fps_base
+    gravity = scene.gravity.length if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
+    leg = rest.leg_length(mapping)
+
+    sources = [source for source in mapping.soles if not source.object]
+    feet = [_Foot.of(source, recording, rest) for source in sources]
+    step = float(recording.frames[1] - recording.frames[0]) if len(recording.frames) > 1 else 1.0
+    planted = planted_instants(
+        [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
+    )
+    meshes = find_foot_meshes(scene, armature, sources, rest.world)
+    facing = rest.facing(mapping)
+    trust = [_REST_IS_FLAT if source.name in meshes else 0.0 for source in sources]
+    images = _mirror_images(feet)
+    flats = [
+        _stand(foot, planted, feet, images[place], facing=facing, leg=leg, trust_rest_within=trust[place], place=place)
+        for place, foot in enumerate(feet)
+    ]
+    sizes = [
+        foot_size(flat, ankle_tip=foot.tip, ball=foot.ball, leg=leg) for foot, flat in zip(feet, flats, strict=True)
+    ]
+    sizes = _evened(sizes, feet, planted)
+
+    motions: dict[str, SoleMotion] = {}
+    for foot, flat, size in zip(feet, flats, sizes, strict=True):
+        placed = foot_sole(
+            foot.source,
+            flat,
+            size,
+            meshes.get(foot.source.name),
+            has_toes=foot.ball is not None,
+            mirrored=rest.is_mirrored,
+        )
+        carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
+        transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
+        motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))
+    for source in mapping.soles:
+        if source.object:
+            motions[source.name] = _object_motion(source, recording.things[source.object])
+
+    return CharacterMotion(
+        name=armature.name,
+        mass=mass,
+        leg_length=leg + (float(np.mean([size.ankle_height for size in sizes])) if sizes else 0.0),
+        frames=recording.frames,
+        frame_rate=frame_rate,
+        soles=tuple(motions[source.name] for source in mapping.soles),
+        joints={
+            joint: along_bone(recording.bones[bone], 0.0 if end == "head" else armature.data.bones[bone].length)
+            for joint, (bone, end) in mapping.joints.items()
+        },
+        gravity=gravity,
+    )
+
+
+def along_bone(matrices: Array, distance: float) -> Array:
+    """Path of the point at a distance from the bone's head, in units of the bone, (F, 3)."""
+    return matrices[:, :3, 1] * distance + matrices[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class RestPose:
+    """The rig at rest, placed in the world as at the first frame [m]."""
+
+    armature: bpy.types.Object
+    world: Array
+
+    @property
+    def is_mirrored(self) -> bool:
+        return bool(np.linalg.det(self.world[:3, :3]) < 0)
+
+    def matrix(self, bone: str) -> Array:
+        return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
+
+    def end(self, bone: str, end: str) -> Array:
+        point = self.armature.data.bones[bone]
+        local = np.array(point.head_local if end == "head" else point.tail_local)
+        return self.world[:3, :3] @ local + self.world[:3, 3]
+
+    def leg_length(self, mapping: RigMapping) -> float:
+        """Thigh and shank together, or about half the rig's height where they are not mapped."""
+        lengths = []
+        for side in "lr":
+            joints = [f"hip_{side}", f"knee_{side}", f"ankle_{side}"]
+            if all(joint in mapping.joints for joint in joints):
+                points = np.array([self.end(*mapping.joints[joint]) for joint in joints])
+                lengths.append(float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()))
+        if lengths and min(lengths) > 0:
+            return float(np.mean(lengths))
+        ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
+        return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
+
+    def facing(self, mapping: RigMapping) -> Array:
+        """Horizontal direction in which the character faces; Blender's front where left and right do not show."""
+        ahead = np.cross(self._across(mapping), (0.0, 0.0, -1.0 if self.is_mirrored else 1.0))
+        length = float(np.linalg.norm(ahead))
+        return ahead / length if length > 0 else np.array((0.0, -1.0, 0.0))
+
+    def _across(self, mapping: RigMapping) -> Array:
+        """From a joint on the right to the same on the left."""
+        for joint in ("hip", "shoulder", "knee", "ankle"):
+            if f"{joint}_l" in mapping.joints and f"{joint}_r" in mapping.joints:
+                across = self.end(*mapping.joints[f"{joint}_l"]) - self.end(*mapping.joints[f"{joint}_r"])
+                if np.linalg.norm(across[:2]) > 0:
+                    return across
+        return np.zeros(3)
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """A foot's bones: joints in the rest pose and rigid motions from it [m]."""
+
+    source: SoleSource
+    ankle: Array
+    hinge: Array  # where the toes bend, or the tip of a foot that does not
+    tip: Array
+    motion: Array
+    toe_motion: Array
+    path: Array  # of ankle and hinge, (F, 2, 3)
+
+    @property
+    def ball(self) -> Array | None:
+        return self.hinge if self.source.toe_bone else None
+
+    @classmethod
+    def of(cls, source: SoleSource, recording: Recording, rest: RestPose) -> _Foot:
+        last = source.toe_bone or source.bone
+        hinge = (last, "head") if source.toe_bone else (last, "tail")
+        matrices = recording.bones[source.bone]
+        motion = _rigid_motion(matrices, rest.matrix(source.bone))
+        length = rest.armature.data.bones[source.bone].length
+        return cls(
+            source=source,
+            ankle=rest.end(source.bone, "head"),
+            hinge=rest.end(*hinge),
+            tip=rest.end(last, "tail"),
+            motion=motion,
+            toe_motion=_rigid_motion(recording.bones[last], rest.matrix(last)) if source.toe_bone else motion,
+            path=np.stack(
+                [
+                    matrices[:, :3, 3],
+                    along_bone(recording.bones[last], 0.0) if source.toe_bone else along_bone(matrices, length),
+                ],
+                axis=1,
+            ),
+        )
+
+
+def _stand(
+    foot: _Foot,
+    planted: Sequence[NDArray[np.bool_]],
+    feet: Sequence[_Foot],
+    images: Mapping[int, Array],
+    *,
+    facing: Array,
+    leg: float,
+    trust_rest_within: float,
+    place: int,
+) -> FlatFoot:
+    """How a foot stands, from its own planted instants and, reflected, from those of its mirror image."""
+    own = planted[place]
+    foot_turns, toe_turns = foot.motion[own, :3, :3], foot.toe_motion[own, :3, :3]
+    foot_images = [feet[other].motion[planted[other], :3, :3] @ mirror for other, mirror in images.items()]
+    toe_images = [feet[other].toe_motion[planted[other], :3, :3] @ mirror for other, mirror in images.items()]
+    foot_up = standing_up(foot_turns, foot_images, trust_rest_within=trust_rest_within)
+    toe_up = standing_up(toe_turns, toe_images, trust_rest_within=trust_rest_within)
+    return flat_foot(
+        foot.ankle,
+        foot.hinge,
+        _pointing(foot, foot_up, facing, leg),
+        foot_up=foot_up,
+        toe_up=toe_up,
+        toe_turns=np.swapaxes(toe_turns, -1, -2) @ foot_turns,
+    )
+
+
+_STUB = 0.02
+"""Length of a foot bone over the leg's, below which it points nowhere."""
+
+_STEEPEST = np.cos(np.radians(18.0))
+"""A foot bone closer than this to the vertical does not tell where the toes are."""
+
+
+def _pointing(foot: _Foot, up: Array, facing: Array, leg: float) -> Array:
+    """Direction of the toes in the rest pose; where the character faces if the foot bone is too short or too steep."""
+    along = foot.hinge - foot.ankle
+    length = float(np.linalg.norm(along))
+    if length < _STUB * leg or abs(float(along @ up)) > _STEEPEST * length:
+        return facing
+    return along
+
+
+def _mirror_images(feet: Sequence[_Foot]) -> list[dict[int, Array]]:
+    """For each foot, the others that are its mirror image in the rest pose, with the (3, 3) reflection."""
+    images: list[dict[int, Array]] = [{} for _ in feet]
+    for i, foot in enumerate(feet):
+        for j, other in enumerate(feet):
+            across = (other.ankle - foot.ankle) * (1, 1, 0)
+            if {foot.source.side, other.source.side} != {"L", "R"} or np.linalg.norm(across) == 0:
+                continue
+            if foot.source.name[:-1] != other.source.name[:-1]:
+                continue
+            mirror = reflection(across)
+            gap = _direction(foot.hinge - foot.ankle) - mirror @ _direction(other.hinge - other.ankle)
+            if np.linalg.norm(gap) < _MIRROR_TOLERANCE:
+                images[i][j] = mirror
+    return images
+
+
+def _direction(vector: Array) -> Array:
+    return vector / max(float(np.linalg.norm(vector)), 1e-12)
+
+
+def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[NDArray[np.bool_]]) -> list[FootSize]:
+    """Left and right foot of one size where their bones are, each counting by how long it was seen standing."""
+    instants = np.array([float(stands.sum()) for stands in planted]) + 1e-6
+    bones = np.array([float(np.linalg.norm(foot.hinge - foot.ankle)) for foot in feet])
+    values = np.array([(size.length, size.ankle_height) for size in sizes]).reshape(-1, 2)
+    evened = []
+    for foot, bone in zip(feet, bones, strict=True):
+        same_limb = np.array([other.source.name[:-1] == foot.source.name[:-1] for other in feet])
+        alike = same_limb & (np.abs(bones - bone) <= _SAME_SIZE * max(bone, 1e-12))
+        evened.append(FootSize(*np.average(values[alike], axis=0, weights=instants[alike]).tolist()))
+    return evened
+
+
+def _rigid_motion(matrices: Array, rest: Array) -> Array:
+    """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
+    turn = _nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
+    motion = np.zeros_like(matrices)
+    motion[:, :3, :3] = turn
+    motion[:, :3, 3] = matrices[:, :3, 3] - turn @ rest[:3, 3]
+    motion[:, 3, 3] = 1.0
+    return motion
+
+
+def _nearest_rotation(matrices: Array) -> Array:
+    """Rotations closest to the given matrices (polar decomposition)."""
+    u, _, vh = np.linalg.svd(matrices)
+    handed = np.ones(matrices.shape[:-1])
+    handed[..., 2] = np.sign(np.linalg.det(u @ vh))
+    return (u * handed[..., None, :]) @ vh
+
+
+def _object_motion(source: SoleSource, matrices: Array) -> SoleMotion:
+    """An object that prints with its own mesh; its local z axis is up."""
+    scale = np.linalg.norm(matrices[0, :3, :3], axis=0)
+    placed = object_sole(source, bpy.data.objects[source.object], scale)
+    rigid = matrices.copy()
+    rigid[:, :3, :3] = _nearest_rotation(matrices[:, :3, :3] / scale)
+    return SoleMotion(placed.sole, (rigid @ placed.placements[0])[:, None])
