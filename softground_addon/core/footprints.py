@@ -116,7 +116,7 @@ class Footprint:
         whole = int(np.searchsorted(changes.frames, frame, side="right"))
         under_way = int(np.searchsorted(changes.frames - self.frame_step, frame, side="left"))
         end = changes.first[whole]
-        total = np.bincount(changes.cells[:end], weights=changes.amounts[:end], minlength=self.window.cells)
+        total = np.bincount(changes.cells[:end], changes.amounts[:end], self.window.cells).astype(np.float64)
         for k in range(whole, under_way):
             passed = 1.0 - (changes.frames[k] - frame) / self.frame_step
             part = slice(changes.first[k], changes.first[k + 1])

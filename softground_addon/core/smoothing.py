@@ -24,7 +24,7 @@ def gaussian_kernel(sigma: float) -> Array:
     Examples
     --------
     >>> gaussian_kernel(0.5).round(3)
-    array([0.   , 0.107, 0.786, 0.107, 0.   ])
+    array([0.   , 0.106, 0.787, 0.106, 0.   ])
     >>> gaussian_kernel(0.0)
     array([1.])
     """
@@ -54,8 +54,13 @@ def blurred_window(field: SparseGrid, window: Window, sigma: float) -> Array:
     margin = len(kernel) // 2
     if margin == 0:
         return field.read(window)
-    values = field.read(window.expanded(margin))
-    blurred: Array = _band(kernel, window.rows) @ values @ _band(kernel, window.columns).T
+    return blurred_inside(field.read(window.expanded(margin)), kernel)
+
+
+def blurred_inside(values: Array, kernel: Array) -> Array:
+    """Values (..., rows, columns) blurred with a kernel, less the margin of half a kernel on every side."""
+    rows, columns = (size - len(kernel) + 1 for size in values.shape[-2:])
+    blurred: Array = _band(kernel, rows) @ values @ _band(kernel, columns).T
     return blurred
 
 
