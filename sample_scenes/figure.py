@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ class Figure:
     weights: Array
 
 
+@cache
 def hiker(body: Body) -> Figure:
     """A dressed figure of the given proportions."""
     pieces = [_garment(body, *piece) for piece in (_head(body), _cap(body), _jacket(body), _trousers(body))]

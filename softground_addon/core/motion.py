@@ -166,7 +166,7 @@ class CharacterMotion:
         )
         return dataclasses.replace(
             self,
-            frames=np.interp(position, np.arange(len(self.frames)), self.frames),
+            frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
             soles=soles,
             joints={name: _interpolate(path, position) for name, path in self.joints.items()},
         )

@@ -11,12 +11,6 @@ from softground_addon.core.pressed_ground import GroundSample
 from tests.blender import fingerprints
 
 
-@pytest.fixture
-def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    return bpy.context.scene
-
-
 def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
     half = np.array([size, size]) / 2
     ground = ground_mesh.create_grid(scene, ground_mesh.GroundPlan(-half, half, height), spacing, unit_scale)

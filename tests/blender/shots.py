@@ -1,0 +1,63 @@
+"""Shots to bake in tests: the project's own walker, and motion files read with their own scale and axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import pytest
+
+from sample_scenes.body import Body
+from sample_scenes.character import create_character
+from sample_scenes.gait import Gait, walk
+from sample_scenes.keys import write_action
+
+SHARED = Path(__file__).parents[3] / "shared" / "data"
+
+
+@dataclass(frozen=True)
+class MotionFile:
+    """A motion file and how it is imported."""
+
+    path: str
+    scale: float
+    forward: str
+    up: str
+
+
+MOTION_FILES = {
+    "walk": MotionFile("gait/walk_subject01.bvh", 0.01, "-Z", "Y"),
+    "run": MotionFile("gait/run_rajagopal.bvh", 0.01, "-Z", "Y"),
+    "zombie": MotionFile("bvh/zombie.bvh", 0.04, "Y", "Z"),
+    "jumping": MotionFile("bvh/jumping.bvh", 0.04, "Y", "Z"),
+    "jumping_jacks": MotionFile("bvh/jumping_jacks.bvh", 0.056444, "-Z", "Y"),
+    "dance": MotionFile("bvh/jesse_dance.bvh", 0.01, "-Z", "Y"),
+}
+
+
+def import_motion(name: str) -> bpy.types.Object:
+    """Import a motion file of the reference data into the open file; skips the test where it is not there."""
+    motion = MOTION_FILES[name]
+    path = SHARED / motion.path
+    if not path.is_file():
+        pytest.skip(f"the reference data is not here: {path}")
+    bpy.ops.import_anim.bvh(
+        filepath=str(path),
+        global_scale=motion.scale,
+        axis_forward=motion.forward,
+        axis_up=motion.up,
+        update_scene_fps=True,
+        update_scene_duration=True,
+    )
+    return bpy.context.active_object
+
+
+def walker(scene: bpy.types.Scene, frames: int = 72, rate: int = 24, **gait: float) -> bpy.types.Object:
+    """The project's own character, walking from the origin; it is the active object."""
+    scene.render.fps, scene.render.fps_base = rate, 1.0
+    body = Body()
+    armature = create_character("Walker", body, scene.collection)
+    write_action(armature, walk(body, Gait(**gait), frames, rate), "Walk")
+    bpy.context.view_layer.objects.active = armature
+    return armature

@@ -1,0 +1,335 @@
+"""The main job, end to end: from a rig to footprints on a ground, and back."""
+
+from itertools import pairwise
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import bake_job, ground_mesh
+from softground_addon.core import record
+from softground_addon.core.presets import FOLDER
+from tests.blender import fingerprints, shots
+
+PRESETS = sorted(path.stem for path in FOLDER.glob("*.json"))
+
+
+def heights(ground, key="Basis"):
+    """World positions (V, 3) of the ground in one of its shapes."""
+    mesh = ground.data
+    points = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    (mesh.shape_keys.key_blocks[key].points if mesh.shape_keys else mesh.vertices).foreach_get("co", points)
+    matrix = np.array(ground.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def rest(ground):
+    points = np.empty(len(ground.data.vertices) * 3, dtype=np.float32)
+    ground.data.attributes[ground_mesh.REST].data.foreach_get("vector", points)
+    matrix = np.array(ground.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def bake(scene, **values):
+    for name, value in values.items():
+        setattr(scene.softground, name, value)
+    return bake_job.run(bake_job.bake(scene))
+
+
+def plane(scene, size=7.0, vertices=240, height=lambda x, y: 0.0 * x):
+    """The user's own ground: a grid of their making, larger than the walk."""
+    axis = np.linspace(-size / 2, size / 2, vertices)
+    x, y = np.meshgrid(axis, axis)
+    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
+    corner = (np.arange(vertices - 1)[:, None] * vertices + np.arange(vertices - 1)).ravel()
+    mesh = bpy.data.meshes.new("Field")
+    mesh.from_pydata(points, [], (corner[:, None] + [0, 1, vertices + 1, vertices]).tolist())
+    ground = bpy.data.objects.new("Field", mesh)
+    scene.collection.objects.link(ground)
+    return ground
+
+
+@pytest.fixture
+def walk(scene):
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    return scene
+
+
+def test_two_clicks_lead_from_an_animated_rig_to_prints(scene):
+    shots.walker(scene)
+    assert bpy.ops.softground.add_character() == {"FINISHED"}
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    ground = scene.softground.ground
+    depth = rest(ground)[:, 2] - heights(ground)[:, 2]
+    assert 0.01 < depth.max() < 0.10
+
+
+def test_steps_alternate_and_lie_under_the_feet(walk):
+    report = bake(walk).report
+    contacts = [step["contact"] for step in report["steps"]]
+    assert len(contacts) >= 5
+    assert all(a != b for a, b in pairwise(contacts))
+    armature = walk.softground.characters[0].armature
+    for step in report["steps"][1:-1]:
+        walk.frame_set(round((step["frame_start"] + step["frame_end"]) / 2))
+        sole = walk.softground.characters[0].soles[step["contact"]]
+        bone = armature.pose.bones[sole.bone]
+        heel, ball = (np.array(armature.matrix_world @ point)[:2] for point in (bone.head, bone.tail))
+        along = (np.array(step["position"][:2]) - heel) @ (ball - heel) / ((ball - heel) @ (ball - heel))
+        aside = np.linalg.norm(np.array(step["position"][:2]) - heel - along * (ball - heel))
+        assert -0.5 < along < 1.5
+        assert aside < 0.02
+
+
+def test_no_print_where_no_foot_was(walk):
+    bake(walk)
+    ground = walk.softground.ground
+    moved = np.abs(rest(ground)[:, 2] - heights(ground, ground_mesh.DISPLAY_KEY)[:, 2]) > 1e-4
+    steps, _ = record.load(ground.data[ground_mesh.RECORD])
+    place = rest(ground)[moved, :2]
+    nearest = np.min([np.linalg.norm(place - step.position[:2], axis=1) for step in steps], axis=0)
+    assert nearest.max() < 0.16 + 0.04 + 0.04  # half a shoe, the rim's reach, the blur
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_rim_holds_the_displaced_volume_on_every_preset(walk, preset):
+    bpy.ops.softground.load_preset(name=preset)
+    result = bake(walk)
+    nu = walk.softground.material.poisson_ratio
+    totals = result.report["totals"]
+    assert totals["compressed_m3"] > 0
+    assert totals["rim_m3"] == pytest.approx(2 * nu * totals["compressed_m3"], rel=1e-6)
+    for step in result.report["steps"]:
+        assert step["rim_m3"] == pytest.approx(2 * nu * step["compressed_m3"], rel=1e-6, abs=1e-12)
+        assert step["max_depth_m"] <= walk.softground.material.layer_depth
+    ground = walk.softground.ground
+    assert np.isfinite(heights(ground)).all()
+
+
+def test_a_bake_on_the_users_mesh_moves_nothing_else_and_clears_to_the_same_bytes(walk):
+    ground = plane(walk, height=lambda x, y: 0.03 * np.sin(2 * x))
+    walk.softground.ground = ground
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    baked = fingerprints.of_file()
+    assert baked["objects"]["Walker"] == before["objects"]["Walker"]
+    assert baked["actions"] == before["actions"]
+    assert baked["names"] == before["names"]
+    assert baked["meshes"]["Field"] != before["meshes"]["Field"]
+    assert np.array_equal(heights(ground)[:, :2], rest(ground)[:, :2])
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_baking_again_gives_the_same_ground_and_not_twice_the_depth(walk):
+    bpy.ops.softground.bake()
+    first = heights(walk.softground.ground)
+    bpy.ops.softground.bake()
+    assert np.array_equal(heights(walk.softground.ground), first)
+
+
+def test_a_bake_survives_save_reload_and_append(walk, tmp_path):
+    bpy.ops.softground.bake()
+    ground = walk.softground.ground
+    name, baked = ground.name, heights(ground, ground_mesh.DISPLAY_KEY)
+    stored = bytes(ground.data[ground_mesh.RECORD])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    ground = bpy.context.scene.softground.ground
+    assert np.array_equal(heights(ground, ground_mesh.DISPLAY_KEY), baked)
+    assert bytes(ground.data[ground_mesh.RECORD]) == stored
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "shot.blend")) as (_, wanted):
+        wanted.objects = [name]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    bpy.context.view_layer.update()
+    assert np.array_equal(heights(wanted.objects[0], ground_mesh.DISPLAY_KEY), baked)
+    assert bytes(wanted.objects[0].data[ground_mesh.RECORD]) == stored
+
+
+@pytest.mark.parametrize("stage", ["sample", "simulate", "write"])
+def test_a_bake_that_is_stopped_half_way_changes_nothing(walk, stage):
+    walk.softground.ground = plane(walk)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    job = bake_job.bake(walk)
+    while next(job).stage != stage:
+        pass
+    job.close()
+    assert fingerprints.of_file() == before
+
+
+@pytest.mark.parametrize("transform", ["tilted", "scaled", "parented", "moved"])
+def test_grounds_with_a_transform_take_the_same_prints(walk, transform):
+    """A level field looks the same however its object is turned and scaled, and so do the prints."""
+    walk.softground.ground = plane(walk)
+    plain = bake(walk)
+    bpy.ops.softground.clear_bake()
+    ground = walk.softground.ground
+    matrix = ground.matrix_world.copy()
+    if transform == "tilted":
+        ground.rotation_euler = (0.3, -0.2, 0.7)
+    elif transform == "scaled":
+        ground.scale = (2.0, 0.5, 3.0)
+    elif transform == "parented":
+        ground.parent = bpy.data.objects.new("parent", None)
+        ground.parent.rotation_euler = (0.2, 0.0, 1.0)
+        walk.collection.objects.link(ground.parent)
+    else:
+        ground.location = (0.5, -0.2, 1.0)
+    bpy.context.view_layer.update()
+    ground.data.transform(ground.matrix_world.inverted() @ matrix)
+    turned = bake(walk)
+    for a, b in zip(plain.report["steps"], turned.report["steps"], strict=True):
+        assert b["max_depth_m"] == pytest.approx(a["max_depth_m"], rel=1e-3)
+        assert np.allclose(b["position"], a["position"], atol=1e-3)
+
+
+def test_prints_do_not_depend_on_the_scenes_units(walk):
+    """The same walk in a scene of centimetres gives the same prints, in metres."""
+    metres = bake(walk).report
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.unit_settings.scale_length = 0.01
+    armature = shots.walker(scene)
+    armature.scale = (100.0, 100.0, 100.0)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.add_character()
+    centimetres = bake(scene).report
+    assert len(metres["steps"]) == len(centimetres["steps"])
+    for a, b in zip(metres["steps"], centimetres["steps"], strict=True):
+        assert b["max_depth_m"] == pytest.approx(a["max_depth_m"], rel=1e-3)
+        assert np.allclose(b["position"], a["position"], atol=1e-3)
+
+
+def unset(scene):
+    scene.softground.characters.clear()
+
+
+def no_animation(scene):
+    scene.softground.characters[0].armature.animation_data_clear()
+
+
+def no_feet(scene):
+    scene.softground.characters[0].soles.clear()
+
+
+def wrong_bone(scene):
+    scene.softground.characters[0].soles[0].bone = "Nonexistent"
+
+
+def stretched(scene):
+    scene.softground.characters[0].armature.scale = (1.0, 1.0, 2.0)
+
+
+def massless(scene):
+    scene.softground.characters[0].mass = 0.0
+
+
+def nan_key(scene):
+    from softground_addon.blender.compat import action_curves
+
+    curve = action_curves(scene.softground.characters[0].armature.animation_data.action)[0]
+    for point in curve.keyframe_points:
+        point.co[1] = float("nan")
+
+
+def empty_range(scene):
+    scene.softground.frame_start, scene.softground.frame_end = 10, 5
+
+
+def too_coarse(scene):
+    scene.softground.ground = plane(scene, vertices=40)
+
+
+def far_below(scene):
+    ground = scene.softground.ground = plane(scene)
+    ground.location.z = -5.0
+
+
+def bridge(scene):
+    ground = scene.softground.ground = plane(scene, vertices=200)
+    ground.modifiers.new("twice", "ARRAY").relative_offset_displace = (0, 0, 0)
+    ground.modifiers["twice"].use_constant_offset = True
+    ground.modifiers["twice"].constant_offset_displace = (0, 0, -1.0)
+
+
+def moving_ground(scene):
+    ground = scene.softground.ground = plane(scene)
+    ground.keyframe_insert("location", frame=1)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (unset, "No character is set up.*Add Character"),
+        (no_animation, "'Walker'"),
+        (no_feet, "'Walker'.*[Ff]oot|'Walker'.*[Ff]eet|'Walker'.*sole"),
+        (wrong_bone, "'Walker'.*Nonexistent"),
+        (stretched, "'Walker'.*scale"),
+        (massless, "mass"),
+        (nan_key, "'Walker'"),
+        (empty_range, "10-5 is empty"),
+        (too_coarse, "'Field' is too coarse.*Subdivide"),
+        (far_below, "'Walker'.*touches 'Field'.*move"),
+        (bridge, "'Field' has several layers.*separate"),
+        (moving_ground, "'Field' moves"),
+    ],
+)
+def test_bad_input_is_named_with_its_remedy_and_changes_nothing(walk, spoil, message):
+    spoil(walk)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    with pytest.raises(RuntimeError, match=message):
+        bpy.ops.softground.bake()
+    assert repr(fingerprints.of_file()) == repr(before)
+
+
+def test_an_armature_is_needed_to_add_a_character(scene):
+    with pytest.raises(RuntimeError, match="armature"):
+        bpy.ops.softground.add_character()
+
+
+def test_clicking_the_characters_mesh_adds_its_armature(scene):
+    armature = shots.walker(scene)
+    bpy.context.view_layer.objects.active = next(child for child in armature.children if child.type == "MESH")
+    bpy.ops.softground.add_character()
+    assert scene.softground.characters[0].armature == armature
+
+
+def test_a_character_cannot_be_added_twice(walk):
+    with pytest.raises(RuntimeError, match="is a character already"):
+        bpy.ops.softground.add_character()
+
+
+def test_a_selected_mesh_becomes_the_ground_as_it_is(walk):
+    ground = plane(walk)
+    bpy.context.view_layer.objects.active = ground
+    ground.select_set(True)
+    before = fingerprints.of_file()
+    bpy.ops.softground.create_ground()
+    assert walk.softground.ground == ground
+    assert fingerprints.of_file() == before
+
+
+def test_a_created_ground_fits_the_walk_with_a_margin(walk):
+    bpy.ops.softground.create_ground()
+    ground = walk.softground.ground
+    report = bake(walk).report
+    place = np.array([step["position"][:2] for step in report["steps"]])
+    corner = heights(ground)[:, :2]
+    assert (corner.min(axis=0) < place.min(axis=0) - 0.3).all()
+    assert (corner.max(axis=0) > place.max(axis=0) + 0.3).all()
+
+
+@pytest.mark.parametrize("model", ["IMPULSE", "WHOLE_BODY"])
+@pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))
+def test_every_reference_motion_bakes_with_the_automatic_set_up(scene, name, model):
+    shots.import_motion(name)
+    bpy.ops.softground.add_character()
+    scene.softground.characters[0].force_model = model
+    report = bake(scene).report
+    assert report["steps"]
+    assert 500 < report["totals"]["peak_force_n"] < 6 * 77.5 * 9.81

@@ -1,0 +1,192 @@
+"""The command line: one shot in, a baked shot and a report out, and exit codes that a farm can trust."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+
+from softground_addon.blender import cli, ground_mesh
+from tests.blender import shots
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def shot(scene, tmp_path):
+    """A saved file with an animated character and nothing of ours in it."""
+    shots.walker(scene, frames=40)
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def run(shot, *options):
+    """Run the command in this process, with its file opened first, as `blender --command` does."""
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    return cli.run_in_blender(["bake", "--progress", "none", *map(str, options)])
+
+
+def standalone(*arguments, **kwargs):
+    return subprocess.run(
+        [sys.executable, "-m", "softground_addon", *map(str, arguments)],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False, **kwargs,
+    )  # fmt: skip
+
+
+def test_it_sets_up_bakes_saves_and_reports_by_itself(shot, tmp_path):
+    report, baked = tmp_path / "report.json", tmp_path / "baked.blend"
+    original = shot.read_bytes()
+    assert run(shot, "--preset", "dry_sand", "--report", report, "--save", baked) == 0
+    content = json.loads(report.read_text(encoding="utf-8"))
+    assert content["schema_version"] == 1
+    assert content["inputs"]["preset"] == "Dry Sand"
+    assert content["inputs"]["frames"] == [1, 40]
+    assert len(content["steps"]) >= 3
+    assert set(content["steps"][0]) == {
+        "contact", "character", "frame_start", "frame_end", "position", "area_m2", "peak_force_n", "max_depth_m",
+        "compressed_m3", "rim_m3",
+    }  # fmt: skip
+    assert set(content["timings"]) == {"sample", "simulate", "write", "frames_per_second"}
+    bpy.ops.wm.open_mainfile(filepath=str(baked))
+    assert ground_mesh.is_baked(bpy.context.scene.softground.ground)
+    assert shot.read_bytes() == original
+    assert {path.name for path in tmp_path.iterdir()} == {"shot.blend", "baked.blend", "report.json"}
+
+
+def test_the_bpy_module_runs_the_same_command(shot, tmp_path):
+    report = tmp_path / "report.json"
+    assert run(shot, "--report", report) == 0
+    here = json.loads(report.read_text(encoding="utf-8"))
+    done = standalone("bake", shot, "--report", report)
+    assert done.returncode == 0, done.stderr
+    assert "steps, deepest" in done.stdout
+    there = json.loads(report.read_text(encoding="utf-8"))
+    assert here["steps"] == there["steps"]
+    assert here["input_hash"] == there["input_hash"]
+
+
+def test_options_reach_the_bake(shot, tmp_path):
+    report = tmp_path / "report.json"
+    options = ("--frames", "5-30", "--cell-size", "0.02", "--set", "material.youngs_modulus=5e5", "--report", report)
+    assert run(shot, *options, "--set", "characters[0].mass=100", "--set", "keep_forces=true") == 0
+    content = json.loads(report.read_text(encoding="utf-8"))
+    assert content["inputs"]["frames"] == [5, 30]
+    assert content["inputs"]["cell_size_m"] == pytest.approx(0.02)
+    assert content["inputs"]["material"]["youngs_modulus"] == 5e5
+    assert content["inputs"]["characters"][0]["mass_kg"] == 100
+    assert content["forces"]["frames"] == list(range(5, 31))
+    forces = content["forces"]["characters"]["Walker"]
+    assert all(len(force) == 26 for force in forces.values())
+
+
+def test_in_place_replaces_the_opened_file_and_keeps_its_compression(shot):
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot), compress=True)
+    assert run(shot, "--in-place") == 0
+    assert shot.read_bytes()[:7] != b"BLENDER"
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    assert ground_mesh.is_baked(bpy.context.scene.softground.ground)
+
+
+def test_a_dry_run_saves_nothing(shot, tmp_path):
+    original = shot.read_bytes()
+    assert run(shot, "--dry-run", "--in-place", "--report", tmp_path / "report.json") == 0
+    assert shot.read_bytes() == original
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["steps"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ((), "Nothing would be kept"),
+        (("--dry-run", "--preset", "lava"), "no preset 'lava'"),
+        (("--dry-run", "--preset", "gone.json"), "gone.json"),
+        (("--dry-run", "--frames", "all"), "no frame range"),
+        (("--dry-run", "--frames", "9-3"), "empty"),
+        (("--dry-run", "--cell-size", "0"), "from 0.0001"),
+        (("--dry-run", "--cell-size", "nan"), "from 0.0001"),
+        (("--dry-run", "--set", "material.density=3"), "no setting 'material.density'.*youngs_modulus"),
+        (("--dry-run", "--set", "material.youngs_modulus=soft"), "takes a number"),
+        (("--dry-run", "--set", "characters[7].mass=3"), "no setting"),
+        (("--dry-run", "--set", "characters[0].force_model=MAGIC"), "WHOLE_BODY, IMPULSE"),
+        (("--dry-run", "--set", "ground=Nothing"), "no object of that name"),
+        (("--dry-run", "--set", "__class__=1"), "no setting|no path"),
+        (("--dry-run", "--set", "nonsense"), "PATH=VALUE"),
+        (("--save", "/nowhere/at/all.blend"), "does not exist"),
+        (("--progress", "fireworks"), "invalid choice"),
+    ],
+)
+def test_bad_options_exit_with_2_and_say_what_to_do(shot, capfd, options, says):
+    import re
+
+    assert run(shot, *options) == 2
+    assert re.search(says, capfd.readouterr().err)
+
+
+def test_a_broken_or_missing_file_exits_with_2(tmp_path):
+    broken = tmp_path / "broken.blend"
+    broken.write_bytes(b"BLENDER-v405" + b"\x00" * 100)
+    for path in (broken, tmp_path / "missing.blend"):
+        done = standalone("bake", path, "--dry-run")
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+        assert path.name in done.stderr
+
+
+def test_a_scene_without_or_with_several_armatures_exits_with_2(scene, tmp_path, capfd):
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert run(path, "--dry-run") == 2
+    assert "no armature" in capfd.readouterr().err
+    for _ in range(2):
+        shots.walker(bpy.context.scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert run(path, "--dry-run") == 2
+    assert "several armatures ('Walker', 'Walker.001')" in capfd.readouterr().err
+
+
+def test_an_interrupted_bake_exits_with_130_and_writes_nothing(scene, tmp_path):
+    shots.walker(scene, frames=1500)
+    path = tmp_path / "long.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    original = path.read_bytes()
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-m", "softground_addon", "bake", str(path), "--in-place", "--progress", "plain"],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("sample"):
+            break
+    time.sleep(0.05)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "interrupted" in errors
+    assert path.read_bytes() == original
+    assert [entry.name for entry in tmp_path.iterdir()] == ["long.blend"]
+
+
+@pytest.mark.parametrize("style", ["plain", "json", "openjd", "none"])
+def test_progress_comes_in_the_asked_style(shot, capfd, style):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    capfd.readouterr()
+    assert cli.run_in_blender(["bake", "--dry-run", "--progress", style]) == 0
+    lines = [line for line in capfd.readouterr().out.splitlines() if line]
+    if style == "none":
+        assert lines == []
+    elif style == "json":
+        seen = [json.loads(line) for line in lines]
+        assert [*dict.fromkeys(step["stage"] for step in seen)] == ["sample", "simulate", "write"]
+        assert seen[-1]["fraction"] == 1.0
+    elif style == "openjd":
+        values = [float(line.split()[1]) for line in lines if line.startswith("openjd_progress: ")]
+        assert values == sorted(values)
+        assert values[-1] == 100.0
+    else:
+        assert lines[-1].endswith(" s")
