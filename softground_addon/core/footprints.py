@@ -24,6 +24,8 @@ QUANTUM = 2.0**-30
 """Unit of the recorded changes [m]: 1 nm, so that volumes are kept to 1e-6 and heights beyond 32-bit floats."""
 LARGEST_AMOUNT = 2**31 - 1
 """Largest change that is stored as one [QUANTUM]: 2 m."""
+PARTS_OF_A_FRAME = 2**16
+"""Fractions of a frame are whole multiples of one over this, so that changes under way add up exactly too."""
 NEVER = -1.0
 """Age of ground that was never touched [s]."""
 
@@ -119,6 +121,7 @@ class Footprint:
         total = np.bincount(changes.cells[:end], changes.amounts[:end], self.window.cells).astype(np.float64)
         for k in range(whole, under_way):
             passed = 1.0 - (changes.frames[k] - frame) / self.frame_step
+            passed = round(passed * PARTS_OF_A_FRAME) / PARTS_OF_A_FRAME
             part = slice(changes.first[k], changes.first[k + 1])
             total += np.bincount(changes.cells[part], weights=changes.amounts[part] * passed, minlength=len(total))
         return (total * QUANTUM).reshape(self.window.rows, self.window.columns)
@@ -356,27 +359,26 @@ def from_arrays(names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]) -
 
 def _columns(count: int, arrays: Mapping[str, Any]) -> dict[str, list[NDArray[Any]]]:
     """Values of each footprint by key."""
-    columns = {"numbers": list(_sized(arrays, "numbers", count * len(_NUMBERS), np.float64).reshape(count, -1))}
+    columns = {"numbers": list(_sized(arrays, "numbers", count * len(_NUMBERS), np.float64).reshape(-1, len(_NUMBERS)))}
     for key, (size, kind) in _VECTORS.items():
-        columns[key] = list(_sized(arrays, key, count * size, kind).reshape(count, -1))
+        columns[key] = list(_sized(arrays, key, count * size, kind).reshape(-1, size))
     for key, kind in _SERIES.items():
         counts = _sized(arrays, f"{key}.count", count, np.int32)
         if (counts < 0).any():
             raise ValueError(f"negative count of {key}")
-        ends = np.cumsum(counts, dtype=np.int64)
-        columns[key] = np.split(_sized(arrays, key, int(ends[-1]) if count else 0, kind), ends[:-1])
+        columns[key] = np.split(_sized(arrays, key, int(counts.sum(dtype=np.int64)), kind), np.cumsum(counts)[:-1])
     return columns
 
 
 def _sized(arrays: Mapping[str, Any], key: str, size: int, kind: type) -> NDArray[Any]:
     if key not in arrays:
         raise ValueError(f"it lacks {key}")
-    values: NDArray[Any] = np.array(arrays[key], kind).ravel()
+    values = np.ravel(arrays[key])
     if len(values) != size:
         raise ValueError(f"{key} has {len(values)} values where {size} are announced")
-    if not np.isfinite(values).all():
-        raise ValueError(f"{key} is not finite")
-    return values
+    if not np.isfinite(values).all() or (values.astype(kind) != values).any():
+        raise ValueError(f"{key} holds what is no number of its kind")
+    return values.astype(kind)
 
 
 def _footprint(name: Mapping[str, str], values: Mapping[str, NDArray[Any]]) -> Footprint:

@@ -236,19 +236,20 @@ class TerrainTiles:
     def slopes(self, window: Window) -> tuple[Array, Array, Array]:
         """Heights and their slopes along x and y, each (rows, columns) [m, 1, 1].
 
-        The slope is the gentler of the two one-sided differences, so that the foot of a wall and the brink of a
-        gap count as the level ground they are.
+        The slope is the mean of those to both sides; where they have opposite signs or one is unknown or level, as
+        at the foot of a wall and at the brink of a gap, the gentler one.
         """
         heights = self.heights(window.expanded(1))
         along_x = np.diff(heights[1:-1], axis=1) / self.cell_size
         along_y = np.diff(heights[:, 1:-1], axis=0) / self.cell_size
-        return heights[1:-1, 1:-1], _gentler(along_x[:, :-1], along_x[:, 1:]), _gentler(along_y[:-1], along_y[1:])
+        return heights[1:-1, 1:-1], _slope(along_x[:, :-1], along_x[:, 1:]), _slope(along_y[:-1], along_y[1:])
 
 
-def _gentler(before: Array, after: Array) -> Array:
-    """Whichever slope is nearer to 0; where one is unknown the other, where both are 0."""
+def _slope(before: Array, after: Array) -> Array:
+    """Slope of cells from those to both sides, 0 where neither is known."""
     before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
-    return np.nan_to_num(np.where(np.abs(before) < np.abs(after), before, after))
+    gentler = np.where(np.abs(before) < np.abs(after), before, after)
+    return np.nan_to_num(np.where(before * after > 0, (before + after) / 2, gentler))
 
 
 def _overlaps(window: Window) -> Iterator[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:

@@ -318,9 +318,9 @@ class _Press:
         rate = compression_rate(self.step, self.material)
         heights = np.zeros(len(target))
         for k in np.flatnonzero(loaded):
-            further = compress(state[0], coverage[k], target[k], rate)
-            state[0] += further
-            heights[k] = further.sum()
+            compression = compress(state[0], coverage[k], target[k], rate)
+            heights[k] = (compression - state[0]).sum()
+            state[0] = compression
         displaced = displaced_volume(heights, self.material)
         rise = np.tensordot(displaced, rim, 1)
         state[1] += rise
@@ -362,6 +362,7 @@ def _common_grid(loads: Sequence[CharacterLoads]) -> tuple[Array, list[int], NDA
     count = max(offset + len(motion.frames) for offset, motion in zip(offsets, motions, strict=True))
     frames = first + spacing * np.arange(count)
     shown = np.flatnonzero(np.abs(frames - first - np.rint(frames - first)) < 1e-6)
+    frames[shown] = first + np.rint(frames[shown] - first)
     return frames, offsets, shown
 
 

@@ -21,9 +21,8 @@ BALL = 0.19
 
 def patch_of(distance, heights, low, high, spacing=0.005):
     """A patch from functions of (x, y) for the signed distance and the height, over a box with a margin."""
-    x = np.arange(low[0] - 0.06, high[0] + 0.06, spacing)
-    y = np.arange(low[1] - 0.06, high[1] + 0.06, spacing)
-    x, y = np.meshgrid(x, y)
+    margin = 12 * spacing
+    x, y = np.meshgrid(*(np.arange(low[k] - margin, high[k] + margin, spacing) for k in (0, 1)))
     return SolePatch(heights(x, y), distance(x, y), np.array([x[0, 0], y[0, 0]]), spacing)
 
 
@@ -32,10 +31,10 @@ def box_distance(x, y, low, high):
     return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0)
 
 
-def box_sole(length, width, name="box"):
+def box_sole(length, width, name="box", spacing=0.005):
     """A flat rectangle centred on its origin."""
     high = np.array([length, width]) / 2
-    patch = patch_of(lambda x, y: box_distance(x, y, -high, high), lambda x, y: 0 * (x + y), -high, high)
+    patch = patch_of(lambda x, y: box_distance(x, y, -high, high), lambda x, y: 0 * (x + y), -high, high, spacing)
     outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * high
     return Sole(name, "", (patch,), np.zeros((1, 3)), np.zeros(1, int), outline)
 
@@ -138,7 +137,7 @@ def walk(
     """
     soles = soles or (foot_sole("foot.L", "L"), foot_sole("foot.R", "R"))
     per_frame = steps_per_frame(frame_rate)
-    duration = period / 2 * (steps + 1)
+    duration = np.ceil(period / 2 * (steps + 2) * 6) / 6  # a whole number of frames at every usual rate
     time = np.arange(round(duration * frame_rate) * per_frame + 1) / (per_frame * frame_rate)
     stance = 0.62 * period
     stride = speed * period
@@ -162,7 +161,7 @@ def walk(
         toes = hinge - BALL * np.stack([np.cos(toe_pitch), 0 * time, np.sin(toe_pitch)], -1)
         world = pose(origin, heading)
         transforms.append(np.stack([world @ pose(foot, 0.0, heel_up), world @ pose(toes, 0.0, toe_pitch)], 1))
-        loaded = (u < 1) & (cycle >= 0)
+        loaded = (u < 1) & (cycle >= 0) & (2 * cycle + number <= steps - 1)
         bumps = np.sin(np.pi * np.clip(u, 0, 1)) + 0.25 * np.sin(3 * np.pi * np.clip(u, 0, 1))
         forces.append(np.where(loaded, 1.05 * MASS * GRAVITY * bumps, 0.0))
         touching.append(loaded)
@@ -180,6 +179,12 @@ def pressed(loads, material, cell_size=0.01, terrain=None):
     return result.ground, footprints
 
 
-def resampled(loads, **changes):
-    """Loads with some of the motion's fields replaced."""
-    return replace(loads, motion=replace(loads.motion, **changes))
+def through_scene_frames(loads):
+    """The same loads with poses known at scene frames only, as when a rig is sampled."""
+    per_frame = steps_per_frame(loads.motion.frame_rate)
+    coarse = replace(
+        loads.motion,
+        frames=loads.motion.frames[::per_frame],
+        soles=tuple(replace(sole, transforms=sole.transforms[::per_frame]) for sole in loads.motion.soles),
+    )
+    return replace(loads, motion=coarse.resampled(per_frame))
