@@ -1,4 +1,4 @@
-"""The whole-body centre of mass from the joints that are mapped.
+"""Where a body's mass is: segments from the joints that are mapped, their centre of mass, and what free fall tells.
 
 Mass fractions and segment centres are those of de Leva (1996), "Adjustments to Zatsiorsky-Seluyanov's segment inertia
 parameters", J. Biomechanics 29(9), table 4, male.
@@ -15,98 +15,155 @@ from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class BodySegment:
-    """A part of the body, its share of the mass, and its centre on the line through two joints.
-
-    Attributes
-    ----------
-    mass_fraction : float
-    proximal, distal : str
-        Joints; `distal` may name the joint beyond which the segment lies (the hand lies beyond the wrist).
-    centre : float
-        Place of the centre of mass from proximal (0) to distal (1).
-    """
-
-    mass_fraction: float
-    proximal: str
-    distal: str
-    centre: float
-
-
+_TRUNK_FRACTION = 0.4346
+_TRUNK_CENTRE = 0.4724
+"""Centre of the trunk from its upper end (0) to the hips (1); the upper end is midway between the neck joint, from
+which de Leva gives 0.5138, and the middle of the shoulders, from which he gives 0.4310."""
+_HEAD_FRACTION = 0.0694
 _HEAD_CENTRE = 0.20
 """Head and neck: centre above the neck joint in trunk lengths (de Leva: 0.5·243 mm of 603 mm). Where rigs put their
 head joint varies too much to measure along it."""
-
 _LIMBS = (
-    BodySegment(0.0271, "shoulder", "elbow", 0.5772),
-    BodySegment(0.0162, "elbow", "wrist", 0.4574),
-    BodySegment(0.0061, "elbow", "wrist", 1.25),  # the hand: 0.79·86 mm beyond the wrist of a 269 mm forearm
-    BodySegment(0.1416, "hip", "knee", 0.4095),
-    BodySegment(0.0433, "knee", "ankle", 0.4395),
-    BodySegment(0.0137, "ankle", "ball", 0.35),  # 44 % from heel to toe tip, seen from the ankle
+    (0.0271, "shoulder", "elbow", 0.5772),
+    (0.0162, "elbow", "wrist", 0.4574),
+    (0.0061, "elbow", "wrist", 1.25),  # the hand: 0.79·86 mm beyond the wrist of a 269 mm forearm
+    (0.1416, "hip", "knee", 0.4095),
+    (0.0433, "knee", "ankle", 0.4395),
+    (0.0137, "ankle", "ball", 0.35),  # 44 % from heel to toe tip, seen from the ankle
 )
-_TRUNK = BodySegment(0.4346, "neck", "hips", 0.5138)
-_HEAD_FRACTION = 0.0694
+"""Mass fraction of one side, joints, and centre on the line from the first joint (0) to the second (1)."""
 
-SEGMENTS = (
-    _TRUNK,
-    *(
-        BodySegment(limb.mass_fraction, f"{limb.proximal}_{side}", f"{limb.distal}_{side}", limb.centre)
-        for side in "lr"
-        for limb in _LIMBS
-    ),
-)
-
-_STAND_IN = {"neck": "spine", "spine": "hips", "head": "neck"} | {
-    f"{joint}_{side}": parent if parent in ("neck", "hips") else f"{parent}_{side}"
-    for side in "lr"
-    for joint, parent in (
-        ("shoulder", "neck"),
-        ("elbow", "shoulder"),
-        ("wrist", "elbow"),
-        ("hip", "hips"),
-        ("knee", "hip"),
-        ("ankle", "knee"),
-        ("ball", "ankle"),
-    )
+_TOWARD_HIPS = {
+    "spine": "hips",
+    "neck": "spine",
+    "head": "neck",
+    "shoulder": "neck",
+    "elbow": "shoulder",
+    "wrist": "elbow",
+    "hip": "hips",
+    "knee": "hip",
+    "ankle": "knee",
+    "ball": "ankle",
 }
-"""The joint that carries the mass of one that is not mapped: the next toward the hips."""
+"""The joint that carries the mass of one that is not mapped."""
+
+_FRACTION_DEVIATION = 0.2
+"""Standard deviation of a body part's mass fraction about de Leva's, relative: people differ, and markers and bones
+slide against the flesh that they stand for."""
+_FALL_DEVIATION = 0.1
+"""Standard deviation of a measured acceleration from free fall, in gravities."""
+
+
+@dataclass(frozen=True)
+class MassPoints:
+    """A body as point masses.
+
+    Attributes
+    ----------
+    positions : (N, K, 3) float array [m]
+    fractions : (K,) float array
+        Of the body mass; they sum to 1.
+    parts : (K,) int array
+        Index of the body part that each point belongs to; left and right limbs are one part.
+    """
+
+    positions: Array
+    fractions: Array
+    parts: NDArray[np.intp]
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass, (N, 3) [m]."""
+        return np.einsum("k,nkc->nc", self.fractions, self.positions)
+
+    def part_centres(self) -> Array:
+        """Centre of mass of each part, (N, parts, 3) [m]."""
+        membership = np.eye(self.parts.max() + 1)[self.parts] * self.fractions[:, None]
+        return np.einsum("kp,nkc->npc", membership / membership.sum(axis=0), self.positions)
 
 
 def centre_of_mass(motion: CharacterMotion) -> Array:
-    """Path of the centre of mass, (N, 3) [m].
+    """Path of the centre of mass, (N, 3) [m]; see `mass_points`."""
+    return mass_points(motion).centre
+
+
+def mass_points(motion: CharacterMotion) -> MassPoints:
+    """The body's segments as point masses at their centres.
 
     A joint that is not mapped is replaced by the next mapped one toward the hips, so that with only the hips mapped
     the whole mass moves with them (the paper's choice). Without any joint, the mean of the soles stands in.
     """
-    joints = _complete(motion)
-    trunk_length = np.median(np.linalg.norm(joints["neck"] - joints["hips"], axis=-1))
-    upward = joints["head"] - joints["neck"]
-    length = np.linalg.norm(upward, axis=-1, keepdims=True)
-    head = joints["neck"] + _HEAD_CENTRE * trunk_length * np.divide(
-        upward, length, out=np.zeros_like(upward), where=length > 0
-    )
-    weighted = _HEAD_FRACTION * head
-    for segment in SEGMENTS:
-        proximal, distal = joints[segment.proximal], joints[segment.distal]
-        weighted = weighted + segment.mass_fraction * (proximal + segment.centre * (distal - proximal))
-    total_fraction = _HEAD_FRACTION + sum(segment.mass_fraction for segment in SEGMENTS)
-    return weighted / total_fraction
+    joints = _Joints(motion)
+    neck, hips = joints["neck"], joints["hips"]
+    shoulders = (joints["shoulder_l"] + joints["shoulder_r"]) / 2
+    trunk_length = np.median(np.linalg.norm(neck - hips, axis=-1))
+    points = [
+        (_TRUNK_FRACTION * _TRUNK_CENTRE, hips),
+        (_TRUNK_FRACTION * (1 - _TRUNK_CENTRE) / 2, neck),
+        (_TRUNK_FRACTION * (1 - _TRUNK_CENTRE) / 2, shoulders),
+        (_HEAD_FRACTION, neck + _HEAD_CENTRE * trunk_length * _direction(joints["head"] - neck)),
+    ]
+    parts = list(range(len(points)))
+    for part, (fraction, start, end, centre) in enumerate(_LIMBS, start=len(points)):
+        for side in "lr":
+            proximal, distal = joints[f"{start}_{side}"], joints[f"{end}_{side}"]
+            points.append((fraction, proximal + centre * (distal - proximal)))
+            parts.append(part)
+    fractions = np.array([fraction for fraction, _ in points])
+    positions = np.stack([position for _, position in points], axis=1)
+    return MassPoints(positions, fractions / fractions.sum(), np.array(parts))
 
 
-def _complete(motion: CharacterMotion) -> dict[str, Array]:
-    """The joints of the motion with stand-ins for those that are not mapped."""
-    joints = dict(motion.joints)
-    if "hips" not in joints:
-        joints["hips"] = _hips(motion)
-    for name in ("spine", "neck", "head"):
-        joints.setdefault(name, joints[_STAND_IN[name]])
-    for side in "lr":
-        for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball"):
-            joints.setdefault(f"{name}_{side}", joints[_STAND_IN[f"{name}_{side}"]])
-    return joints
+def fitted_to_free_fall(points: MassPoints, accelerations: Array, gravity: float) -> MassPoints:
+    """The same body with the mass fractions that make it fall freely when it does.
+
+    In flight the centre of mass falls with g whatever the limbs do, so that what it seems to do beside tells how the
+    body's mass differs from the table's. Least squares with the table as the prior.
+
+    Parameters
+    ----------
+    points : MassPoints
+    accelerations : (M, parts, 3) float array
+        Acceleration of each part's centre at steps of free fall [m/s²].
+    gravity : float
+        [m/s²]
+    """
+    prior = np.bincount(points.parts, weights=points.fractions)
+    deviation = _FRACTION_DEVIATION * prior
+    excess = accelerations / gravity + (0.0, 0.0, 1.0)
+    rows = np.moveaxis(excess, 1, -1).reshape(-1, len(prior))
+    # Least squares for the changes in deviations, under the condition that they sum to 0 (its own last equation).
+    system = np.zeros((len(prior) + 1, len(prior) + 1))
+    scaled = rows * deviation / _FALL_DEVIATION
+    system[:-1, :-1] = scaled.T @ scaled + np.eye(len(prior))
+    system[:-1, -1] = system[-1, :-1] = deviation
+    right = np.append(-scaled.T @ (rows @ prior) / _FALL_DEVIATION, 0.0)
+    fitted = np.maximum(prior + deviation * np.linalg.solve(system, right)[:-1], 0.0)
+    fractions = points.fractions * (fitted / prior)[points.parts]
+    return MassPoints(points.positions, fractions / fractions.sum(), points.parts)
+
+
+def _direction(vectors: Array) -> Array:
+    """Unit vectors, 0 where there is no direction."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+class _Joints:
+    """Paths of joints by name, with stand-ins for those that are not mapped."""
+
+    def __init__(self, motion: CharacterMotion) -> None:
+        self._mapped = motion.joints
+        self._hips = _hips(motion)
+
+    def __getitem__(self, name: str) -> Array:
+        if name in self._mapped:
+            return self._mapped[name]
+        if name == "hips":
+            return self._hips
+        joint, _, side = name.partition("_")
+        parent = _TOWARD_HIPS[joint]
+        return self[f"{parent}_{side}" if side and f"{parent}" not in ("neck", "hips") else parent]
 
 
 def _hips(motion: CharacterMotion) -> Array:

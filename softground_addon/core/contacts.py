@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .motion import CharacterMotion, SoleMotion
+from .smoothing_spline import smooth_path
 
 if TYPE_CHECKING:
     from .heightfield import Terrain
@@ -25,10 +26,13 @@ TOUCH_HEIGHT = 0.025
 """A sole lower than this starts to touch, in leg lengths (2 cm for an adult)."""
 LEAVE_HEIGHT = 0.05
 """A touching sole higher than this has left, in leg lengths."""
-TOUCH_SPEED = 0.4
-"""A sole slower than this starts to touch, in sqrt(gravity·leg length) (1.2 m/s for an adult)."""
-LEAVE_SPEED = 0.6
-"""A touching sole faster than this has left, in sqrt(gravity·leg length)."""
+TOUCH_SPEED = 0.25
+"""A sole slower than this, or than the body, starts to touch, in sqrt(gravity·leg length) (0.8 m/s for an adult). The
+foot that swings overtakes the body, the foot that stands falls behind it."""
+LEAVE_SPEED = 1.5
+"""A touching sole faster than this many times that speed has left."""
+LANDED_HEIGHT = 0.01
+"""A sole has landed when it is this near to where it will stand, in leg lengths."""
 REST_SPEED = 0.15
 """A sole slower than this may be standing: such samples tell the float, in sqrt(gravity·leg length)."""
 FLOAT_PERCENTILE = 10.0
@@ -39,6 +43,11 @@ SHORTEST_CONTACT = 0.165
 """Gaps and blips shorter than this close, in sqrt(leg length/gravity) (0.05 s for an adult)."""
 STEEPEST_GROUND = np.cos(np.radians(60.0))
 """Vertical part of the normal of the steepest ground that bears a sole: more is a wall."""
+EDGE_SEARCH = 0.2
+"""How far toe-off may lie from the instant that height and speed tell, in sqrt(leg length/gravity) (60 ms)."""
+EDGE_CUTOFF = 24.0
+"""Cut-off of the low-pass before a sole's acceleration is taken, in pendulum frequencies sqrt(gravity/leg
+length)/(2·pi) (12 Hz for an adult)."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 
@@ -64,6 +73,10 @@ class Contacts:
 def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     """Find when each sole touches the terrain, by height and speed with hysteresis.
 
+    A contact starts when the sole has come down to where it will stand, and ends when its last landmark accelerates
+    upward most (Hreljac and Marshall 2000, "Algorithms to determine event timing during normal walking using
+    kinematic data", J. Biomechanics 33(6)).
+
     Parameters
     ----------
     motion : CharacterMotion
@@ -75,8 +88,13 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     -------
     Contacts
     """
-    touching, offset, normal = zip(*(_detect(sole, motion, terrain) for sole in motion.soles), strict=True)
-    return Contacts(np.stack(touching, axis=1), np.array(offset), np.stack(normal, axis=1))
+    tracks = [_track(sole, motion, terrain) for sole in motion.soles]
+    drift = _ground_drift(tracks, motion)
+    body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
+    limit = np.maximum(TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length), body_speed)
+    touching, offset = zip(*(_detect(track, drift, limit, motion) for track in tracks), strict=True)
+    normal = np.stack([track.normal for track in tracks], axis=1)
+    return Contacts(np.stack(touching, axis=1), np.array(offset), normal)
 
 
 def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:
@@ -145,30 +163,95 @@ def runs(state: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
-def _detect(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> tuple[Mask, float, Array]:
-    """When one sole touches, the float that was removed, and the normal under its lowest landmark."""
-    leg, step = motion.leg_length, motion.time_step
-    clearance, normals = clearances(sole, terrain, reach=SLOPE_PROBE * leg)
+@dataclass(frozen=True)
+class _Track:
+    """One sole over its ground: clearance, velocity and height of the ground's normal at its lowest landmark."""
+
+    clearance: Array  # (N,) [m]
+    velocity: Array  # (N, 3) [m/s]
+    rise: Array  # (N, L) clearance of every landmark [m]
+    normal: Array  # (N, 3)
+
+
+def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Track:
+    clearance, normals = clearances(sole, terrain, reach=SLOPE_PROBE * motion.leg_length)
     now = np.arange(len(clearance))
     lowest = clearance.argmin(axis=1)
-    height = clearance[now, lowest]
-    speed = _speeds(sole.landmark_positions(), step)[now, lowest] / np.sqrt(motion.gravity * leg)
-    offset = _float(height, speed, leg)
-    height = (height - offset) / leg
+    velocity = _velocities(sole.landmark_positions(), motion.time_step)
+    return _Track(clearance[now, lowest], velocity[now, lowest], clearance, normals[now, lowest])
+
+
+def _velocities(points: Array, step: float) -> Array:
+    """Velocity of each point, (N, L, 3) [m/s]: the slower of the steps before and after, so that a jump of the pose
+    does not widen."""
+    if len(points) < 2:
+        return np.zeros_like(points)
+    stride = np.diff(points, axis=0) / step
+    before, after = np.concatenate([stride[:1], stride]), np.concatenate([stride, stride[-1:]])
+    slower = np.linalg.norm(before, axis=-1, keepdims=True) < np.linalg.norm(after, axis=-1, keepdims=True)
+    return np.where(slower, before, after)
+
+
+def _body_velocity(motion: CharacterMotion) -> Array:
+    """Horizontal velocity of the body, (N, 3) [m/s]: of the hips, else of the middle of the soles."""
+    if "hips" in motion.joints:
+        path = motion.joints["hips"]
+    else:
+        path = np.mean([sole.landmark_positions().mean(axis=1) for sole in motion.soles], axis=0)
+    if len(path) < 2:
+        return np.zeros_like(path)
+    return np.gradient(path, motion.time_step, axis=0) * (1.0, 1.0, 0.0)
+
+
+def _ground_drift(tracks: list[_Track], motion: CharacterMotion) -> Array:
+    """Horizontal velocity that the soles have while they stand, (3,) [m/s].
+
+    0 in a sound animation; the belt's in a walk on the spot.
+    """
+    low = [track.velocity[track.clearance < _low(track.clearance, motion.leg_length)] for track in tracks]
+    drift = np.median(np.concatenate(low), axis=0) * (1.0, 1.0, 0.0) if any(map(len, low)) else np.zeros(3)
+    return drift * (np.linalg.norm(drift) > REST_SPEED * np.sqrt(motion.gravity * motion.leg_length))
+
+
+def _low(clearance: Array, leg_length: float) -> float:
+    """The clearance below which a sole may well be standing [m]."""
+    finite = clearance[np.isfinite(clearance)]
+    return float(np.percentile(finite, FLOAT_PERCENTILE)) + TOUCH_HEIGHT * leg_length if len(finite) else 0.0
+
+
+def _detect(track: _Track, drift: Array, limit: Array, motion: CharacterMotion) -> tuple[Mask, float]:
+    """When one sole touches, and the float that was removed."""
+    leg = motion.leg_length
+    speed = np.linalg.norm(track.velocity - drift, axis=-1)
+    offset = _float(track.clearance, speed / np.sqrt(motion.gravity * leg), leg)
+    height = (track.clearance - offset) / leg
     touching = hysteresis(
-        (height < TOUCH_HEIGHT) & (speed < TOUCH_SPEED),
-        (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED),
+        (height < TOUCH_HEIGHT) & (speed < limit), (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED * limit)
     )
-    shortest = round(SHORTEST_CONTACT * np.sqrt(leg / motion.gravity) / step)
-    return close_short(touching, shortest), offset, normals[now, lowest]
+    unit = np.sqrt(leg / motion.gravity) / motion.time_step
+    touching = close_short(touching, round(SHORTEST_CONTACT * unit))
+    return _sharpened(touching, track, height, motion), offset
 
 
-def _speeds(points: Array, step: float) -> Array:
-    """Speed of each point, (N, L) [m/s]: the smaller of the steps before and after, so that a jump does not widen."""
-    stride = np.linalg.norm(np.diff(points, axis=0), axis=-1) / step
-    if not len(stride):
-        return np.zeros(points.shape[:2])
-    return np.minimum(np.concatenate([stride[:1], stride]), np.concatenate([stride, stride[-1:]]))
+def _sharpened(touching: Mask, track: _Track, height: Array, motion: CharacterMotion) -> Mask:
+    """Contacts from landing to toe-off: later starts, and ends where the last landmark accelerates upward most."""
+    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    search = round(EDGE_SEARCH * unit)
+    rise = np.where(np.isfinite(track.rise), track.rise, 0.0)
+    cutoff = EDGE_CUTOFF / (2 * np.pi * unit * motion.time_step)
+    _, _, acceleration = smooth_path(rise, motion.time_step, cutoff)
+    sharp = np.zeros_like(touching)
+    for first, last in zip(*runs(touching), strict=True):
+        start, end = first, last
+        if first > 0:
+            standing = np.percentile(height[first:last], 25)
+            start += int(np.argmax(height[first:last] < standing + LANDED_HEIGHT))
+        if last < len(touching):
+            landmark = track.rise[last].argmin()
+            begin = max(last - search, start + 1)
+            end = begin + int(np.argmax(acceleration[begin : last + search, landmark]))
+        sharp[start:end] = True
+    return sharp
 
 
 def _float(height: Array, speed: Array, leg_length: float) -> float:

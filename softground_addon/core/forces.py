@@ -10,16 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_dynamics import body_dynamics
 from .centre_of_mass import centre_of_mass
+from .centre_of_pressure import lowest_points
 from .contacts import Contacts, runs
-from .load_sharing import share_by_moment
+from .load_sharing import share_by_moment, share_through_transitions
 from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
-PRESSURE_DEPTH = 0.01
-"""Landmarks this much higher than the lowest one bear e times less of the pressure, in leg lengths."""
+POINT_DEVIATION = 0.05
+"""Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
+LONGEST_RAMP = 1.0
+"""Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +39,9 @@ class ContactForces:
     centre_of_pressure : (N, S, 3) float array
         Where each force acts, on the sole's underside [m].
     weight : (N, S) float array
-        Part of the force that carries the weight, for display [N].
+        Part of the vertical force that carries the weight, for display [N].
     momentum : (N, S) float array
-        Part of the force that stops a landing sole or accelerates the body, for display [N].
+        The rest of it: what stops a landing sole or accelerates the body, for display [N].
     """
 
     forces: Array
@@ -68,7 +72,7 @@ def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_t
     ContactForces
         A sole's momentum part lasts only while it touches.
     """
-    pressure = centres_of_pressure(motion)
+    pressure = lowest_points(motion)
     share = share_by_moment(pressure[..., :2], centre_of_mass(motion)[:, :2], contacts.touching)
     weight = share * motion.mass * motion.gravity
     momentum = share * motion.mass * _landing_deceleration(motion, contacts, characteristic_time)
@@ -84,32 +88,33 @@ def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactFor
     motion : CharacterMotion
         On the simulation's time grid.
     contacts : Contacts
-        Of that motion.
+        Of that motion, best after `refine_contacts`.
+
+    Returns
+    -------
+    ContactForces
+        None pulls; they are 0 where nothing touches.
     """
-    centre = centre_of_mass(motion)
-    pressure = centres_of_pressure(motion)
-    share = share_by_moment(pressure[..., :2], centre[:, :2], contacts.touching)
-    acceleration = np.gradient(np.gradient(centre, motion.time_step, axis=0), motion.time_step, axis=0)
-    total = motion.mass * (acceleration + motion.gravity * UP) * contacts.touching.any(axis=1)[:, None]
-    total *= (total[:, 2] > 0)[:, None]
-    forces = share[..., None] * total[:, None]
-    weight = np.minimum(share * motion.mass * motion.gravity, forces[..., 2])
+    grounded = contacts.touching.any(axis=1)
+    body = body_dynamics(motion, ~grounded)
+    body_weight = motion.mass * motion.gravity
+    total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
+    pressure = lowest_points(motion)
+    ground = (pressure[..., 2] * contacts.touching).sum(axis=1) / np.maximum(contacts.touching.sum(axis=1), 1)
+    share = share_through_transitions(
+        pressure[..., :2],
+        body.point_of_action(ground),
+        contacts.touching,
+        deviation=POINT_DEVIATION * motion.leg_length / np.clip(total[:, 2], 0.1, 1.0),
+        longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
+    )
+    forces = body_weight * share[..., None] * total[:, None]
+    weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)
 
 
-def centres_of_pressure(motion: CharacterMotion) -> Array:
-    """Where each sole presses, (N, S, 3) [m]: the mean of its landmarks, the lowest ones counting most."""
-    centres = []
-    for sole in motion.soles:
-        points = sole.landmark_positions()
-        height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-        nearness = np.exp(-height / (PRESSURE_DEPTH * motion.leg_length))
-        centres.append((nearness[..., None] * points).sum(axis=1) / nearness.sum(axis=1)[:, None])
-    return np.stack(centres, axis=1)
-
-
 def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> Array:
-    """v_n/tau of the sole that landed last, for tau after it did, (N, S) [m/s²]."""
+    """v_n/tau of each sole's last landing, for tau after it, (N, S) [m/s²]."""
     step = motion.time_step
     deceleration = np.zeros(contacts.touching.shape)
     for index, sole in enumerate(motion.soles):

@@ -1,15 +1,21 @@
-"""How several contacts share one load: non-negative least squares, for all steps at once."""
+"""How several contacts share one load: smooth transitions, and non-negative least squares on force and moment."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .contacts import runs
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _EVENNESS = 1e-6
 """How much an even split counts: decides only where force and moment leave the shares open."""
+_SUM_WEIGHT = 1e6
+"""How much more the sum of the shares counts than their prior; the rest is normalised away."""
+SHARE_DEVIATION = 0.5
+"""Standard deviation of the share of a sole in the middle of its contact about an even split: not known at all."""
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:
@@ -37,9 +43,69 @@ def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:
     # Shares that sum to 1 and minimise share·gram·share are, up to their sum, those that minimise
     # share·gram·share/2 - sum(share): the constraint's multiplier only scales them.
     right = np.ones(touching.shape)
-    share = solve_non_negative(gram, right, touching)
-    total = share.sum(axis=1, keepdims=True)
-    return np.divide(share, total, out=np.zeros_like(share), where=total > 0)
+    return _normalised(solve_non_negative(gram, right, touching))
+
+
+def share_through_transitions(points: Array, target: Array, touching: Mask, *, deviation: Array, longest: int) -> Array:
+    """Shares that pass smoothly from sole to sole and agree with the moment as well as it is known.
+
+    Each sole takes its load over a cosine ramp while others that were there before it still touch, and gives it up
+    likewise (Ren et al. 2008, "Whole body inverse dynamics over a complete gait cycle based only on measured
+    kinematics", the smooth transition assumption). Within a ramp and on several soles that stand, the shares follow
+    the moment: the closer the ramp is to its end, the less.
+
+    Parameters
+    ----------
+    points, target, touching
+        As for `share_by_moment`.
+    deviation : (N,) float array
+        How well `target` is known, standard deviation [m].
+    longest : int
+        Longest ramp [steps].
+
+    Returns
+    -------
+    (N, S) float array, not negative; rows sum to 1, or are 0 where nothing touches. Continuous in time while
+    something touches.
+    """
+    readiness = _ramps(touching, longest)
+    prior = _normalised(readiness)
+    variance = (SHARE_DEVIATION * np.maximum(readiness, 1e-3)) ** 2
+    arm = np.where(touching[..., None], points - target[:, None, :], 0.0) / deviation[:, None, None]
+    gram = arm @ np.swapaxes(arm, 1, 2) + _SUM_WEIGHT
+    gram += np.eye(touching.shape[1]) / variance[:, None, :]
+    right = prior / variance + _SUM_WEIGHT
+    return _normalised(solve_non_negative(gram, right, touching))
+
+
+def _ramps(touching: Mask, longest: int) -> Array:
+    """How far each contact is from its ends: 0 at an end that others bridge, 1 away from it, (N, S)."""
+    count, soles = touching.shape
+    ramps = touching.astype(float)
+    intervals = [[(int(a), int(b)) for a, b in zip(*runs(touching[:, sole]), strict=True)] for sole in range(soles)]
+    for sole in range(soles):
+        others = [interval for other in range(soles) if other != sole for interval in intervals[other]]
+        for first, last in intervals[sole]:
+            step = np.arange(first, last)
+            ends = [b for a, b in others if a < first < b]
+            if first > 0 and ends:
+                rise = min(max(min(ends) - first, 1), last - first, longest)
+                ramps[first:last, sole] *= _cosine((step - first + 0.5) / rise)
+            starts = [a for a, b in others if a < last < b]
+            if last < count and starts:
+                fall = min(max(last - max(starts), 1), last - first, longest)
+                ramps[first:last, sole] *= _cosine((last - step - 0.5) / fall)
+    return ramps
+
+
+def _cosine(phase: Array) -> Array:
+    """A ramp from 0 at phase 0 to 1 at phase 1, without corners."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip(phase, 0.0, 1.0))
+
+
+def _normalised(shares: Array) -> Array:
+    total = shares.sum(axis=1, keepdims=True)
+    return np.divide(shares, total, out=np.zeros_like(shares), where=total > 0)
 
 
 def solve_non_negative(gram: Array, right: Array, free: Mask) -> Array:

@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_dynamics import body_dynamics
+from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts, runs
 from .deformation import (
     GroundMaterial,
@@ -67,6 +69,7 @@ def estimate_loads(
     if force_model == "IMPULSE":
         forces = impulse_forces(fine, contacts, material.characteristic_time)
     else:
+        contacts = refine_contacts(fine, contacts, body_dynamics(fine))
         forces = whole_body_forces(fine, contacts)
     return CharacterLoads(fine, contacts, forces)
 

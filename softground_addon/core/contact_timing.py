@@ -1,0 +1,139 @@
+"""Heel strike and toe-off to a few milliseconds: from the sole's acceleration and from the forces on the whole body.
+
+Heights and speeds tell that a foot is on the ground, not quite when it got there: a swinging foot comes in flat and
+slow, and a toe leaves while it hardly moves. The forces do: in double support the point through which the total force
+acts moves from the trailing to the leading foot.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .body_dynamics import FREE_FALL, BodyDynamics
+from .centre_of_pressure import lowest_points
+from .contacts import Contacts, runs
+from .motion import CharacterMotion
+
+Array = NDArray[np.float64]
+
+SEARCH = 0.33
+"""How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""
+TIMING_DEVIATION = 0.1
+"""Standard deviation of the times found from heights and speeds, in the same unit (30 ms)."""
+SHARE_DEVIATION = 0.1
+"""Standard deviation of the leading foot's share as the point of action tells it."""
+SHARE_MEMORY = 0.25
+"""Time over which the error of that share is about the same, in the same unit (one period of the low-pass at 4/5)."""
+SHORTEST_OVERLAP = 0.1
+"""Shortest double support, in the same unit (30 ms)."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """The load passes from one sole to another.
+
+    Attributes
+    ----------
+    trailing, leading : int
+        Soles.
+    strike, leave : int
+        Step at which the leading sole lands and the trailing one has left; they overlap when strike < leave.
+    """
+
+    trailing: int
+    leading: int
+    strike: int
+    leave: int
+
+
+def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynamics) -> Contacts:
+    """Contacts that agree with the forces on the whole body.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Found from heights and speeds.
+    body : BodyDynamics
+        Of that motion, before anything is known about flight.
+    """
+    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    touching = contacts.touching.copy()
+    pressure = lowest_points(motion)
+    for change in transitions(touching, round(SEARCH * unit)):
+        gap = body.force[change.leave : change.strike, 2]
+        if len(gap) and gap.min() < FREE_FALL:
+            continue  # flight: the feet are right, there is no double support
+        strike, leave = _fit_overlap(change, pressure, body, unit)
+        touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
+        touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
+    return dataclasses.replace(contacts, touching=touching)
+
+
+def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
+    """Changes of load from one sole to another that no third sole has a part in.
+
+    Parameters
+    ----------
+    touching : (N, S) bool array
+    reach : int
+        Longest gap between the trailing sole's contact and the leading one's [steps].
+    """
+    count = len(touching)
+    intervals = [
+        (int(first), int(last), sole)
+        for sole in range(touching.shape[1])
+        for first, last in zip(*runs(touching[:, sole]), strict=True)
+    ]
+    found = []
+    for first, last, leading in intervals:
+        if first == 0:
+            continue
+        partners = [
+            (end, sole)
+            for start, end, sole in intervals
+            if sole != leading and start < first and first - reach <= end < min(last, count)
+        ]
+        if len(partners) != 1:
+            continue
+        leave, trailing = partners[0]
+        window = slice(max(min(first, leave) - reach, 0), max(first, leave) + reach)
+        others = np.delete(touching[window], (leading, trailing), axis=1)
+        if not others.any():
+            found.append(Transition(trailing, leading, first, leave))
+    return found
+
+
+def _fit_overlap(change: Transition, pressure: Array, body: BodyDynamics, unit: float) -> tuple[int, int]:
+    """Strike and leave whose cosine ramp fits the point of action best, near those of the transition."""
+    search = max(round(SEARCH * unit), 1)
+    first = max(min(change.strike, change.leave) - search, 0)
+    last = min(max(change.strike, change.leave) + search, len(pressure))
+    window = slice(first, last)
+    back, front = pressure[window, change.trailing], pressure[window, change.leading]
+    target = body.point_of_action((back[:, 2] + front[:, 2]) / 2, window)
+    along = (front - back)[:, :2]
+    length = (along**2).sum(axis=1)
+    share = ((target - back[:, :2]) * along).sum(axis=1) / np.maximum(length, 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    # Where one sole bears all, the point of action wanders under that sole and tells nothing about the other.
+    telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * SHARE_DEVIATION**2)
+
+    offset = np.arange(-search, search + 1)
+    strike, leave = change.strike + offset[:, None], change.leave + offset[None, :]
+    possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > first) & (leave < last)
+    pairs = np.stack([np.broadcast_to(edge, possible.shape)[possible] for edge in (strike, leave)])
+    if not pairs.size:
+        return change.strike, change.leave
+    step = np.arange(first, last)
+    phase = np.clip((step - pairs[0][:, None]) / (pairs[1] - pairs[0])[:, None], 0.0, 1.0)
+    misfit = (0.5 - 0.5 * np.cos(np.pi * phase) - share) ** 2 @ telling
+    moved = (pairs - np.array([[change.strike], [change.leave]])) / unit
+    cost = misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=0)
+    best = cost.argmin()
+    return int(pairs[0, best]), int(pairs[1, best])

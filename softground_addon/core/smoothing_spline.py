@@ -1,0 +1,121 @@
+"""Acceleration of a sampled path by a smoothing spline that knows free fall.
+
+A discrete smoothing spline is a zero-phase low-pass (its gain is 1/(1 + (f/cut-off)^6)) that needs no data beyond the
+ends of the path, takes samples at any subset of the steps, and can be told what is known about the acceleration.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_ORDER = 3
+"""The penalty is on the third derivative, so the bandwidth of the normal equations is 3."""
+_BLOCK = 32
+"""Rows of a block of the banded solver: the fastest among powers of two."""
+_FALL_WEIGHT = 1e4
+"""How much more a known fall counts than the samples near the cut-off frequency."""
+
+
+def smooth_path(
+    path: Array,
+    step: float,
+    cutoff: float,
+    *,
+    sampled: Mask | None = None,
+    falling: Mask | None = None,
+    fall: float = 0.0,
+) -> tuple[Array, Array, Array]:
+    """Low-passed path and its first two derivatives.
+
+    Parameters
+    ----------
+    path : (N, C) float array
+    step : float
+        Time between steps [s].
+    cutoff : float
+        Frequency at which half the amplitude passes [Hz].
+    sampled : (N,) bool array, optional
+        Steps at which `path` is known; the spline fills in the others.
+    falling : (N,) bool array, optional
+        Steps at which the second derivative is known: 0 but for the last column, where it is -`fall`.
+    fall : float
+        [unit of path/s²]
+
+    Returns
+    -------
+    position, velocity, acceleration : (N, C) float arrays
+    """
+    count = len(path)
+    if count <= _ORDER:
+        return path.copy(), np.zeros_like(path), np.zeros_like(path)
+    weight = np.ones(count) if sampled is None else sampled.astype(float)
+    # Per step, so that the cut-off is the same however few of the steps are sampled.
+    scale = 2 * np.pi * cutoff * step
+    density = weight.mean()
+    band = np.zeros((_ORDER + 1, count))
+    band[0] = weight
+    _add_difference(band, np.full(count - _ORDER, density / scale ** (2 * _ORDER)), _ORDER)
+    right = weight[:, None] * path
+    if falling is not None:
+        rows = np.where(falling[1:-1], _FALL_WEIGHT * density / scale**4, 0.0)
+        _add_difference(band, rows, 2)
+        pull = -fall * step**2 * rows
+        for offset, coefficient in enumerate((1.0, -2.0, 1.0)):
+            right[offset : offset + count - 2, -1] += coefficient * pull
+    position = _solve_banded(band, right)
+    velocity = np.gradient(position, step, axis=0)
+    acceleration = np.empty_like(position)
+    acceleration[1:-1] = np.diff(position, 2, axis=0) / step**2
+    acceleration[0] = 2 * acceleration[1] - acceleration[2]
+    acceleration[-1] = 2 * acceleration[-2] - acceleration[-3]
+    return position, velocity, acceleration
+
+
+def _add_difference(band: Array, weight: Array, order: int) -> None:
+    """Add the normal equations of weighted differences of an order to a symmetric band matrix.
+
+    band[k, i] is the matrix element (i, i + k).
+    """
+    stencil = np.array([1.0])
+    for _ in range(order):
+        stencil = np.convolve(stencil, (1.0, -1.0))
+    for i, a in enumerate(stencil):
+        for j in range(i, order + 1):
+            band[j - i, i : i + len(weight)] += a * stencil[j] * weight
+
+
+def _solve_banded(band: Array, right: Array) -> Array:
+    """Solve a symmetric positive definite banded system by block elimination, (N, C)."""
+    reach, count = len(band) - 1, band.shape[1]
+    blocks = -(-count // _BLOCK)
+    padded = np.zeros((reach + 1, blocks * _BLOCK))
+    padded[:, :count] = band
+    padded[0, count:] = 1.0
+    diagonal = np.zeros((blocks, _BLOCK, _BLOCK))
+    coupling = np.zeros((blocks, _BLOCK, _BLOCK))  # from each block's rows to the next block's columns
+    for k in range(reach + 1):
+        elements = padded[k].reshape(blocks, _BLOCK)
+        row = np.arange(_BLOCK - k)
+        diagonal[:, row, row + k] = elements[:, : _BLOCK - k]
+        diagonal[:, row + k, row] = elements[:, : _BLOCK - k]
+        if k:
+            over = np.arange(_BLOCK - k, _BLOCK)
+            coupling[:, over, over + k - _BLOCK] = elements[:, _BLOCK - k :]
+    unknown = np.zeros((blocks, _BLOCK, right.shape[1]))
+    unknown.reshape(-1, right.shape[1])[:count] = right
+    carried = np.empty((blocks, _BLOCK, reach + right.shape[1]))
+    for block in range(blocks):
+        if block:
+            link = coupling[block - 1, :, :reach].T
+            diagonal[block, :reach, :reach] -= link @ carried[block - 1, :, :reach]
+            unknown[block, :reach] -= link @ carried[block - 1, :, reach:]
+        carried[block] = np.linalg.solve(
+            diagonal[block], np.concatenate([coupling[block, :, :reach], unknown[block]], axis=1)
+        )
+    for block in range(blocks - 2, -1, -1):
+        carried[block, :, reach:] -= carried[block, :, :reach] @ carried[block + 1, :reach, reach:]
+    return carried[:, :, reach:].reshape(-1, right.shape[1])[:count]
