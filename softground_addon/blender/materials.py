@@ -1,0 +1,257 @@
+"""Render materials of the grounds, built from nodes: what the mesh attributes of a bake say is what one sees.
+
+Textures are laid out in world space, so that grains keep their size on any ground. All relief is in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import bpy
+
+from ..core.errors import InputError
+from .ground_mesh import COMPRESSION, RIM
+
+MARK = "softground_surface"
+"""Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Socket:
+    """An output of a node, with the arithmetic of shader graphs."""
+
+    graph: Graph
+    output: Any
+
+    def __add__(self, other: Socket | float) -> Socket:
+        return self.graph.math("ADD", self, other)
+
+    def __mul__(self, other: Socket | float) -> Socket:
+        return self.graph.math("MULTIPLY", self, other)
+
+
+class Graph:
+    """Writes nodes into a material, each at the right of those that it reads."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self._tree = tree
+        self._depth: dict[str, int] = {}
+        self._rows: dict[int, int] = {}
+
+    def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
+        """A node with its properties set and its inputs, given by identifier or position, linked or set."""
+        node: Any = self._tree.nodes.new(kind)
+        for name, value in properties.items():
+            setattr(node, name, value)
+        depth = 0
+        for key, value in (inputs or {}).items():
+            socket = _input(node, key)
+            if isinstance(value, Socket):
+                self._tree.links.new(value.output, socket)
+                depth = max(depth, self._depth[value.output.node.name] + 1)
+            else:
+                socket.default_value = value
+        row = self._rows.get(depth, 0)
+        self._depth[node.name], self._rows[depth] = depth, row + 1
+        node.location = (220 * depth, -260 * row)
+        return node
+
+    def out(self, node: Any, index: int = 0) -> Socket:
+        """An output by its position: names of outputs differ between Blender versions."""
+        return Socket(self, node.outputs[index])
+
+    def math(self, operation: str, a: Socket | float, b: Socket | float) -> Socket:
+        """a operation b."""
+        return self.out(self.node("ShaderNodeMath", {0: a, 1: b}, operation=operation))
+
+    def attribute(self, name: str) -> Socket:
+        """A float attribute of the mesh; 0 where the mesh has none."""
+        return self.out(self.node("ShaderNodeAttribute", attribute_name=name), 2)
+
+    def ramp(self, value: Socket, low: float, high: float, start: float = 0.0, end: float = 1.0) -> Socket:
+        """From `start` at `low` to `end` at `high`, smoothly, and level outside."""
+        inputs = {0: value, 1: low, 2: high, 3: start, 4: end}
+        return self.out(self.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP"))
+
+    def noise(self, place: Socket, size: float, detail: float = 2.0, roughness: float = 0.5) -> Socket:
+        """Noise around 0.5 whose features are about `size` [m] large."""
+        inputs = {"Vector": place, "Scale": 1.0 / size, "Detail": detail, "Roughness": roughness}
+        return self.out(self.node("ShaderNodeTexNoise", inputs))
+
+    def cells(self, place: Socket, size: float) -> Any:
+        """Voronoi cells of about `size` [m]: outputs are distance to the centre [cells], random colour."""
+        return self.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": 1.0 / size})
+
+    def mix(self, factor: Socket, a: Socket | Colour, b: Socket | Colour) -> Socket:
+        """Colour a at factor 0, b at factor 1."""
+        inputs = {"Factor_Float": factor, "A_Color": _rgba(a), "B_Color": _rgba(b)}
+        return self.out(self.node("ShaderNodeMix", inputs, data_type="RGBA"), 2)
+
+    def blend(self, factor: Socket, a: Socket | float, b: Socket | float) -> Socket:
+        """Number a at factor 0, b at factor 1."""
+        return self.out(self.node("ShaderNodeMix", {"Factor_Float": factor, "A_Float": a, "B_Float": b}))
+
+
+def _rgba(colour: Socket | Colour) -> Any:
+    return colour if isinstance(colour, Socket) else (*colour, 1.0)
+
+
+def _input(node: Any, key: str | int) -> Any:
+    if isinstance(key, int):
+        return node.inputs[key]
+    return next(socket for socket in node.inputs if key in (socket.identifier, socket.name))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What every surface is made from: world place [m], how pressed it is (0-1), how risen (0-1)."""
+
+    place: Socket
+    pressed: Socket
+    risen: Socket
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a surface hands to the shader: its relief [m] and the inputs of the Principled BSDF."""
+
+    relief: Socket
+    inputs: Mapping[str, Any]
+
+
+def ensure_material(surface: str) -> bpy.types.Material:
+    """The add-on's material for a surface, made on first use and left as it is from then on.
+
+    Parameters
+    ----------
+    surface : str
+        "snow", "sand", "mud" or "soil".
+
+    Raises
+    ------
+    InputError
+        If there is no such surface.
+    """
+    if surface not in _SURFACES:
+        raise InputError(f"There is no surface '{surface}': choose one of {', '.join(_SURFACES)}.")
+    for material in bpy.data.materials:
+        if material.get(MARK) == surface and material.library is None:
+            return material
+    material = bpy.data.materials.new(f"SoftGround {surface.capitalize()}")
+    material[MARK] = surface
+    look_of, preview = _SURFACES[surface]
+    material.diffuse_color = (*preview, 1.0)
+    if material.node_tree is None:  # 5.x makes the tree with the material and warns of the switch
+        material.use_nodes = True
+    tree = cast("bpy.types.NodeTree", material.node_tree)
+    tree.nodes.clear()
+    _build(Graph(tree), look_of)
+    return material
+
+
+def _build(graph: Graph, look_of: Callable[[Graph, Ground], Look]) -> None:
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    ground = Ground(
+        place=place,
+        pressed=graph.ramp(graph.attribute(COMPRESSION), 0.0004, 0.004),
+        risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
+    )
+    look = look_of(graph, ground)
+    bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": 1.0, "Height": look.relief})
+    # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
+    shader = graph.node(
+        "ShaderNodeBsdfPrincipled", {**look.inputs, "Normal": graph.out(bump)}, subsurface_method="BURLEY"
+    )
+    graph.node("ShaderNodeOutputMaterial", {"Surface": graph.out(shader)})
+
+
+def _snow(graph: Graph, ground: Ground) -> Look:
+    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish."""
+    drifts = graph.noise(ground.place, 0.13, 2.0) * 0.016
+    clumps = graph.noise(ground.place, 0.016, 2.0) * graph.blend(ground.pressed, 0.0042, 0.0010)
+    crystals = graph.noise(ground.place, 0.0035, 3.0, 0.65) * graph.blend(ground.pressed, 0.0022, 0.0012)
+
+    glints = graph.cells(ground.place, 0.0030)
+    random = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(glints, 1)}))
+    tilt = graph.node("ShaderNodeVectorMath", {0: graph.out(glints, 1), 1: (0.5, 0.5, 0.0)}, operation="SUBTRACT")
+    facet = graph.node("ShaderNodeVectorMath", {0: graph.out(tilt)}, operation="NORMALIZE")
+    return Look(
+        drifts + clumps + crystals,
+        {
+            "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.62, 0.76, 0.92)),
+            "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
+            "Subsurface Weight": 0.5,
+            "Subsurface Radius": (0.7, 0.9, 1.0),
+            "Subsurface Scale": 0.010,
+            "Coat Weight": graph.ramp(random, 0.92, 0.93) * 0.8,
+            "Coat Roughness": 0.15,
+            "Coat Normal": graph.out(facet),
+        },
+    )
+
+
+def _sand(graph: Graph, ground: Ground) -> Look:
+    """Dry: fine grains of several colours over soft undulations; nothing shines."""
+    grain = graph.cells(ground.place, 0.0016)
+    tint = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(grain, 1)}))
+    patches = graph.noise(ground.place, 0.25, 3.0)
+    relief = graph.noise(ground.place, 0.16, 1.0) * 0.014
+    relief = relief + graph.noise(ground.place, 0.0030, 2.0, 0.7) * graph.blend(ground.pressed, 0.0016, 0.0012)
+    relief = relief + graph.noise(ground.place, 0.024, 2.0) * graph.blend(ground.pressed, 0.0024, 0.0010)
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.58, 0.37, 0.17), (0.90, 0.67, 0.40))
+    colour = graph.mix(graph.ramp(patches, 0.35, 0.75, 0.0, 0.35), colour, (0.66, 0.42, 0.21))
+    colour = graph.mix(ground.pressed * 0.25, colour, (0.45, 0.28, 0.13))
+    return Look(relief, {"Base Color": colour, "Roughness": 0.92, "Specular IOR Level": 0.2})
+
+
+def _mud(graph: Graph, ground: Ground) -> Look:
+    """Dark, smooth and sticky; wet in patches, wettest in the prints, where water films over it."""
+    lumps = graph.noise(ground.place, 0.06, 2.0, 0.45)
+    bits = graph.noise(ground.place, 0.009, 2.0, 0.5)
+    relief = lumps * graph.blend(ground.pressed, 0.012, 0.006) + bits * graph.blend(ground.pressed, 0.0016, 0.0009)
+    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.38, 0.66, 0.12, 0.55)
+    wet = graph.math("MAXIMUM", ground.pressed, damp)
+    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.070, 0.042, 0.024), (0.120, 0.078, 0.048))
+    colour = graph.mix(wet, colour, (0.034, 0.018, 0.009))
+    return Look(
+        relief,
+        {
+            "Base Color": colour,
+            "Roughness": graph.blend(wet, 0.60, 0.30),
+            "Specular IOR Level": 0.5,
+            "Coat Weight": ground.pressed * 0.35,
+            "Coat Roughness": 0.14,
+            "Coat IOR": 1.33,
+        },
+    )
+
+
+def _soil(graph: Graph, ground: Ground) -> Look:
+    """Dark dry crumbs of all sizes, dull; under the foot they are crushed to a firm, even surface."""
+    loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
+    stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
+    stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
+    wavy = graph.out(stirred)  # crumbs are no honeycomb
+    large = graph.ramp(graph.out(graph.cells(wavy, 0.030)), 0.1, 0.7, 1.0, 0.0)
+    small = graph.ramp(graph.out(graph.cells(wavy, 0.009)), 0.1, 0.8, 1.0, 0.0)
+    dust = graph.noise(ground.place, 0.0035, 3.0, 0.7)
+    spread = graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.46, 0.62)
+    crumbs = large * spread * 0.012 + small * 0.0040
+    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0026, 0.0012)
+    tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
+    colour = graph.mix(tint, (0.036, 0.021, 0.013), (0.135, 0.082, 0.050))
+    colour = graph.mix(ground.pressed * 0.5, colour, (0.075, 0.045, 0.027))
+    return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
+
+
+_SURFACES: dict[str, tuple[Callable[[Graph, Ground], Look], Colour]] = {
+    "snow": (_snow, (0.85, 0.89, 0.95)),
+    "sand": (_sand, (0.66, 0.48, 0.29)),
+    "mud": (_mud, (0.07, 0.04, 0.02)),
+    "soil": (_soil, (0.12, 0.07, 0.04)),
+}
+"""What builds each surface, and its colour in Solid shading."""

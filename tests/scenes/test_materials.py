@@ -1,0 +1,106 @@
+"""The grounds' render materials: built on this Blender, driven by the attributes of a bake, the user's left alone."""
+
+import numpy as np
+import pytest
+
+from softground_addon.core.errors import InputError
+from softground_addon.core.presets import SURFACES
+
+
+@pytest.fixture
+def ensure_material(scene):
+    from softground_addon.blender.materials import ensure_material
+
+    return ensure_material
+
+
+def upstream(socket):
+    """Nodes that an input depends on."""
+    found = set()
+    waiting = [link.from_node for link in socket.links]
+    while waiting:
+        node = waiting.pop()
+        if node not in found:
+            found.add(node)
+            waiting += [link.from_node for inlet in node.inputs for link in inlet.links]
+    return found
+
+
+def principled(material):
+    return next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_the_output_is_shaded_from_the_compression_of_the_bake(ensure_material, surface):
+    shader = principled(ensure_material(surface))
+    for name in ("Base Color", "Normal"):
+        attributes = {node.attribute_name for node in upstream(shader.inputs[name]) if node.type == "ATTRIBUTE"}
+        assert "softground_compression" in attributes
+    output = next(node for node in shader.id_data.nodes if node.type == "OUTPUT_MATERIAL")
+    assert output.inputs["Surface"].links[0].from_node == shader
+    assert all(link.is_valid for link in shader.id_data.links)
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_textures_are_laid_out_in_the_world(ensure_material, surface):
+    nodes = ensure_material(surface).node_tree.nodes
+    for texture in (node for node in nodes if node.type in ("TEX_NOISE", "TEX_VORONOI")):
+        assert any(node.type == "NEW_GEOMETRY" for node in upstream(texture.inputs["Vector"]))
+
+
+def test_a_surface_has_one_material_however_often_it_is_asked_for(ensure_material):
+    first = ensure_material("snow")
+    first.node_tree.nodes.clear()  # the user is free to change it
+    assert ensure_material("snow") == first
+    assert not first.node_tree.nodes
+    assert ensure_material("mud") != first
+
+
+def test_a_users_material_of_the_same_name_is_left_alone(ensure_material):
+    import bpy
+
+    theirs = bpy.data.materials.new("SoftGround Snow")
+    theirs.diffuse_color = (1, 0, 0, 1)
+    ours = ensure_material("snow")
+    assert ours != theirs
+    assert tuple(theirs.diffuse_color) == (1, 0, 0, 1)
+
+
+def test_an_unknown_surface_is_refused_with_the_known_ones(ensure_material):
+    with pytest.raises(InputError, match="snow, sand, mud, soil"):
+        ensure_material("lava")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", SURFACES)
+def test_a_pressed_spot_renders_differently_from_an_untouched_one(scene, ensure_material, tmp_path, surface):
+    import bpy
+
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1, size=0.2)
+    ground = bpy.context.object
+    pressed = ground.data.attributes.new("softground_compression", "FLOAT", "POINT")
+    pressed.data.foreach_set("value", [0.02 if vertex.co.x > 0.01 else 0.0 for vertex in ground.data.vertices])
+    ground.data.materials.append(ensure_material(surface))
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.use_nodes = True
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 0.18, 1.0
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler.x = 3.0, 0.9
+    for thing in (camera, sun):
+        scene.collection.objects.link(thing)
+    scene.camera = camera
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 16
+    scene.render.resolution_x = scene.render.resolution_y = 48
+    scene.view_settings.view_transform = "Standard"
+    scene.render.filepath = str(tmp_path / "spot.png")
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    pixels = np.empty(48 * 48 * 4, dtype=np.float32)
+    picture.pixels.foreach_get(pixels)
+    rgb = pixels.reshape(48, 48, 4)[..., :3]
+    left, right = rgb[:, 4:16].mean(axis=(0, 1)), rgb[:, -16:-4].mean(axis=(0, 1))
+    assert rgb.max() > 0.05
+    assert rgb.mean(axis=(0, 1))[1] > 0.3 * rgb.mean(axis=(0, 1))[0]  # not the pink of a broken shader
+    assert np.abs(left - right).max() > 0.01
