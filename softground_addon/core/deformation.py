@@ -7,12 +7,14 @@ varies over the ground only changes what is passed in.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Fraction = NDArray[np.floating[Any]]
 
 LAYER_DEPTH = 0.30
 """Depth of the loose layer [m] (the paper, section 5)."""
@@ -104,7 +106,7 @@ def compression_rate(step: float, material: GroundMaterial) -> float:
     return step / material.characteristic_time
 
 
-def touching_fraction(clearance: Array, sinkage: Array | float, tolerance: float) -> Array:
+def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
     """How much of each piece of a posed sole touches the ground, 0 to 1.
 
     The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
@@ -119,7 +121,9 @@ def touching_fraction(clearance: Array, sinkage: Array | float, tolerance: float
         How far the ground has given way under the lowest point [m].
     tolerance : float [m]
     """
-    fraction = (sinkage - clearance) * (1.0 / tolerance) + 1.5
+    fraction = sinkage - clearance
+    fraction *= 1.0 / tolerance
+    fraction += 1.5
     return np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
 
 
@@ -171,7 +175,7 @@ def sink(
     return Sinking(touching_area, target, reached[:-1], float(sinkage))
 
 
-def compress(compression: Array, coverage: Array, target: Array | float, rate: float) -> Array:
+def compress(compression: Array, coverage: Fraction, target: Array | float, rate: float) -> Array:
     """Compression of each cell after one more step [m] (Eq. 11).
 
     It grows by min(rate·target, target - compression) where that is positive. A cell that the contact covers in part
@@ -199,13 +203,13 @@ def compress(compression: Array, coverage: Array, target: Array | float, rate: f
     >>> compress(np.array([0.02, 0.04]), np.array([1.0, 1.0]), target=0.03, rate=0.5)
     array([0.03, 0.04])
     """
-    aim = coverage * target
+    aim = np.multiply(coverage, target, dtype=np.float64)
     further = compression + rate * aim
     np.minimum(further, aim, out=further)
     return np.maximum(further, compression, out=further)
 
 
-def rim_weights(coverage: Array, reach: float, room: Array | None = None) -> Array:
+def rim_weights(coverage: Fraction, reach: float, room: Mask | None = None) -> Array:
     """Shares of the cells that take up the volume a contact displaces, summing to 1 (Eq. 12-14).
 
     All cells within reach of the contact take part alike, in so far as they are not in contact themselves.
@@ -216,8 +220,8 @@ def rim_weights(coverage: Array, reach: float, room: Array | None = None) -> Arr
         Fraction of each cell that is in contact, at each of N steps.
     reach : float
         Reach of the rim in cells; at least the next cells take part.
-    room : (rows, columns) float array, optional
-        Fraction of each cell that is ground at all.
+    room : (rows, columns) bool array, optional
+        Cells that are ground at all.
 
     Returns
     -------
@@ -232,14 +236,16 @@ def rim_weights(coverage: Array, reach: float, room: Array | None = None) -> Arr
            [0.25, 0.  , 0.25],
            [0.  , 0.25, 0.  ]])
     """
-    weights = dilate(in_contact(coverage), reach) * (1.0 - coverage)
+    free = dilate(in_contact(coverage), reach)
     if room is not None:
-        weights *= room
+        free &= room
+    weights = np.subtract(1.0, coverage, dtype=np.float64)
+    weights *= free
     total = weights.sum(axis=(1, 2), keepdims=True)
     return np.divide(weights, total, out=weights, where=total > 0)
 
 
-def in_contact(coverage: Array) -> Mask:
+def in_contact(coverage: Fraction) -> Mask:
     """Cells that count as in contact at each of N steps: those covered by half.
 
     A contact smaller than a cell covers none by half; then those count that it covers by half as much as any.

@@ -8,6 +8,8 @@ the touched ground and not its extent.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +22,9 @@ Mask = NDArray[np.bool_]
 
 TILE = 32
 """Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""
+
+STEEPEST_CELL = np.tan(np.radians(60.0))
+"""Slope of the steepest cell that takes a print: more is a wall."""
 
 
 class Terrain(Protocol):
@@ -204,6 +209,35 @@ class HeightField(SparseGrid):
         return float(total[0]) * self.cell_size**2, float(total[1]) * self.cell_size**2
 
 
+@dataclass(frozen=True)
+class Surface:
+    """The undisturbed ground over a window.
+
+    Attributes
+    ----------
+    window : Window
+    cell_size : float
+        Side of a cell [m].
+    heights : (rows, columns) float array
+        At the centres of cells [m], NaN where there is no ground.
+    slope_x, slope_y : (rows, columns) float arrays
+        Rise along x and y: the mean of those to both sides; where they have opposite signs or one is unknown or
+        level, as at the foot of a wall and at the brink of a gap, the gentler one.
+    """
+
+    window: Window
+    cell_size: float
+    heights: Array
+    slope_x: Array
+    slope_y: Array
+
+    @cached_property
+    def bears(self) -> Mask:
+        """Cells that take a print: on the ground and no wall."""
+        mask: Mask = np.isfinite(self.heights) & (self.slope_x**2 + self.slope_y**2 <= STEEPEST_CELL**2)
+        return mask
+
+
 class TerrainTiles:
     """A terrain's heights and slopes at cell centres, looked up once per tile.
 
@@ -233,16 +267,18 @@ class TerrainTiles:
         values: Array = self._heights.read(window)[0]
         return values
 
-    def slopes(self, window: Window) -> tuple[Array, Array, Array]:
-        """Heights and their slopes along x and y, each (rows, columns) [m, 1, 1].
-
-        The slope is the mean of those to both sides; where they have opposite signs or one is unknown or level, as
-        at the foot of a wall and at the brink of a gap, the gentler one.
-        """
+    def surface(self, window: Window) -> Surface:
+        """Heights and slopes of a window."""
         heights = self.heights(window.expanded(1))
         along_x = np.diff(heights[1:-1], axis=1) / self.cell_size
         along_y = np.diff(heights[:, 1:-1], axis=0) / self.cell_size
-        return heights[1:-1, 1:-1], _slope(along_x[:, :-1], along_x[:, 1:]), _slope(along_y[:-1], along_y[1:])
+        return Surface(
+            window,
+            self.cell_size,
+            heights[1:-1, 1:-1],
+            _slope(along_x[:, :-1], along_x[:, 1:]),
+            _slope(along_y[:-1], along_y[1:]),
+        )
 
 
 def _slope(before: Array, after: Array) -> Array:

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .deformation import touching_fraction
-from .heightfield import TerrainTiles, Window
+from .heightfield import Surface, Window
 from .motion import Sole, SolePatch
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Single = NDArray[np.float32]
+"""What is said of many cells at many steps: fractions and heights near the ground, where 32 bits are plenty."""
 
 TOLERANCE = 0.04
 """What counts as touching, in sole lengths: 1 cm for an adult, the give of a shoe and the error of a pose."""
@@ -28,8 +30,6 @@ POINTS_PER_PATCH = 400
 """A patch is measured at about this many points: its area to 0.1 %."""
 LEAST_FACING = 0.2
 """Cosine of the tilt beyond which a patch stands on its edge and has no underside to print with (78°)."""
-STEEPEST_CELL = np.tan(np.radians(60.0))
-"""Slope of the steepest cell that takes a print: more is a wall."""
 NEGLIGIBLE_SHIFT = 0.02
 """Sideways shift of the underside by its height that need not be followed, in cells."""
 FAR = 1e9
@@ -116,7 +116,7 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
         for earlier, frame in zip(sole.patches[:number], flat[:number], strict=True):
             to_earlier = np.linalg.inv(frame) @ flat[number]
             places = points.positions @ to_earlier[:3, :3].T + to_earlier[:3, 3]
-            distance = _Nodes.under(earlier, places[:, 0], places[:, 1]).interpolate(earlier.signed_distance)
+            distance = _Nodes.under(earlier, *places[:, :2].T.astype(np.float32)).interpolate(earlier.signed_distance)
             free = free * (1.0 - _covered(distance, earlier.spacing))
         used = free > 0
         patches.append(PatchPoints(points.positions[used], points.normals[used], free[used]))
@@ -138,7 +138,7 @@ def reach(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
-def point_contact(points: SolePoints, transforms: Array, ground: TerrainTiles) -> PointContact:
+def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> PointContact:
     """Heights of a posed sole's points above the undisturbed ground.
 
     Parameters
@@ -146,16 +146,15 @@ def point_contact(points: SolePoints, transforms: Array, ground: TerrainTiles) -
     points : SolePoints
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
-    ground : TerrainTiles
+    ground : Surface
+        Of all cells that the points lie over, at least.
 
     Returns
     -------
     PointContact
         Points off the ground, over a wall or turned away from the ground have no area.
     """
-    window = Window.around(*reach(points, transforms), ground.cell_size)
-    heights, slope_x, slope_y = ground.slopes(window)
-    bears = _bears(heights, slope_x, slope_y)
+    window, heights, bears = ground.window, ground.heights, ground.bears
     level = bool(bears.all()) and np.ptp(heights) == 0
     clearances, areas = [], []
     for number, patch in enumerate(points.patches):
@@ -171,7 +170,7 @@ def point_contact(points: SolePoints, transforms: Array, ground: TerrainTiles) -
             row = (rotation[:, 1] @ patch.positions.T + place[:, 1:2]) / ground.cell_size - window.row
             i = np.clip(column.astype(int), 0, window.columns - 1)
             j = np.clip(row.astype(int), 0, window.rows - 1)
-            rise = slope_x[j, i] * (column - i - 0.5) + slope_y[j, i] * (row - j - 0.5)
+            rise = ground.slope_x[j, i] * (column - i - 0.5) + ground.slope_y[j, i] * (row - j - 0.5)
             on_ground = bears[j, i]
             height -= np.where(on_ground, heights[j, i] + rise * ground.cell_size, 0.0)
             area *= on_ground
@@ -212,14 +211,13 @@ def contact_window(points: SolePoints, transforms: Array, cell_size: float) -> W
 def cell_coverage(
     sole: Sole,
     transforms: Array,
-    ground: TerrainTiles,
-    window: Window,
+    ground: Surface,
     *,
     lowest: Array,
     sinkage: Array,
     tolerance: float,
-    divisions: int,
-) -> Array:
+    divisions: int = 1,
+) -> Single:
     """Fraction of each cell that is in contact, at each of N steps.
 
     Parameters
@@ -227,10 +225,8 @@ def cell_coverage(
     sole : Sole
     transforms : (N, P, 4, 4) float array
         Poses of the patches.
-    ground : TerrainTiles
-        With cells that are `divisions` times smaller than those of the window.
-    window : Window
-        The cells to look at.
+    ground : Surface
+        With cells that are `divisions` times smaller than those looked for.
     lowest : (N,) float array
         Height of the sole's lowest point above the undisturbed ground [m].
     sinkage : (N,) float array
@@ -244,39 +240,29 @@ def cell_coverage(
     -------
     (N, rows, columns) float array
     """
-    fine = window.refined(divisions)
-    heights, slope_x, slope_y = ground.slopes(fine)
-    bears = _bears(heights, slope_x, slope_y)
-    base = np.where(bears, heights, 0.0)
+    fine = ground.window
+    level = float(np.min(ground.heights, where=ground.bears, initial=FAR))  # 32 bits suffice for what lies above it
+    base = np.where(ground.bears, ground.heights - level, 0.0).astype(np.float32).ravel()
+    above = (lowest + level).astype(float)
     x, y = fine.centres(ground.cell_size)
-    coverage = np.zeros((len(transforms), fine.rows, fine.columns))
+    indices = np.arange(fine.cells).reshape(fine.rows, fine.columns)
+    coverage = np.zeros((len(transforms), fine.cells), np.float32)
     for number, patch in enumerate(sole.patches):
         pose = transforms[:, number]
-        facing = pose[:, 2, 2] >= LEAST_FACING
-        if facing.any():
-            rows, columns = _slices(fine, patch, pose[facing], ground.cell_size)
-            underside, covered = _underside(patch, pose, x[columns], y[rows], ground.cell_size)
-            underside -= base[rows, columns]
-            underside -= lowest[:, None, None]
-            covered *= touching_fraction(underside, sinkage[:, None, None], tolerance)
-            covered[~facing] = 0.0
-            part = coverage[:, rows, columns]
-            np.maximum(part, covered, out=part)
-    if not bears.all():
-        coverage *= bears
+        columns, rows = _columns_and_rows(patch, pose, x, y)
+        cells, underside, covered = _underside(patch, pose, x[columns], y[rows], above, ground.cell_size)
+        cells = indices[rows, columns].ravel()[cells]
+        underside -= base[cells]
+        covered *= touching_fraction(underside, sinkage[:, None].astype(np.float32), tolerance)
+        covered[pose[:, 2, 2] < LEAST_FACING] = 0.0
+        coverage[:, cells] = np.maximum(coverage[:, cells], covered) if number else covered
+    coverage = coverage.reshape(-1, fine.rows, fine.columns)
+    if not ground.bears.all():
+        coverage *= ground.bears
     if divisions > 1:
-        coverage = coverage.reshape(-1, window.rows, divisions, window.columns, divisions).mean(axis=(2, 4))
+        parts = (-1, fine.rows // divisions, divisions, fine.columns // divisions, divisions)
+        coverage = coverage.reshape(parts).mean(axis=(2, 4))
     return coverage
-
-
-def bearing(ground: TerrainTiles, window: Window) -> Array:
-    """1 for cells of a window that can be pressed or raised, 0 for those off the ground or on a wall."""
-    return _bears(*ground.slopes(window)).astype(float)
-
-
-def _bears(heights: Array, slope_x: Array, slope_y: Array) -> Mask:
-    mask: Mask = np.isfinite(heights) & (slope_x**2 + slope_y**2 <= STEEPEST_CELL**2)
-    return mask
 
 
 def _patch_points(patch: SolePatch) -> PatchPoints:
@@ -294,49 +280,69 @@ def _patch_points(patch: SolePatch) -> PatchPoints:
     return PatchPoints(positions, normals, covered[inside] * (patch.area / covered.sum()))
 
 
-def _slices(window: Window, patch: SolePatch, pose: Array, cell_size: float) -> tuple[slice, slice]:
-    """Rows and columns of a window that a patch may cover at any of the steps."""
-    row, column = np.nonzero(patch.signed_distance <= patch.spacing)
-    heights = patch.heights[row, column]
-    x, y = patch.origin[0] + column * patch.spacing, patch.origin[1] + row * patch.spacing
-    low = np.array([x.min(), y.min(), heights.min()])
-    high = np.array([x.max(), y.max(), heights.max()])
-    centre = pose[:, :2, :3] @ ((low + high) / 2) + pose[:, :2, 3]
-    extent = np.abs(pose[:, :2, :3]) @ ((high - low) / 2) + cell_size
-    first = np.floor((centre - extent).min(axis=0) / cell_size).astype(int) - (window.column, window.row)
-    last = np.floor((centre + extent).max(axis=0) / cell_size).astype(int) - (window.column, window.row)
-    return slice(max(0, first[1]), max(0, last[1] + 1)), slice(max(0, first[0]), max(0, last[0] + 1))
+def _underside(
+    patch: SolePatch, pose: Array, x: Array, y: Array, above: Array, cell_size: float
+) -> tuple[NDArray[np.intp], Single, Single]:
+    """The cells that a patch covers at any of N steps, its height over each and the fraction that it covers of each.
 
-
-def _underside(patch: SolePatch, pose: Array, x: Array, y: Array, cell_size: float) -> tuple[Array, Array]:
-    """World height of a patch over cells and the fraction of each that its outline covers, (N, rows, columns)."""
+    Returns
+    -------
+    cells : (C,) int array
+        row·columns + column.
+    underside : (N, C) float array
+        Height above the level `above` (N,) [m].
+    covered : (N, C) float array
+    """
     rotation, place = pose[:, :3, :3], pose[:, :3, 3]
-    facing = np.maximum(rotation[:, 2, 2], LEAST_FACING)
     # x = a·u + b·v + (terms of the height h), solved for the patch's (u, v) first at h = 0, then at the h found there.
     (a, b), (c, d) = rotation[:, 0, :2].T, rotation[:, 1, :2].T
-    inverse = np.array([[d, -b], [-c, a]]) / facing
-    along_x = inverse[:, 0, :, None] * (x - place[:, :1])[None]
-    along_y = inverse[:, 1, :, None] * (y - place[:, 1:2])[None]
+    inverse = np.array([[d, -b], [-c, a]]) / np.maximum(rotation[:, 2, 2], LEAST_FACING)
+    along_x = (inverse[:, 0, :, None] * (x - place[:, :1])).astype(np.float32)
+    along_y = (inverse[:, 1, :, None] * (y - place[:, 1:2])).astype(np.float32)
     u = along_x[0][:, None, :] + along_y[0][:, :, None]
     v = along_x[1][:, None, :] + along_y[1][:, :, None]
-    shift = np.einsum("ijn,nj->in", inverse, rotation[:, :2, 2])
-    if np.abs(shift).max() * np.abs(patch.heights).max() > NEGLIGIBLE_SHIFT * cell_size:
+    shift = np.einsum("ijn,nj->in", inverse, rotation[:, :2, 2]).astype(np.float32)[..., None]
+    sideways = np.abs(shift).max(axis=(1, 2)) * np.abs(patch.heights).max()
+    low, high = _outline_box(patch)
+    slack_u, slack_v = cell_size + sideways
+    near = (u > low[0] - slack_u) & (u < high[0] + slack_u) & (v > low[1] - slack_v) & (v < high[1] + slack_v)
+    cells = np.flatnonzero(near.any(axis=0))
+    u, v = u.reshape(len(pose), -1)[:, cells], v.reshape(len(pose), -1)[:, cells]
+    if sideways.max() > NEGLIGIBLE_SHIFT * cell_size:
         height = _Nodes.under(patch, u, v).interpolate(patch.heights)
-        u -= shift[0][:, None, None] * height
-        v -= shift[1][:, None, None] * height
+        u -= shift[0] * height
+        v -= shift[1] * height
     nodes = _Nodes.under(patch, u, v)
-    distance, slope_u, slope_v = nodes.interpolate_with_slopes(patch.signed_distance, patch.spacing)
-    distance += nodes.beyond * patch.spacing
-    # A tilted patch covers its outline foreshortened: the distance grows that much faster over the ground.
-    slope_x = slope_u * inverse[0, 0][:, None, None] + slope_v * inverse[1, 0][:, None, None]
-    slope_y = slope_u * inverse[0, 1][:, None, None] + slope_v * inverse[1, 1][:, None, None]
-    steepness = np.sqrt(slope_x**2 + slope_y**2)
-    covered = _covered(distance, np.maximum(steepness, 0.5) * cell_size)
-    height = nodes.interpolate(patch.heights) * rotation[:, 2, 2][:, None, None]
-    height += rotation[:, 2, 0][:, None, None] * u
-    height += rotation[:, 2, 1][:, None, None] * v
-    height += place[:, 2][:, None, None]
-    return height, covered
+    distance = nodes.interpolate(patch.signed_distance)
+    distance += nodes.beyond
+    along_u, along_v, along_h = rotation[:, 2].T.astype(np.float32)[..., None]
+    height = nodes.interpolate(patch.heights)
+    height *= along_h
+    height += along_u * u
+    height += along_v * v
+    height += (place[:, 2] - above).astype(np.float32)[:, None]
+    return cells, height, _covered(distance, cell_size)
+
+
+def _outline_box(patch: SolePatch) -> tuple[Array, Array]:
+    """Lower and upper corner (x, y, height) of the underside within a patch's outline, and a node around it."""
+    row, column = np.nonzero(patch.signed_distance <= patch.spacing)
+    x, y = patch.origin[0] + column * patch.spacing, patch.origin[1] + row * patch.spacing
+    points = np.stack([x, y, patch.heights[row, column]])
+    return points.min(axis=1), points.max(axis=1)
+
+
+def _columns_and_rows(patch: SolePatch, pose: Array, x: Array, y: Array) -> tuple[slice, slice]:
+    """The columns at x and the rows at y that a patch may cover at any of the steps, and one around them."""
+    low, high = _outline_box(patch)
+    centre = pose[:, :2, :3] @ ((low + high) / 2) + pose[:, :2, 3]
+    extent = np.abs(pose[:, :2, :3]) @ ((high - low) / 2)
+    first, last = (centre - extent).min(axis=0), (centre + extent).max(axis=0)
+    columns, rows = (
+        slice(max(0, int(np.searchsorted(at, first[k])) - 1), int(np.searchsorted(at, last[k])) + 1)
+        for k, at in enumerate((x, y))
+    )
+    return columns, rows
 
 
 @dataclass(frozen=True)
@@ -344,42 +350,47 @@ class _Nodes:
     """Where places lie between the nodes of a patch's maps."""
 
     index: NDArray[np.intp]
-    u: Array
-    v: Array
+    u: Single
+    v: Single
     columns: int
-    beyond: Array
-    """How far outside the maps [nodes]."""
+    beyond: Single
+    """How far outside the maps [m]."""
 
     @classmethod
-    def under(cls, patch: SolePatch, x: Array, y: Array) -> _Nodes:
+    def under(cls, patch: SolePatch, x: Single, y: Single) -> _Nodes:
         rows, columns = patch.heights.shape
-        u, v = (x - patch.origin[0]) / patch.spacing, (y - patch.origin[1]) / patch.spacing
-        inside_u, inside_v = np.clip(u, 0.0, columns - 1.0), np.clip(v, 0.0, rows - 1.0)
-        beyond = np.abs(u - inside_u) + np.abs(v - inside_v)
-        column = np.minimum(inside_u.astype(np.intp), columns - 2)
-        row = np.minimum(inside_v.astype(np.intp), rows - 2)
-        return cls(row * columns + column, inside_u - column, inside_v - row, columns, beyond)
+        u = (x - np.float32(patch.origin[0])) * np.float32(1 / patch.spacing)
+        v = (y - np.float32(patch.origin[1])) * np.float32(1 / patch.spacing)
+        inside_u = np.minimum(np.maximum(u, np.float32(0)), np.float32(columns - 1))
+        inside_v = np.minimum(np.maximum(v, np.float32(0)), np.float32(rows - 1))
+        u -= inside_u
+        v -= inside_v
+        beyond = (np.abs(u, out=u) + np.abs(v, out=v)) * np.float32(patch.spacing)
+        column = np.minimum(inside_u.astype(np.int32), columns - 2)
+        row = np.minimum(inside_v.astype(np.int32), rows - 2)
+        inside_u -= column.astype(np.float32)
+        inside_v -= row.astype(np.float32)
+        row *= columns
+        row += column
+        return cls(row.astype(np.intp), inside_u, inside_v, columns, beyond)
 
-    def interpolate(self, values: Array) -> Array:
-        low, high = self._along_u(values)
-        return low + (high - low) * self.v
+    def interpolate(self, values: Array) -> Single:
+        flat = values.ravel().astype(np.float32)
+        low = self._between(flat)
+        high = self._between(flat[self.columns :])
+        high -= low
+        high *= self.v
+        high += low
+        return high
 
-    def interpolate_with_slopes(self, values: Array, spacing: float) -> tuple[Array, Array, Array]:
-        flat = values.ravel()
-        near, far = flat[self.index], flat[self.index + 1]
-        near_up, far_up = flat[self.index + self.columns], flat[self.index + self.columns + 1]
-        slope_low, slope_high = far - near, far_up - near_up
-        low, high = near + slope_low * self.u, near_up + slope_high * self.u
-        slope_u = (slope_low + (slope_high - slope_low) * self.v) / spacing
-        return low + (high - low) * self.v, slope_u, (high - low) / spacing
-
-    def _along_u(self, values: Array) -> tuple[Array, Array]:
-        flat = values.ravel()
-        near, near_up = flat[self.index], flat[self.index + self.columns]
-        low = near + (flat[self.index + 1] - near) * self.u
-        return low, near_up + (flat[self.index + self.columns + 1] - near_up) * self.u
+    def _between(self, flat: Single) -> Single:
+        near, far = flat.take(self.index), flat[1:].take(self.index)
+        far -= near
+        far *= self.u
+        far += near
+        return far
 
 
-def _covered(distance: Array, size: Array | float) -> Array:
+def _covered(distance: Any, size: float) -> Any:
     """Fraction of a cell of this size that lies inside an outline at a signed distance from its centre."""
-    return np.clip(0.5 - distance / size, 0.0, 1.0)
+    return np.minimum(np.maximum(0.5 - distance * (1.0 / size), 0.0), 1.0)

@@ -26,14 +26,14 @@ from .deformation import (
 from .errors import InputError
 from .footprints import Footprint, FootprintRecorder, quantised
 from .forces import ContactForces, impulse_forces, whole_body_forces
-from .heightfield import HeightField, Terrain, TerrainTiles, Window
-from .imprint import SolePoints, bearing, cell_coverage, centroid, contact_window, point_contact, sole_points
+from .heightfield import HeightField, Surface, Terrain, TerrainTiles, Window
+from .imprint import SolePoints, cell_coverage, centroid, contact_window, point_contact, sole_points
 from .motion import CharacterMotion, SoleMotion, steps_per_frame
 
 Array = NDArray[np.float64]
 
-STEPS_AT_ONCE = 64
-"""Steps of one contact that are laid out in one go: enough to make the cost of a call small, few enough for memory."""
+STEPS_AT_ONCE = 128
+"""Steps of one contact that are laid out in one go: about one stance of a walk."""
 LARGEST_SPREAD = 4
 """A sliding sole is laid out in fewer steps, so that its window stays within so many times the sole's own."""
 
@@ -161,7 +161,7 @@ class _Imprints:
 
     first: int
     window: Window
-    coverage: Array
+    coverage: NDArray[np.float32]
     rim: Array
     target: Array
 
@@ -197,19 +197,23 @@ class _Contact:
         """The imprints of these steps, laid out together with as many later ones as pays."""
         if self._imprints is None or self._imprints.end < end:
             ahead = press.steps_per_frame * max(1, STEPS_AT_ONCE // press.steps_per_frame)
-            allowed = LARGEST_SPREAD * contact_window(self.points, self.poses(start, start + 1), press.cell_size).cells
             last = min(self.end, end - press.steps_per_frame + ahead)
-            while last > end and contact_window(self.points, self.poses(start, last), press.cell_size).cells > allowed:
-                frames_ahead = (last - end) // press.steps_per_frame
-                last = end + frames_ahead // 2 * press.steps_per_frame
-            self._imprints = self._lay_out(start, last, press)
+            allowed = LARGEST_SPREAD * contact_window(self.points, self.poses(start, start + 1), press.cell_size).cells
+            window = contact_window(self.points, self.poses(start, last), press.cell_size)
+            while last > end and window.cells > allowed:
+                last = end + (last - end) // (2 * press.steps_per_frame) * press.steps_per_frame
+                window = contact_window(self.points, self.poses(start, last), press.cell_size)
+            self._imprints = self._lay_out(start, last, window, press)
         return self._imprints
 
-    def _lay_out(self, start: int, end: int, press: _Press) -> _Imprints:
+    def _lay_out(self, start: int, end: int, window: Window, press: _Press) -> _Imprints:
         poses, points = self.poses(start, end), self.points
         force = self.force[start - self.first : end - self.first]
+        reach = press.material.rim_reach / press.cell_size
+        window = window.expanded(max(1, int(reach + 1e-6)))
         divisions = points.cell_divisions(press.cell_size)
-        ground = press.terrain_tiles(divisions)
+        cells = press.surface(window)
+        ground = press.surface(window, divisions) if divisions > 1 else cells
         over_ground = point_contact(points, poses, ground)
         upright = self.loads.contacts.normal[start - self.offset : end - self.offset, self.sole, 2]
         area = over_ground.area / upright[:, None]
@@ -227,20 +231,16 @@ class _Contact:
         touching = area * touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
         self._moment += force @ centroid(points, poses, touching)
         self._load += force.sum()
-        reach = press.material.rim_reach / press.cell_size
-        window = contact_window(points, poses, press.cell_size).expanded(max(1, int(reach + 1e-6)))
         coverage = cell_coverage(
             self.motion.sole,
             poses,
             ground,
-            window,
             lowest=over_ground.lowest,
             sinkage=sinking.sinkage,
             tolerance=points.tolerance,
             divisions=divisions,
         )
-        rim = rim_weights(coverage, reach, bearing(press.terrain_tiles(1), window))
-        return _Imprints(start, window, coverage, rim, sinking.target)
+        return _Imprints(start, window, coverage, rim_weights(coverage, reach, cells.bears), sinking.target)
 
     def footprint(self, frames: Array) -> Footprint:
         """The record of what was pressed."""
@@ -284,11 +284,11 @@ class _Press:
     def cell_size(self) -> float:
         return self.ground.cell_size
 
-    def terrain_tiles(self, divisions: int) -> TerrainTiles:
-        """The undisturbed ground in cells divided so many times along each side."""
+    def surface(self, window: Window, divisions: int = 1) -> Surface:
+        """The undisturbed ground under a window, its cells divided in so many parts along each side."""
         if divisions not in self._tiles:
             self._tiles[divisions] = TerrainTiles(self.terrain, self.cell_size / divisions)
-        return self._tiles[divisions]
+        return self._tiles[divisions].surface(window.refined(divisions))
 
     def advance(self, contacts: Sequence[_Contact], start: int, end: int, frame: float) -> tuple[Window, ...]:
         """Press the steps from start to before end, all contacts of a step before the next where they share ground."""

@@ -127,12 +127,12 @@ def test_the_rim_is_uniform_over_free_cells_within_reach():
 def test_no_rim_rises_where_there_is_no_ground():
     contact = np.zeros((2, 9, 9))
     contact[:, 4, 4] = 1.0
-    room = np.zeros((9, 9))
-    room[:, :4] = 1.0
+    room = np.zeros((9, 9), bool)
+    room[:, :4] = True
     weights = rim_weights(contact, 2.0, room)
     assert weights.sum(axis=(1, 2)) == pytest.approx(1.0)
     assert not weights[:, :, 4:].any()
-    assert not rim_weights(contact, 2.0, np.zeros((9, 9))).any()
+    assert not rim_weights(contact, 2.0, np.zeros((9, 9), bool)).any()
 
 
 def test_touching_fades_over_one_tolerance_in_the_middle_of_which_it_is_half():

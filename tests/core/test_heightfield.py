@@ -110,11 +110,19 @@ def test_the_terrain_is_looked_up_once_per_tile():
 
 def test_slopes_are_those_of_the_terrain_and_level_at_the_brink_of_a_gap():
     tiles = TerrainTiles(Counting(lambda x, y: np.where(x > 0.1, np.nan, 0.3 * x - 0.2 * y)), 0.01)
-    heights, slope_x, slope_y = tiles.slopes(Window(0, 0, 20, 8))
-    ground = np.isfinite(heights)
-    assert ground.sum(axis=1) == pytest.approx(10)
-    assert slope_x[ground] == pytest.approx(0.3)
-    assert slope_y[ground] == pytest.approx(-0.2)
+    surface = tiles.surface(Window(0, 0, 20, 8))
+    assert surface.bears.sum(axis=1) == pytest.approx(10)
+    assert surface.slope_x[surface.bears] == pytest.approx(0.3)
+    assert surface.slope_y[surface.bears] == pytest.approx(-0.2)
+
+
+@pytest.mark.parametrize("steepness", [3.0, 6.0, 1e6])
+def test_a_wall_takes_no_print_and_the_level_ground_on_both_sides_of_it_does(steepness):
+    tiles = TerrainTiles(Counting(lambda x, y: np.clip(steepness * x, 0.0, 0.5) + 0 * y), 0.01)
+    window = Window(-40, 0, 80, 5)
+    height = np.clip(steepness * window.centres(0.01)[0], 0.0, 0.5)
+    level = (height == 0) | (height == 0.5)
+    assert (tiles.surface(window).bears == level).all()
 
 
 def test_a_flat_terrain_is_flat_everywhere():
