@@ -24,6 +24,8 @@ FREE_FALL = 0.5
 hangs or flies by other means, and its motion says nothing about free fall."""
 LIGHT = 0.2
 """Below this total force the point of action is not known, in body weights."""
+STEADY_ENDS = 0.04
+"""How much a force of 1 body weight is expected at both ends of the action, where half of the evidence is missing."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,9 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
             points = fitted_to_free_fall(points, acceleration[falling], gravity)
 
     _, rate, _ = smooth_path(_angular_momentum(points, step), step, cutoff, sampled=at_frame)
-    centre, _, acceleration = smooth_path(points.centre, step, cutoff, sampled=at_frame, falling=falling, fall=gravity)
+    centre, _, acceleration = smooth_path(
+        points.centre, step, cutoff, sampled=at_frame, falling=falling, fall=gravity, steady_ends=STEADY_ENDS
+    )
     force = acceleration / gravity + (0.0, 0.0, 1.0)
     if falling is not None:
         force[falling] = 0.0

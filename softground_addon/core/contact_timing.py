@@ -31,6 +31,13 @@ SHARE_MEMORY = 0.25
 SHORTEST_OVERLAP = 0.1
 """Shortest double support, in the same unit (30 ms)."""
 
+LANDING_DEVIATION = 0.07
+"""Standard deviation of the time of a landing after flight as heights and speeds tell it, in the same unit (20 ms)."""
+ONSET_DEVIATION = 0.035
+"""Standard deviation of that time as the rise of the total force tells it, in the same unit (10 ms)."""
+QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
+"""Phases at which a sine has a quarter and a half of its peak."""
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -72,7 +79,43 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         strike, leave = _fit_overlap(change, pressure, body, unit)
         touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
         touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
+    for first, sole in _landings(touching):
+        onset = _onset(body.force[:, 2], first, round(SEARCH * unit))
+        weight = LANDING_DEVIATION**2 / (LANDING_DEVIATION**2 + ONSET_DEVIATION**2)
+        strike = round(first + weight * (onset - first))
+        touching[min(strike, first) : max(strike, first), sole] = strike < first
     return dataclasses.replace(contacts, touching=touching)
+
+
+def _landings(touching: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First steps of contacts that end a flight, with their soles."""
+    grounded, _ = runs(touching.any(axis=1))
+    return [(int(first), int(sole)) for first in grounded[grounded > 0] for sole in np.flatnonzero(touching[first])]
+
+
+def _onset(force: Array, first: int, search: int) -> float:
+    """Step at which the vertical force (N,) [body weights] starts to rise, near the landing at step `first`.
+
+    The low-pass leads the force into the flight; its steep flank stays in place. The flank is that of a half sine, as
+    running and landing show: from one half of the peak through one quarter to 0 in known proportion.
+    """
+    window = force[max(first - search, 0) : first + search]
+    crest = int(window.argmax())
+    peak = window[crest]
+    quarter, half = (_last_below(window[: crest + 1], level * peak) for level in (0.25, 0.5))
+    if peak < 1.0 or quarter < 0 or window[: crest + 1].min() > 0.25 * peak:
+        return float(first)
+    onset = quarter - (half - quarter) * QUARTER_SINE / (HALF_SINE - QUARTER_SINE)
+    return max(first - search, 0) + float(np.clip(onset, 0, len(window)))
+
+
+def _last_below(rising: Array, level: float) -> float:
+    """Where a curve crosses a level for the last time, in fractional samples; -1 where it never is below it."""
+    below = np.flatnonzero(rising < level)
+    if not len(below) or below[-1] == len(rising) - 1:
+        return -1.0
+    i = below[-1]
+    return float(i + (level - rising[i]) / (rising[i + 1] - rising[i]))
 
 
 def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:

@@ -32,7 +32,7 @@ foot that swings overtakes the body, the foot that stands falls behind it."""
 LEAVE_SPEED = 1.5
 """A touching sole faster than this many times that speed has left."""
 LANDED_HEIGHT = 0.01
-"""A sole has landed when it is this near to where it will stand, in leg lengths."""
+"""A sole has landed when one of its landmarks is this near to where it will stand, in leg lengths."""
 REST_SPEED = 0.15
 """A sole slower than this may be standing: such samples tell the float, in sqrt(gravity·leg length)."""
 FLOAT_PERCENTILE = 10.0
@@ -230,10 +230,10 @@ def _detect(track: _Track, drift: Array, limit: Array, motion: CharacterMotion) 
     )
     unit = np.sqrt(leg / motion.gravity) / motion.time_step
     touching = close_short(touching, round(SHORTEST_CONTACT * unit))
-    return _sharpened(touching, track, height, motion), offset
+    return _sharpened(touching, track, motion), offset
 
 
-def _sharpened(touching: Mask, track: _Track, height: Array, motion: CharacterMotion) -> Mask:
+def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
     """Contacts from landing to toe-off: later starts, and ends where the last landmark accelerates upward most."""
     unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
     search = round(EDGE_SEARCH * unit)
@@ -244,10 +244,11 @@ def _sharpened(touching: Mask, track: _Track, height: Array, motion: CharacterMo
     for first, last in zip(*runs(touching), strict=True):
         start, end = first, last
         if first > 0:
-            standing = np.percentile(height[first:last], 25)
-            start += int(np.argmax(height[first:last] < standing + LANDED_HEIGHT))
+            standing = np.percentile(rise[first:last], FLOAT_PERCENTILE, axis=0)
+            landed = (rise[first:last] < standing + LANDED_HEIGHT * motion.leg_length).any(axis=1)
+            start += int(landed.argmax())
         if last < len(touching):
-            landmark = track.rise[last].argmin()
+            landmark = rise[last].argmin()
             begin = max(last - search, start + 1)
             end = begin + int(np.argmax(acceleration[begin : last + search, landmark]))
         sharp[start:end] = True

@@ -28,6 +28,7 @@ def smooth_path(
     sampled: Mask | None = None,
     falling: Mask | None = None,
     fall: float = 0.0,
+    steady_ends: float = 0.0,
 ) -> tuple[Array, Array, Array]:
     """Low-passed path and its first two derivatives.
 
@@ -44,6 +45,8 @@ def smooth_path(
         Steps at which the second derivative is known: 0 but for the last column, where it is -`fall`.
     fall : float
         [unit of path/s²]
+    steady_ends : float
+        How much a second derivative of 0 is expected at both ends, where the samples lie on one side only.
 
     Returns
     -------
@@ -59,6 +62,9 @@ def smooth_path(
     band = np.zeros((_ORDER + 1, count))
     band[0] = weight
     _add_difference(band, np.full(count - _ORDER, density / scale ** (2 * _ORDER)), _ORDER)
+    ends = np.zeros(count - 2)
+    ends[[0, -1]] = steady_ends * density / (scale**4 * cutoff * step)
+    _add_difference(band, ends, 2)
     right = weight[:, None] * path
     if falling is not None:
         rows = np.where(falling[1:-1], _FALL_WEIGHT * density / scale**4, 0.0)
