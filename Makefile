@@ -7,7 +7,7 @@ VENV := .venv$(if $(filter-out 4.5.15,$(BPY)),-$(BPY))
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready-$(BPY)
 
-.PHONY: test slow bench lint types clean
+.PHONY: test slow bench validate lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -22,6 +22,9 @@ slow: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m pytest -s -m benchmark $(TESTS)
+
+validate: $(READY)
+	$(BIN)/python -m tests.validation.validate $(DATA)
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -1,0 +1,51 @@
+"""Measured and estimated forces over time, in the style of the paper's Fig. 6."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+from tests.validation.trials import Trial
+
+Array = NDArray[np.float64]
+
+MEASURED = {"color": "black", "linewidth": 2.0, "label": "force plates"}
+STYLES = {
+    "WHOLE_BODY": {"color": "tab:red", "linewidth": 1.6, "label": "whole body"},
+    "IMPULSE": {"color": "tab:blue", "linewidth": 1.2, "linestyle": "--", "label": "impulse (the paper)"},
+}
+LONGEST = 2.6
+"""Seconds of a trial that a plot shows: a few strides, so that one can see their shape."""
+
+
+def plot_trial(trial: Trial, path: str, curves: dict[str, Array], scored: Array, file: Path) -> None:
+    """Vertical force per foot and in total: plates, whole-body model, and the impulse model nearest to them."""
+    weight = trial.mass * 9.81
+    time = np.arange(len(trial.forces)) / trial.rate
+    shown = time <= LONGEST
+    impulse = min(
+        (name for name in curves if name.startswith("IMPULSE")),
+        key=lambda name: float(((curves[name] - trial.forces)[scored, :, 2] ** 2).mean()),
+    )
+    figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True, constrained_layout=True)
+    pick = {"left foot": lambda f: f[:, 0, 2], "right foot": lambda f: f[:, 1, 2], "both": lambda f: f[..., 2].sum(1)}
+    for axis, (what, vertical) in zip(axes, pick.items(), strict=True):
+        axis.plot(time[shown], vertical(trial.forces)[shown] / weight, **MEASURED)
+        for name in (impulse, "WHOLE_BODY"):
+            style = STYLES[name.split()[0]]
+            axis.plot(time[shown], vertical(curves[name])[shown] / weight, **style)
+        axis.set_ylabel(f"{what}\nvertical force [body weights]")
+        axis.grid(alpha=0.3)
+        axis.set_ylim(bottom=0)
+    source = "joint centres" if path == "joints" else "BVH through Blender"
+    axes[0].set_title(f"{trial.name}, from {source}; {impulse.replace('IMPULSE', 'impulse model at')} s")
+    axes[0].legend(loc="upper right", ncols=3, fontsize="small")
+    axes[-1].set_xlabel("time [s]")
+    figure.savefig(file, dpi=110)
+    plt.close(figure)

@@ -1,0 +1,129 @@
+"""How near estimated forces come to the plates'."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softground_addon.core.contacts import runs
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LOADED = 20.0
+"""A plate is loaded above this vertical force [N]."""
+EVENT_REACH = 0.15
+"""An estimated event farther than this from the measured one is another event [s]."""
+EDGE = 0.06
+"""Heel strike and toe-off of the motion are this uncertain [s]: no disagreement within it."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of one model on one trial; see `score`."""
+
+    rms_bw_left: float
+    rms_bw_right: float
+    rms_bw_total: float
+    peak_ratio: float
+    heel_strike_ms: float
+    toe_off_ms: float
+    rms_bw_anterior_posterior: float
+    mean_cycle_bw: float
+    frames_scored: int
+
+
+def plates_saw_everything(measured: Array, touching: Mask, rate: float) -> Mask:
+    """Frames at which every foot that the motion shows on the ground stood on a plate, and no other plate was loaded.
+
+    On a walkway with a few plates most steps miss them: there the measured force is 0 and the true one is not. A
+    foot counts as on the ground where the motion shows it for the whole of ±60 ms, and as off it likewise.
+
+    Parameters
+    ----------
+    measured : (F, 2) float array
+        Vertical plate forces [N].
+    touching : (F, 2) bool array
+        Whether heights and speeds show the foot on the ground; no force has a part in that.
+    rate : float
+        [Hz]
+    """
+    reach = max(1, round(EDGE * rate))
+    window = np.lib.stride_tricks.sliding_window_view
+    padded = np.pad(touching, ((reach, reach), (0, 0)), mode="edge")
+    surely_on = window(padded, 2 * reach + 1, axis=0).all(axis=-1)
+    surely_off = window(~padded, 2 * reach + 1, axis=0).all(axis=-1)
+    loaded = measured > LOADED
+    return ~((surely_on & ~loaded) | (surely_off & loaded)).any(axis=1)
+
+
+def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rate: float) -> Score:
+    """Compare forces on the left and the right foot.
+
+    Parameters
+    ----------
+    estimated, measured : (F, 2, 3) float array
+        [N]; X is the direction of progress.
+    scored : (F,) bool array
+        Frames that count, from `plates_saw_everything`.
+    weight : float
+        Body weight [N].
+    rate : float
+        [Hz]
+    """
+    error = (estimated - measured) / weight
+    strikes, leaves = _timing_errors(estimated[..., 2], measured[..., 2], scored, rate)
+    total = estimated[..., 2].sum(axis=1)
+    return Score(
+        rms_bw_left=_rms(error[scored, 0, 2]),
+        rms_bw_right=_rms(error[scored, 1, 2]),
+        rms_bw_total=_rms(error[scored, :, 2].sum(axis=1)),
+        peak_ratio=float(estimated[scored, :, 2].max() / measured[scored, :, 2].max()),
+        heel_strike_ms=_mean_absolute(strikes) * 1e3,
+        toe_off_ms=_mean_absolute(leaves) * 1e3,
+        rms_bw_anterior_posterior=_rms(error[scored, :, 0].sum(axis=1)),
+        mean_cycle_bw=_mean_over_cycles(total, measured[..., 2]) / weight,
+        frames_scored=int(scored.sum()),
+    )
+
+
+def crossings(force: Array) -> tuple[Array, Array]:
+    """Fractional frames at which a force (F,) rises above `LOADED`, and falls below it."""
+    first, last = runs(force > LOADED)
+    first, last = first[first > 0], last[last < len(force)]
+
+    def between(frame: NDArray[np.intp]) -> Array:
+        return frame - 1 + (LOADED - force[frame - 1]) / (force[frame] - force[frame - 1])
+
+    return between(first), between(last)
+
+
+def _timing_errors(estimated: Array, measured: Array, scored: Mask, rate: float) -> tuple[Array, Array]:
+    """Errors of heel strike and toe-off [s]; an event that the estimate misses counts `EVENT_REACH`."""
+    errors: tuple[list[float], list[float]] = ([], [])
+    for foot in range(measured.shape[1]):
+        events = zip(crossings(measured[:, foot]), crossings(estimated[:, foot]), errors, strict=True)
+        for true, found, collected in events:
+            for event in true[scored[np.round(true).astype(int)]]:
+                nearest = np.abs(found - event).min(initial=np.inf) / rate
+                collected.append(min(nearest, EVENT_REACH))
+    return np.array(errors[0]), np.array(errors[1])
+
+
+def _mean_over_cycles(total: Array, measured: Array) -> float:
+    """Mean of the total force from the first to the last strike of the foot that strikes most often."""
+    strikes = max((crossings(measured[:, foot])[0] for foot in range(measured.shape[1])), key=len)
+    if len(strikes) < 2:
+        return float(total.mean())
+    first, last = np.round(strikes[[0, -1]]).astype(int)
+    return float(total[first:last].mean())
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt((error**2).mean()))
+
+
+def _mean_absolute(error: Array) -> float:
+    return float(np.abs(error).mean()) if len(error) else 0.0

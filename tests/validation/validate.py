@@ -1,0 +1,103 @@
+"""Both force models against force plates: `python -m tests.validation.validate DIR` prints a table.
+
+Every trial of DIR (three files each, see `trials.read_trial`) is estimated twice: from its joint centres, and from
+its BVH through Blender with the automatic set-up. Writes build/validation.json and one plot for each trial and path.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softground_addon.core.contacts import detect_contacts
+from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.motion import CharacterMotion
+from softground_addon.core.simulation import ForceModel, estimate_loads
+from tests.validation.plots import plot_trial
+from tests.validation.scoring import plates_saw_everything, score
+from tests.validation.through_blender import motion_of_bvh
+from tests.validation.trials import Trial, motion_of_trial, read_trial
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.81
+CHARACTERISTIC_TIMES = (0.05, 0.1, 0.15, 0.2)
+"""Ground times at which the impulse model is run: those of the presets [s]."""
+COLUMNS = {
+    "trial": "{:<18}",
+    "path": "{:<7}",
+    "model": "{:<17}",
+    "rms_bw_left": "{:>7.3f}",
+    "rms_bw_right": "{:>7.3f}",
+    "rms_bw_total": "{:>7.3f}",
+    "peak_ratio": "{:>7.2f}",
+    "heel_strike_ms": "{:>7.1f}",
+    "toe_off_ms": "{:>7.1f}",
+    "rms_bw_anterior_posterior": "{:>7.3f}",
+    "mean_cycle_bw": "{:>7.3f}",
+    "frames_scored": "{:>7d}",
+}
+HEADINGS = ("trial", "path", "model", "left", "right", "total", "peak", "HS ms", "TO ms", "AP", "mean", "frames")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("directory", type=Path, help="folder of trials: NAME.csv, NAME.json, NAME.bvh")
+    parser.add_argument("--output", type=Path, default=Path("build"), help="folder for validation.json and the plots")
+    options = parser.parse_args()
+    trials = [read_trial(csv) for csv in sorted(options.directory.glob("*.csv"))]
+    if not trials:
+        parser.error(f"{options.directory} holds no trial: give a folder with NAME.csv, NAME.json and NAME.bvh files")
+    options.output.mkdir(parents=True, exist_ok=True)
+    rows = [row for trial in trials for row in validate(trial, options.output)]
+    (options.output / "validation.json").write_text(json.dumps(rows, indent=1))
+    print_table(rows)
+
+
+def validate(trial: Trial, output: Path) -> Iterator[dict[str, object]]:
+    """Rows of the table for one trial, for each path and model."""
+    for path, motion in motions_of(trial):
+        touching = detect_contacts(motion, FlatTerrain()).touching
+        scored = plates_saw_everything(trial.forces[..., 2], touching, trial.rate)
+        curves = dict(estimates(motion))
+        for model, forces in curves.items():
+            result = score(forces, trial.forces, scored, weight=trial.mass * GRAVITY, rate=trial.rate)
+            yield {"trial": trial.name, "path": path, "model": model, **dataclasses.asdict(result)}
+        plot_trial(trial, path, curves, scored, output / f"{trial.name}_{path}.png")
+
+
+def motions_of(trial: Trial) -> Iterator[tuple[str, CharacterMotion]]:
+    """The trial's motion, from its joint centres and through Blender, on the frames of the plates."""
+    yield "joints", motion_of_trial(trial)
+    if trial.bvh.exists():
+        yield "bvh", motion_of_bvh(trial.bvh, mass=trial.mass, rate=trial.rate)
+
+
+def estimates(motion: CharacterMotion) -> Iterator[tuple[str, Array]]:
+    """Forces of each model at the motion's frames, (F, 2, 3) [N], left foot first."""
+    models: list[tuple[str, ForceModel, float]] = [("WHOLE_BODY", "WHOLE_BODY", CHARACTERISTIC_TIMES[0])]
+    models += [(f"IMPULSE tau={tau:.2f}", "IMPULSE", tau) for tau in CHARACTERISTIC_TIMES]
+    order = [[sole.sole.side for sole in motion.soles].index(side) for side in "LR"]
+    for name, model, tau in models:
+        material = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=tau)
+        loads = estimate_loads(motion, FlatTerrain(), force_model=model, material=material)
+        steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
+        yield name, loads.forces.forces[::steps, order]
+
+
+def print_table(rows: list[dict[str, object]]) -> None:
+    """Errors in body weights (vertical, and AP: along the progress), of timing in ms."""
+    print("{:<18} {:<7} {:<17} ".format(*HEADINGS[:3]) + " ".join(f"{heading:>7}" for heading in HEADINGS[3:]))
+    for row in rows:
+        print(" ".join(form.format(row[key]) for key, form in COLUMNS.items()))
+
+
+if __name__ == "__main__":
+    main()
