@@ -261,7 +261,7 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
     rest = _rest_positions(mesh)
     if REST not in mesh.attributes:
         _add_attribute(mesh, REST, "FLOAT_VECTOR").data.foreach_set("vector", rest.ravel())
-    up = np.array(ground.matrix_world.to_3x3().inverted() @ Vector((0.0, 0.0, 1.0))) / unit_scale
+    up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
     raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
     display[index] += (pressed.display[:, None] * up).astype(np.float32)
@@ -283,6 +283,11 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
         attribute.data.foreach_set("value", whole)
     mesh[RECORD] = record
     _write_positions(mesh, raw)
+
+
+def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """World up in the ground's own space and units, of the length of one metre, (3,)."""
+    return np.array(ground.matrix_world.to_3x3().inverted() @ Vector((0.0, 0.0, 1.0))) / unit_scale
 
 
 def restore(ground: bpy.types.Object) -> None:

@@ -1,0 +1,249 @@
+"""Playing a bake with native attributes and nodes, against the record put together frame by frame."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import ground_mesh, playback, playback_nodes
+from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.histories import histories
+from softground_addon.core.pressed_ground import PressedGround
+from softground_addon.core.ramps import TOLERANCE
+from tests.core.walkers import pressed, walk
+
+SAND = GroundMaterial(330e3, 0.45, 0.1, blur_sigma=0.01)
+FRAMES = (1, 9, 23, 24, 38, 52, 77, 200)
+
+
+def ground_object(scene, spacing=0.02, matrix=None):
+    """A grid around the walk, 2.8 by 1 m."""
+    x, y = np.arange(-0.4, 2.4, spacing), np.arange(-0.5, 0.5, spacing)
+    position = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))], axis=-1)
+    corner = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
+    quads = corner[:, None] + np.array([0, 1, len(x) + 1, len(x)])
+    points = position.reshape(-1, 3)
+    if matrix is not None:
+        inverse = np.linalg.inv(matrix)
+        points = points @ inverse[:3, :3].T + inverse[:3, 3]
+    mesh = bpy.data.meshes.new("Ground")
+    mesh.from_pydata(points.tolist(), [], quads.tolist())
+    ground = bpy.data.objects.new("Ground", mesh)
+    if matrix is not None:
+        ground.matrix_world = matrix.T
+    scene.collection.objects.link(ground)
+    scene.view_layers[0].update()
+    return ground
+
+
+def bake_onto(ground, footprints, material=SAND, unit_scale=1.0):
+    """What the bake job does once the record is there."""
+    surface = ground_mesh.undisturbed_surface(ground, unit_scale)
+    pressed_ground = PressedGround.at(
+        footprints, frame=1e9, frame_rate=30.0, cell_size=0.01, blur_sigma=material.blur_sigma
+    )
+    index = np.flatnonzero(pressed_ground.covers(*surface.vertices[:, :2].T))
+    place = surface.vertices[index, :2].T
+    ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale)
+    up = ground_mesh.up_of(ground, unit_scale)
+    playback.install(
+        ground, index, histories(footprints, *place, blur_sigma=material.blur_sigma), up=up, frame_rate=30.0
+    )
+    return surface
+
+
+def evaluated(ground, scene, frame):
+    scene.frame_set(int(frame), subframe=float(frame % 1))
+    return ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+
+
+def world_positions(evaluated_object, unit_scale=1.0):
+    mesh = evaluated_object.data
+    position = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", position)
+    matrix = np.array(evaluated_object.matrix_world)
+    return (position.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]) * unit_scale
+
+
+def floats(evaluated_object, name):
+    values = np.empty(len(evaluated_object.data.vertices), dtype=np.float32)
+    evaluated_object.data.attributes[name].data.foreach_get("value", values)
+    return values
+
+
+def recorded(footprints, frame, surface, material=SAND):
+    ground = PressedGround.at(footprints, frame=frame, frame_rate=30.0, cell_size=0.01, blur_sigma=material.blur_sigma)
+    return ground.sample(*surface.vertices[:, :2].T)
+
+
+@pytest.fixture(scope="module")
+def footprints():
+    return pressed(walk(steps=4), SAND)[1]
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = 30
+    return bpy.context.scene
+
+
+def test_heights_are_those_of_the_record_in_any_order_and_between_frames(scene, footprints):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    for frame in (52, 9, 200, 1, 23.25, 77, 24, 38.5):
+        moved = world_positions(evaluated(ground, scene, frame)) - surface.vertices
+        assert np.abs(moved[:, 2] - recorded(footprints, frame, surface).display).max() <= TOLERANCE + 1e-6
+        assert np.abs(moved[:, :2]).max() < 1e-6
+
+
+def test_shading_attributes_follow_the_same_time(scene, footprints):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    for frame in FRAMES:
+        shown, sample = evaluated(ground, scene, frame), recorded(footprints, frame, surface)
+        assert np.abs(floats(shown, "softground_compression") - sample.compression).max() <= 1e-3
+        assert np.abs(floats(shown, "softground_rim") - sample.rim).max() <= 1e-3 + TOLERANCE
+        np.testing.assert_allclose(floats(shown, "softground_age"), sample.age, atol=1e-5)
+
+
+def test_pressure_is_there_only_during_the_contact(scene, footprints):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    for frame in FRAMES:
+        pressure, age = (
+            floats(evaluated(ground, scene, frame), "softground_pressure"),
+            recorded(footprints, frame, surface).age,
+        )
+        assert (pressure[age != 0] == 0).all()
+    print_ = footprints[1]
+    middle = (print_.start_frame + print_.end_frame) / 2
+    pressure = floats(evaluated(ground, scene, middle), "softground_pressure")
+    assert pressure.max() == pytest.approx(print_.peak_force_n / print_.area_m2, rel=1e-4)
+
+
+def test_without_the_modifier_the_finished_ground_stands_there(scene, footprints):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    playback.modifier_of(ground).show_viewport = False
+    moved = world_positions(evaluated(ground, scene, 1)) - surface.vertices
+    np.testing.assert_allclose(moved[:, 2], recorded(footprints, 1e9, surface).display, atol=1e-6)
+
+
+@pytest.mark.parametrize("key_value", [0.0, 0.3, 1.0])
+def test_the_shape_key_does_not_move_the_ground_twice(scene, footprints, key_value):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    ground.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY].value = key_value
+    moved = world_positions(evaluated(ground, scene, 52)) - surface.vertices
+    touched = recorded(footprints, 1e9, surface).compression > 1e-5
+    difference = moved[:, 2] - recorded(footprints, 52, surface).display
+    assert np.abs(difference[touched]).max() <= TOLERANCE + 1e-6
+
+
+def tilted_and_scaled():
+    turn = np.radians(25)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]]) @ np.diag(
+        [2.0, 0.5, -3.0]
+    )
+    matrix[:3, 3] = (1.0, -2.0, 0.5)
+    return matrix
+
+
+@pytest.mark.parametrize("unit_scale", [1.0, 0.01])
+def test_a_tilted_scaled_mirrored_ground_moves_along_world_z(scene, footprints, unit_scale):
+    matrix = tilted_and_scaled()
+    matrix[:3] /= unit_scale
+    ground = ground_object(scene, matrix=matrix)
+    surface = bake_onto(ground, footprints, unit_scale=unit_scale)
+    for frame in (23, 52):
+        moved = world_positions(evaluated(ground, scene, frame), unit_scale) - surface.vertices
+        assert np.abs(moved[:, 2] - recorded(footprints, frame, surface).display).max() <= TOLERANCE + 5e-6
+        assert np.abs(moved[:, :2]).max() < 5e-6
+
+
+def test_the_users_own_modifiers_work_on_the_played_ground(scene, footprints):
+    ground = ground_object(scene)
+    lift = ground.modifiers.new("Lift", "DISPLACE")
+    lift.strength, lift.mid_level, lift.direction = 1.5, 0.0, "Z"
+    surface = bake_onto(ground, footprints)
+    assert ground.modifiers[0] == playback.modifier_of(ground)
+    moved = world_positions(evaluated(ground, scene, 52))[:, 2] - 1.5
+    assert np.abs(moved - recorded(footprints, 52, surface).display).max() <= TOLERANCE + 1e-6
+
+
+def test_a_second_bake_replaces_the_first(scene, footprints):
+    ground = ground_object(scene)
+    bake_onto(ground, footprints)
+    names = {attribute.name for attribute in ground.data.attributes}
+    surface = bake_onto(ground, footprints[:2])
+    assert len(ground.modifiers) == 1
+    assert len(bpy.data.node_groups) == 1
+    assert {attribute.name for attribute in ground.data.attributes} <= names
+    moved = world_positions(evaluated(ground, scene, 200)) - surface.vertices
+    np.testing.assert_allclose(moved[:, 2], recorded(footprints[:2], 1e9, surface).display, atol=2e-6)
+
+
+def test_removal_leaves_nothing_behind(scene, footprints):
+    ground = ground_object(scene)
+    before = sorted(attribute.name for attribute in ground.data.attributes)
+    bake_onto(ground, footprints)
+    playback.remove(ground)
+    ground_mesh.restore(ground)
+    assert sorted(attribute.name for attribute in ground.data.attributes) == before
+    assert not ground.modifiers
+    assert not bpy.data.node_groups
+
+
+def test_the_playback_needs_no_add_on(scene, footprints, tmp_path):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    blend = tmp_path / "baked.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False)
+    assert not hasattr(bpy.types.Scene, "softground")
+    scene, ground = bpy.context.scene, bpy.data.objects["Ground"]
+    for frame in (52, 23):
+        moved = world_positions(evaluated(ground, scene, frame)) - surface.vertices
+        assert np.abs(moved[:, 2] - recorded(footprints, frame, surface).display).max() <= TOLERANCE + 1e-6
+
+
+def test_it_plays_when_appended_and_linked_as_an_instance(scene, footprints, tmp_path):
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    blend = tmp_path / "library.blend"
+    collection = bpy.data.collections.new("Set")
+    scene.collection.children.link(collection)
+    collection.objects.link(ground)
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    for link in (False, True):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        with bpy.data.libraries.load(str(blend), link=link) as (_, wanted):
+            wanted.collections = ["Set"]
+        empty = bpy.data.objects.new("Instance", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Set"]
+        scene.collection.objects.link(empty)
+        scene.render.use_simplify, scene.render.simplify_subdivision = True, 0
+        scene.frame_set(52)
+        instances = [
+            world_positions(instance.object)
+            for instance in bpy.context.evaluated_depsgraph_get().object_instances
+            if instance.is_instance and instance.object.type == "MESH"
+        ]
+        assert len(instances) == 1
+        difference = (instances[0] - surface.vertices)[:, 2] - recorded(footprints, 52, surface).display
+        assert np.abs(difference).max() <= TOLERANCE + 1e-6
+
+
+def test_every_layer_counts_where_a_spot_is_stepped_on_often(scene):
+    trails = [walk(steps=2, origin=(0.02 * number, 0.01 * number, 0.0), name=f"w{number}") for number in range(4)]
+    _, footprints = pressed(trails, SAND)
+    ground = ground_object(scene)
+    surface = bake_onto(ground, footprints)
+    layers = sum(playback_nodes.MOVES in attribute.name for attribute in ground.data.attributes)
+    assert layers > 3
+    for frame in (24, 40, 300):
+        moved = world_positions(evaluated(ground, scene, frame)) - surface.vertices
+        assert np.abs(moved[:, 2] - recorded(footprints, frame, surface).display).max() <= TOLERANCE + 2e-6
