@@ -209,7 +209,7 @@ def compress(compression: Array, coverage: Fraction, target: Array | float, rate
     return np.maximum(further, compression, out=further)
 
 
-def rim_weights(coverage: Fraction, reach: float, room: Mask | None = None) -> Array:
+def rim_weights(coverage: Fraction, contact: Mask, reach: float, room: Mask | None = None) -> Array:
     """Shares of the cells that take up the volume a contact displaces, summing to 1 (Eq. 12-14).
 
     All cells within reach of the contact take part alike, in so far as they are not in contact themselves.
@@ -218,6 +218,8 @@ def rim_weights(coverage: Fraction, reach: float, room: Mask | None = None) -> A
     ----------
     coverage : (N, rows, columns) float array
         Fraction of each cell that is in contact, at each of N steps.
+    contact : (N, rows, columns) bool array
+        From `in_contact`.
     reach : float
         Reach of the rim in cells; at least the next cells take part.
     room : (rows, columns) bool array, optional
@@ -229,14 +231,14 @@ def rim_weights(coverage: Fraction, reach: float, room: Mask | None = None) -> A
 
     Examples
     --------
-    >>> contact = np.zeros((1, 5, 5))
-    >>> contact[0, 2, 2] = 1.0
-    >>> rim_weights(contact, reach=1.0)[0, 1:4, 1:4]
+    >>> coverage = np.zeros((1, 5, 5))
+    >>> coverage[0, 2, 2] = 1.0
+    >>> rim_weights(coverage, in_contact(coverage), reach=1.0)[0, 1:4, 1:4]
     array([[0.  , 0.25, 0.  ],
            [0.25, 0.  , 0.25],
            [0.  , 0.25, 0.  ]])
     """
-    free = dilate(in_contact(coverage), reach)
+    free = dilate(contact, reach)
     if room is not None:
         free &= room
     weights = np.subtract(1.0, coverage, dtype=np.float64)

@@ -165,19 +165,19 @@ class FootprintRecorder:
             Scene frame, not before that of the last call.
         window : Window
         change : (2, rows, columns) int array
-            Change of compression and rim [QUANTUM].
+            Growth of compression and rim [QUANTUM].
         touched : (rows, columns) bool array
             Cells that were in contact.
         """
         self._frames.append(frame)
         self._windows.append(window)
         self._contacts.append(np.flatnonzero(touched))
-        part = np.clip(change, -LARGEST_AMOUNT, LARGEST_AMOUNT)
-        for channel, values in zip(self._changes, part.reshape(2, -1), strict=True):
+        rest = change - LARGEST_AMOUNT if change.max(initial=0) > LARGEST_AMOUNT else None
+        for channel, values in zip(self._changes, change.reshape(2, -1), strict=True):
             cells = np.flatnonzero(values)
-            channel.append((cells, values[cells].astype(np.int32)))
-        if (part != change).any():
-            self.add(frame, window, change - part, touched)
+            channel.append((cells, np.minimum(values[cells], LARGEST_AMOUNT).astype(np.int32)))
+        if rest is not None:
+            self.add(frame, window, np.maximum(rest, 0), touched)
 
     def footprint(self, **what: Any) -> Footprint:
         """The footprint so far.

@@ -162,6 +162,7 @@ class _Imprints:
     first: int
     window: Window
     coverage: NDArray[np.float32]
+    contact: NDArray[np.bool_]
     rim: Array
     target: Array
 
@@ -240,7 +241,9 @@ class _Contact:
             tolerance=points.tolerance,
             divisions=divisions,
         )
-        return _Imprints(start, window, coverage, rim_weights(coverage, reach, cells.bears), sinking.target)
+        contact = in_contact(coverage)
+        rim = rim_weights(coverage, contact, reach, cells.bears)
+        return _Imprints(start, window, coverage, contact, rim, sinking.target)
 
     def footprint(self, frames: Array) -> Footprint:
         """The record of what was pressed."""
@@ -309,31 +312,28 @@ class _Press:
         return tuple(windows)
 
     def _press(self, contact: _Contact, imprints: _Imprints, start: int, end: int, frame: float) -> None:
-        steps = slice(start - imprints.first, end - imprints.first)
-        target, coverage, rim = imprints.target[steps], imprints.coverage[steps], imprints.rim[steps]
         if contact.recorder is None:
             contact.recorder = FootprintRecorder(self.cell_size, self.frame_step)
-        loaded = target > 0
-        if not loaded.any():
+        steps = start - imprints.first + np.flatnonzero(imprints.target[start - imprints.first : end - imprints.first])
+        if not len(steps):
             return
         state = self.ground.read(imprints.window)
         before = quantised(state)
         rate = compression_rate(self.step, self.material)
-        heights = np.zeros(len(target))
-        for k in np.flatnonzero(loaded):
-            compression = compress(state[0], coverage[k], target[k], rate)
+        heights = np.zeros(len(steps))
+        for k, step in enumerate(steps):
+            compression = compress(state[0], imprints.coverage[step], imprints.target[step], rate)
             heights[k] = (compression - state[0]).sum()
             state[0] = compression
         displaced = displaced_volume(heights, self.material)
-        rise = np.tensordot(displaced, rim, 1)
-        state[1] += rise
+        rise = displaced @ imprints.rim[steps].reshape(len(steps), -1)
+        state[1] += rise.reshape(state[1].shape)
+        self.ground.write(imprints.window, state)
         cell_area = self.cell_size**2
         contact.compressed += float(heights.sum()) * cell_area
         contact.raised += float(rise.sum()) * cell_area
-        contact.unplaced += float(displaced[~rim.any(axis=(1, 2))].sum()) * cell_area
-        self.ground.write(imprints.window, state)
-        touched = in_contact(coverage[loaded]).any(axis=0)
-        contact.recorder.add(frame, imprints.window, quantised(state) - before, touched)
+        contact.unplaced += float(displaced[~imprints.rim[steps].any(axis=(1, 2))].sum()) * cell_area
+        contact.recorder.add(frame, imprints.window, quantised(state) - before, imprints.contact[steps].any(axis=0))
 
 
 def _contacts(loads: CharacterLoads, offset: int) -> Iterator[_Contact]:

@@ -17,6 +17,7 @@ from softground_addon.core.deformation import (
     dilate,
     displaced_volume,
     equilibrium_depth,
+    in_contact,
     rim_weights,
     sink,
     target_compression,
@@ -103,7 +104,7 @@ def test_dilation_reaches_every_cell_within_its_reach_and_no_other(coverage, rea
 
 @given(coverages, st.floats(0, 5))
 def test_the_shares_of_the_rim_sum_to_one_and_fall_outside_the_contact(coverage, reach):
-    weights = rim_weights(coverage, reach)
+    weights = rim_weights(coverage, in_contact(coverage), reach)
     assert (weights >= 0).all()
     for share, contact in zip(weights, coverage, strict=True):
         free = (contact < 1) & (contact > 0)
@@ -117,7 +118,7 @@ def test_the_shares_of_the_rim_sum_to_one_and_fall_outside_the_contact(coverage,
 def test_the_rim_is_uniform_over_free_cells_within_reach():
     contact = np.zeros((1, 21, 21))
     contact[0, 9:12, 9:12] = 1.0
-    weights = rim_weights(contact, 4.0)[0]
+    weights = rim_weights(contact, in_contact(contact), 4.0)[0]
     distance = ndimage.distance_transform_edt(contact[0] == 0)
     ring = (distance > 0) & (distance <= 4.0)
     assert weights[ring] == pytest.approx(1 / ring.sum())
@@ -129,10 +130,10 @@ def test_no_rim_rises_where_there_is_no_ground():
     contact[:, 4, 4] = 1.0
     room = np.zeros((9, 9), bool)
     room[:, :4] = True
-    weights = rim_weights(contact, 2.0, room)
+    weights = rim_weights(contact, in_contact(contact), 2.0, room)
     assert weights.sum(axis=(1, 2)) == pytest.approx(1.0)
     assert not weights[:, :, 4:].any()
-    assert not rim_weights(contact, 2.0, np.zeros((9, 9), bool)).any()
+    assert not rim_weights(contact, in_contact(contact), 2.0, np.zeros((9, 9), bool)).any()
 
 
 def test_touching_fades_over_one_tolerance_in_the_middle_of_which_it_is_half():
