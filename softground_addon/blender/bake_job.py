@@ -21,11 +21,12 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import FlatTerrain, Terrain
+from ..core.histories import histories
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
 from ..core.terrain import MeshTerrain
-from . import ground_mesh, settings
+from . import ground_mesh, playback, settings
 from .character_setup import mapping_of
 from .ground_mesh import GroundPlan, GroundSurface, Indices
 from .materials import ensure_material
@@ -153,19 +154,25 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         cell_size=options.cell_size,
         blur_sigma=material.blur_sigma,
     )
+    vertices = None
     if ground and surface:
+        vertices = surface.vertices
         index = _pressed_vertices(ground, surface, pressed, terrain, loads)
     elif write:
         ground = create_ground(scene, plan)
-        surface = ground_mesh.undisturbed_surface(ground, unit_scale)
-        index = surface.pressed_vertices(pressed, terrain)
+        vertices = ground_mesh.rest_vertices(ground, unit_scale)
+        index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
     inputs = _inputs(scene, characters, material)
-    geometry = None if surface is None else (surface.vertices, surface.triangles)
-    input_hash = report.hash_inputs(inputs, motions, geometry)
-    if write and ground and surface:
-        sample = pressed.sample(*surface.vertices[index, :2].T)
+    input_hash = report.hash_inputs(inputs, motions, vertices)
+    playback_error: float | None = None
+    if write and ground and vertices is not None:
+        place = vertices[index, :2].T
         stored = record.dump(footprints, {"inputs": inputs, "input_hash": input_hash})
-        ground_mesh.write(ground, index, sample, stored, unit_scale)
+        ground_mesh.write(ground, index, pressed.sample(*place), stored, unit_scale)
+        over_time = histories(footprints, *place, blur_sigma=material.blur_sigma)
+        up = ground_mesh.up_of(ground, unit_scale)
+        playback.install(ground, index, over_time, up=up, frame_rate=motions[0].frame_rate)
+        playback_error = over_time.error
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
     result = report.build(
@@ -179,6 +186,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
             "write": finished - simulated,
             "frames_per_second": frames / (finished - started),
         },
+        playback_error_m=playback_error,
         warnings=_warnings(footprints),
         forces=forces if options.keep_forces else None,
     )

@@ -22,6 +22,7 @@ from ..core.footprints import NEVER
 from ..core.heightfield import Terrain
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.terrain import MeshTerrain
+from . import playback
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -123,6 +124,20 @@ def is_baked(ground: bpy.types.Object) -> bool:
     return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
 
 
+def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """World positions of the mesh's vertices without any bake or modifier, (V, 3) [m].
+
+    Raises
+    ------
+    InputError
+        If some are no numbers.
+    """
+    vertices = _transform(_to_world(ground, unit_scale), _rest_positions(mesh_of(ground)))
+    if not np.isfinite(vertices).all():
+        raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
+    return vertices
+
+
 def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSurface:
     """The ground as it is without any bake, in world space and metres.
 
@@ -132,16 +147,12 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
         If the surface has points that are no numbers.
     """
     mesh = mesh_of(ground)
-    to_world = np.array(ground.matrix_world, dtype=np.float64)
-    to_world[:3] *= unit_scale
-    rest = _rest_positions(mesh)
-    vertices = _transform(to_world, rest)
-    if not np.isfinite(vertices).all():
-        raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
+    vertices = rest_vertices(ground, unit_scale)
+    to_world = _to_world(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
         surface, triangles = vertices, _triangles(mesh)
     else:
-        with _undisturbed_copy(ground, rest) as evaluated:
+        with _undisturbed_copy(ground, _rest_positions(mesh)) as evaluated:
             surface = _transform(to_world, _positions(evaluated))
             triangles = _triangles(evaluated)
         if len(surface) == len(vertices):
@@ -149,6 +160,13 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
     return GroundSurface(vertices, surface, triangles)
+
+
+def _to_world(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """Object space to world space in metres, (4, 4)."""
+    matrix = np.array(ground.matrix_world, dtype=np.float64)
+    matrix[:3] *= unit_scale
+    return matrix
 
 
 @contextmanager
@@ -159,6 +177,8 @@ def _undisturbed_copy(ground: bpy.types.Object, rest: NDArray[np.float32]) -> It
     try:
         copy.data = mesh
         copy.shape_key_clear()
+        if played := playback.modifier_of(copy):
+            copy.modifiers.remove(played)
         _write_positions(mesh, rest)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
@@ -294,6 +314,7 @@ def restore(ground: bpy.types.Object) -> None:
     """Take the bake off the ground: its mesh is what it was before, bit for bit. Without a bake nothing happens."""
     if not is_baked(ground):
         return
+    playback.remove(ground)
     mesh = mesh_of(ground)
     rest = _rest_positions(mesh)
     ground.shape_key_clear()

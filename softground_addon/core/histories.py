@@ -211,7 +211,8 @@ def _changes(footprint: Footprint, window: Window) -> tuple[Array, Array]:
     number = np.rint((frame - frame.min()) / footprint.frame_step).astype(np.intp)
     count = int(number.max()) + 1
     cell = number * (2 * window.cells) + np.concatenate(where)
-    heights = np.bincount(cell, weights=np.concatenate(amounts) * QUANTUM, minlength=count * 2 * window.cells)
+    heights = np.zeros(count * 2 * window.cells)
+    heights += np.bincount(cell, weights=np.concatenate(amounts) * QUANTUM, minlength=len(heights))
     frames = frame.min() + np.arange(count) * footprint.frame_step
     return frames, heights.reshape(count, 2, window.rows, window.columns)
 

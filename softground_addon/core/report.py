@@ -22,6 +22,7 @@ def build(
     footprints: Sequence[Footprint],
     offsets_mm: Mapping[str, Mapping[str, float]],
     timings: Mapping[str, float],
+    playback_error_m: float | None = None,
     warnings: Sequence[str] = (),
     forces: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
@@ -39,6 +40,8 @@ def build(
         Constant float (positive) or sink of the source animation that was taken out of each sole.
     timings : mapping
         Seconds by stage, and frames per second.
+    playback_error_m : float, optional
+        Largest error of the played heights against the record's [m].
     warnings : sequence of str
         What the user should know.
     forces : mapping, optional
@@ -75,6 +78,8 @@ def build(
         "timings": dict(timings),
         "warnings": list(warnings),
     }
+    if playback_error_m is not None:
+        report["playback_error_mm"] = playback_error_m * 1e3
     if forces is not None:
         report["forces"] = dict(forces)
     return report
