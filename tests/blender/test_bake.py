@@ -264,7 +264,7 @@ def moving_ground(scene):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (unset, "No character is set up.*Add Character"),
+        (unset, "Add Character"),
         (no_animation, "'Walker'"),
         (no_feet, "'Walker'.*[Ff]oot|'Walker'.*[Ff]eet|'Walker'.*sole"),
         (wrong_bone, "'Walker'.*Nonexistent"),
