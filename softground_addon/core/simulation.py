@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -13,29 +12,16 @@ from numpy.typing import NDArray
 from .body_dynamics import body_dynamics
 from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts, runs
-from .deformation import (
-    GroundMaterial,
-    compress,
-    compression_rate,
-    displaced_volume,
-    in_contact,
-    rim_weights,
-    sink,
-    touching_fraction,
-)
+from .deformation import GroundMaterial
 from .errors import InputError
-from .footprints import Footprint, FootprintRecorder, quantised
+from .footprints import Footprint
 from .forces import ContactForces, impulse_forces, whole_body_forces
-from .heightfield import HeightField, Surface, Terrain, TerrainTiles, Window
-from .imprint import SolePoints, cell_coverage, centroid, contact_window, point_contact, sole_points
-from .motion import CharacterMotion, SoleMotion, steps_per_frame
+from .heightfield import HeightField, Terrain, Window
+from .imprint import sole_points
+from .motion import CharacterMotion, steps_per_frame
+from .pressing import Press, Stance, Timing
 
 Array = NDArray[np.float64]
-
-STEPS_AT_ONCE = 128
-"""Steps of one contact that are laid out in one go: about one stance of a walk."""
-LARGEST_SPREAD = 4
-"""A sliding sole is laid out in fewer steps, so that its window stays within so many times the sole's own."""
 
 ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
 
@@ -130,224 +116,113 @@ def simulate(
     InputError
         If the cell size is not positive, or the characters do not share a time grid.
     """
-    ground = HeightField(cell_size)
-    frames, offsets, shown = _common_grid(loads)
-    steps_between = int(shown[1] - shown[0]) if len(shown) > 1 else 1
-    press = _Press(terrain, material, ground, loads[0].motion, steps_between)
-    waiting = [contact for pair in zip(loads, offsets, strict=True) for contact in _contacts(*pair)]
-    waiting.sort(key=lambda contact: contact.first)  # stable: in the order of the scene where they start together
-    active: list[_Contact] = []
-    start = 1
-    for end in shown + 1:
-        while waiting and waiting[0].first < end:
-            active.append(waiting.pop(0))
-        changed = press.advance(active, start, int(end), float(frames[end - 1]))
-        over = end == shown[-1] + 1
-        ended = [contact for contact in active if contact.end <= end or over]
-        active = [contact for contact in active if contact.end > end]
-        yield FrameResult(
-            float(frames[end - 1]),
-            ground,
-            changed,
-            tuple(contact.footprint(frames) for contact in ended if contact.pressed),
-            *_state_at(loads, offsets, int(end) - 1),
-        )
-        start = int(end)
+    yield from Simulation(terrain, material, HeightField(cell_size)).run(loads)
+
+
+class Simulation:
+    """A ground that characters press, in one go or piece by piece as a timeline plays.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        The undisturbed ground.
+    material : GroundMaterial
+    ground : HeightField
+        Its state to begin with, empty or from `footprints.recompose`; it is worked on.
+    """
+
+    def __init__(self, terrain: Terrain, material: GroundMaterial, ground: HeightField) -> None:
+        self._press = Press(terrain, material, ground)
+        self._open: dict[tuple[int, int], Stance] = {}
+
+    def run(self, loads: Sequence[CharacterLoads], *, more_follows: bool = False) -> Iterator[FrameResult]:
+        """Press a piece of the motion; see `simulate`.
+
+        Parameters
+        ----------
+        loads : sequence of CharacterLoads
+            The next piece of the same characters, its first step the last of the piece before.
+        more_follows : bool
+            Whether stances that last to the end go on in the next piece, instead of ending here.
+        """
+        grid = _time_grid(loads)
+        waiting, ended = self._stances(loads, grid)
+        active: list[Stance] = []
+        start = 1
+        for end in grid.shown + 1:
+            while waiting and waiting[0].first < end:
+                active.append(waiting.pop(0))
+            frame = float(grid.frames[end - 1])
+            changed = self._press.advance(active, start, int(end), frame, grid.timing)
+            last = end == grid.shown[-1] + 1
+            for stance in [stance for stance in active if stance.end <= end or last]:
+                active.remove(stance)
+                if not (more_follows and stance in self._open.values()):
+                    ended.append(stance)
+            yield FrameResult(
+                frame,
+                self._press.ground,
+                changed,
+                tuple(stance.footprint() for stance in ended if stance.printed),
+                *_state_at(loads, grid.offsets, int(end) - 1),
+            )
+            start, ended = int(end), []
+
+    def _stances(self, loads: Sequence[CharacterLoads], grid: _TimeGrid) -> tuple[list[Stance], list[Stance]]:
+        """The stances of a piece by their first step, and those of the piece before that do not go on.
+
+        Those that last to the end of the piece are left in `_open`.
+        """
+        before, self._open = self._open, {}
+        stances = []
+        for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True)):
+            for index, motion in enumerate(character.motion.soles):
+                points = None
+                for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
+                    begin = max(int(first), 1 - offset)  # the first step of the grid is a state, it presses nothing
+                    if begin == end:
+                        continue
+                    stance = before.pop((number, index), None) if first + offset == 0 else None
+                    if stance is None:
+                        points = points or sole_points(motion.sole, motion.transforms)
+                        stance = Stance(character.motion.name, motion.sole, points)
+                    steps = slice(begin, end)
+                    stance.extend(
+                        begin + offset,
+                        grid.frames[begin + offset : end + offset],
+                        motion.transforms[steps],
+                        character.forces.forces[steps, index],
+                        character.contacts.normal[steps, index],
+                    )
+                    if end == len(character.motion.frames):
+                        self._open[number, index] = stance
+                    stances.append(stance)
+        stances.sort(key=lambda stance: stance.first)  # stable: in the order of the scene where they start together
+        return stances, list(before.values())
 
 
 @dataclass(frozen=True)
-class _Imprints:
-    """A contact over the cells at each of N steps from `first` on."""
+class _TimeGrid:
+    """The steps that all characters share.
 
-    first: int
-    window: Window
-    coverage: NDArray[np.float32]
-    contact: NDArray[np.bool_]
-    rim: Array
-    target: Array
+    Attributes
+    ----------
+    frames : (N,) float array
+        Scene frame of each step.
+    shown : (K,) int array
+        Steps at whole frames.
+    offsets : list of int
+        Step at which each character appears.
+    timing : Timing
+    """
 
-    @property
-    def end(self) -> int:
-        return self.first + len(self.target)
-
-
-class _Contact:
-    """One sole from touching down to leaving; its footprint as it grows. Steps count on the common time grid."""
-
-    def __init__(self, loads: CharacterLoads, sole: int, points: SolePoints, offset: int, first: int, end: int) -> None:
-        self.loads, self.sole, self.points, self.offset = loads, sole, points, offset
-        self.first, self.end = first, end
-        forces = np.einsum("ni,ni->n", loads.forces.forces[:, sole], loads.contacts.normal[:, sole])
-        self.force = np.maximum(forces[first - offset : end - offset], 0.0)
-        self.pressed = bool((self.force > 0).any())
-        self.compressed = self.raised = self.unplaced = 0.0
-        self.recorder: FootprintRecorder | None = None
-        self._sinkage = 0.0
-        self._area = 0.0
-        self._moment, self._load = np.zeros(3), 0.0
-        self._imprints: _Imprints | None = None
-
-    @property
-    def motion(self) -> SoleMotion:
-        return self.loads.motion.soles[self.sole]
-
-    def poses(self, start: int, end: int) -> Array:
-        return self.motion.transforms[start - self.offset : end - self.offset]
-
-    def imprints(self, start: int, end: int, press: _Press) -> _Imprints:
-        """The imprints of these steps, laid out together with as many later ones as pays."""
-        if self._imprints is None or self._imprints.end < end:
-            ahead = press.steps_per_frame * max(1, STEPS_AT_ONCE // press.steps_per_frame)
-            last = min(self.end, end - press.steps_per_frame + ahead)
-            allowed = LARGEST_SPREAD * contact_window(self.points, self.poses(start, start + 1), press.cell_size).cells
-            window = contact_window(self.points, self.poses(start, last), press.cell_size)
-            while last > end and window.cells > allowed:
-                last = end + (last - end) // (2 * press.steps_per_frame) * press.steps_per_frame
-                window = contact_window(self.points, self.poses(start, last), press.cell_size)
-            self._imprints = self._lay_out(start, last, window, press)
-        return self._imprints
-
-    def _lay_out(self, start: int, end: int, window: Window, press: _Press) -> _Imprints:
-        poses, points = self.poses(start, end), self.points
-        force = self.force[start - self.first : end - self.first]
-        reach = press.material.rim_reach / press.cell_size
-        window = window.expanded(max(1, int(reach + 1e-6)))
-        divisions = points.cell_divisions(press.cell_size)
-        cells = press.surface(window)
-        ground = press.surface(window, divisions) if divisions > 1 else cells
-        over_ground = point_contact(points, poses, ground)
-        upright = self.loads.contacts.normal[start - self.offset : end - self.offset, self.sole, 2]
-        area = over_ground.area / upright[:, None]
-        sinking = sink(
-            over_ground.clearance,
-            area,
-            force,
-            tolerance=points.tolerance,
-            step=press.step,
-            material=press.material,
-            sinkage=self._sinkage,
-        )
-        self._sinkage = sinking.reached
-        self._area = max(self._area, float(sinking.area[force > 0].max(initial=0.0)))
-        touching = area * touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
-        self._moment += force @ centroid(points, poses, touching)
-        self._load += force.sum()
-        coverage = cell_coverage(
-            self.motion.sole,
-            poses,
-            ground,
-            lowest=over_ground.lowest,
-            sinkage=sinking.sinkage,
-            tolerance=points.tolerance,
-            divisions=divisions,
-        )
-        contact = in_contact(coverage)
-        rim = rim_weights(coverage, contact, reach, cells.bears)
-        return _Imprints(start, window, coverage, contact, rim, sinking.target)
-
-    def footprint(self, frames: Array) -> Footprint:
-        """The record of what was pressed."""
-        assert self.recorder is not None
-        forward = self.poses(self.first, self.end)[int(self.force.argmax()), 0, :3, 0]
-        steps = np.arange(self.first, self.end)
-        return self.recorder.footprint(
-            character=self.loads.motion.name,
-            sole=self.motion.sole.name,
-            start_frame=float(frames[self.first]),
-            end_frame=float(frames[self.end - 1]),
-            position=self._moment / self._load,
-            heading=float(np.arctan2(forward[1], forward[0])),
-            area_m2=self._area,
-            peak_force_n=float(self.force.max()),
-            compressed_m3=self.compressed,
-            rim_m3=self.raised,
-            unplaced_rim_m3=self.unplaced,
-            load_frames=frames[steps],
-            load_n=self.force,
-        )
+    frames: Array
+    shown: NDArray[np.intp]
+    offsets: list[int]
+    timing: Timing
 
 
-class _Press:
-    """The ground that is pressed, and on what terms."""
-
-    def __init__(
-        self,
-        terrain: Terrain,
-        material: GroundMaterial,
-        ground: HeightField,
-        motion: CharacterMotion,
-        steps_per_frame: int,
-    ) -> None:
-        self.terrain, self.material, self.ground = terrain, material, ground
-        self.step, self.steps_per_frame = motion.time_step, steps_per_frame
-        self.frame_step = motion.time_step * motion.frame_rate * steps_per_frame
-        self._tiles: dict[int, TerrainTiles] = {}
-
-    @property
-    def cell_size(self) -> float:
-        return self.ground.cell_size
-
-    def surface(self, window: Window, divisions: int = 1) -> Surface:
-        """The undisturbed ground under a window, its cells divided in so many parts along each side."""
-        if divisions not in self._tiles:
-            self._tiles[divisions] = TerrainTiles(self.terrain, self.cell_size / divisions)
-        return self._tiles[divisions].surface(window.refined(divisions))
-
-    def advance(self, contacts: Sequence[_Contact], start: int, end: int, frame: float) -> tuple[Window, ...]:
-        """Press the steps from start to before end, all contacts of a step before the next where they share ground."""
-        parts = []
-        for contact in contacts:
-            first, last = max(start, contact.first), min(end, contact.end)
-            if first < last and contact.pressed:
-                parts.append((contact, contact.imprints(first, last, self), first, last))
-        windows = [imprints.window for _, imprints, _, _ in parts]
-        if any(one.intersects(other) for one, other in combinations(windows, 2)):
-            spans = [(step, step + 1) for step in range(start, end)]
-        else:
-            spans = [(start, end)]
-        for begin, stop in spans:
-            for contact, imprints, first, last in parts:
-                if max(first, begin) < min(last, stop):
-                    self._press(contact, imprints, max(first, begin), min(last, stop), frame)
-        return tuple(windows)
-
-    def _press(self, contact: _Contact, imprints: _Imprints, start: int, end: int, frame: float) -> None:
-        if contact.recorder is None:
-            contact.recorder = FootprintRecorder(self.cell_size, self.frame_step)
-        steps = start - imprints.first + np.flatnonzero(imprints.target[start - imprints.first : end - imprints.first])
-        if not len(steps):
-            return
-        state = self.ground.read(imprints.window)
-        before = quantised(state)
-        rate = compression_rate(self.step, self.material)
-        heights = np.zeros(len(steps))
-        for k, step in enumerate(steps):
-            compression = compress(state[0], imprints.coverage[step], imprints.target[step], rate)
-            heights[k] = (compression - state[0]).sum()
-            state[0] = compression
-        displaced = displaced_volume(heights, self.material)
-        rise = displaced @ imprints.rim[steps].reshape(len(steps), -1)
-        state[1] += rise.reshape(state[1].shape)
-        self.ground.write(imprints.window, state)
-        cell_area = self.cell_size**2
-        contact.compressed += float(heights.sum()) * cell_area
-        contact.raised += float(rise.sum()) * cell_area
-        contact.unplaced += float(displaced[~imprints.rim[steps].any(axis=(1, 2))].sum()) * cell_area
-        contact.recorder.add(frame, imprints.window, quantised(state) - before, imprints.contact[steps].any(axis=0))
-
-
-def _contacts(loads: CharacterLoads, offset: int) -> Iterator[_Contact]:
-    """All contacts of a character; `offset` is the step on the common grid at which it appears."""
-    for number, sole in enumerate(loads.motion.soles):
-        points = sole_points(sole.sole, sole.transforms)
-        for first, end in zip(*runs(loads.contacts.touching[:, number]), strict=True):
-            first_pressed = max(int(first) + offset, 1)  # the first step of all is the undisturbed ground
-            if first_pressed < end + offset:
-                yield _Contact(loads, number, points, offset, first_pressed, int(end) + offset)
-
-
-def _common_grid(loads: Sequence[CharacterLoads]) -> tuple[Array, list[int], NDArray[np.intp]]:
-    """Frame numbers of all steps, the step at which each character appears, and the steps at whole frames."""
+def _time_grid(loads: Sequence[CharacterLoads]) -> _TimeGrid:
     if not loads:
         raise InputError("There is no character to bake: add one with 'Add Character'.")
     motions = [character.motion for character in loads]
@@ -366,7 +241,8 @@ def _common_grid(loads: Sequence[CharacterLoads]) -> tuple[Array, list[int], NDA
     frames = first + spacing * np.arange(count)
     shown = np.flatnonzero(np.abs(frames - first - np.rint(frames - first)) < 1e-6)
     frames[shown] = first + np.rint(frames[shown] - first)
-    return frames, offsets, shown
+    steps = int(shown[1] - shown[0]) if len(shown) > 1 else 1
+    return _TimeGrid(frames, shown, offsets, Timing(motions[0].time_step, steps, spacing * steps))
 
 
 def _state_at(

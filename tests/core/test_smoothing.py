@@ -35,7 +35,7 @@ def test_the_blur_is_scipys_gaussian_wherever_the_tiles_lie(column, row, columns
         ndimage.gaussian_filter(channel, sigma / CELL, mode="constant") if sigma >= CELL / 8 else channel
         for channel in field.read(wide)
     ]
-    assert blurred(field, sigma).read(wide) == pytest.approx(np.array(expected), abs=1e-12)
+    assert np.abs(blurred(field, sigma).read(wide) - expected).max() < 1e-12
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.005, 0.01, 0.05, 0.4])
