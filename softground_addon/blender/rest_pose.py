@@ -16,11 +16,17 @@ from ..core.motion import Array
 Joints = dict[str, tuple[str, str]]
 Feet = list[tuple[str, str, str, str]]
 
+_Pair = tuple[list[int], list[int]]
+"""Two mirrored chains of bones, from where they part down to the tips."""
+
 _LOW = 0.2
 """A leaf counts as a foot when its lowest end is in this part of the rig's height."""
 
 _ANKLE_LEVEL = 0.3
 """The foot starts below this part of the hip's height (the ankle of a human is at 0.08, the knee at 0.54)."""
+
+_NO_DIRECTION = 0.01
+"""Feet that point less far than this part of the rig's height do not tell where it faces."""
 
 _MIRROR_TOLERANCE = 0.06
 """Two points count as mirrored when they agree to this part of the rig's height."""
@@ -55,13 +61,15 @@ def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
     pairs = _mirrored_legs(skeleton)
     if not pairs:
         return None
-    left_axis = _left_axis(skeleton, pairs)
+    forward = _forward(skeleton, pairs)
+    left = np.cross((0.0, 0.0, 1.0), forward)
+    pairs.sort(key=lambda pair: float(skeleton.heads[pair[0][0]] @ forward))
     joints: Joints = {}
     feet: Feet = []
     for index, pair in enumerate(pairs):
         limb = ("hip", "knee", "ankle", "ball", "toe") if index == 0 else ("shoulder", "elbow", "wrist", "", "")
         stem = "foot" if index == 0 else "forefoot"
-        sides = sorted(pair, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left_axis))
+        sides = sorted(pair, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left))
         for leg, side in zip(sides, "LR", strict=True):
             thigh, shin, foot, toe = _segments(skeleton, leg)
             for joint, bone in zip(limb, (thigh, shin, foot, toe), strict=False):
@@ -83,6 +91,8 @@ def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
     index = {bone.name: place for place, bone in enumerate(deforming)}
     parents = [next((index[p.name] for p in bone.parent_recursive if p.name in index), -1) for bone in deforming]
     turn = np.array(armature.matrix_world.to_3x3())
+    if np.linalg.det(turn) < 0:
+        turn = turn * (-1, 1, 1)  # sides are those of the character, not of its mirror image
     return _Skeleton(
         names=[bone.name for bone in deforming],
         parents=parents,
@@ -91,7 +101,7 @@ def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
     )
 
 
-def _mirrored_legs(skeleton: _Skeleton) -> list[tuple[list[int], list[int]]]:
+def _mirrored_legs(skeleton: _Skeleton) -> list[_Pair]:
     """Pairs of chains, from below where they part to the lowest bones; the lowest and longest pair first."""
     has_child = {parent for parent in skeleton.parents if parent >= 0}
     floor = min(skeleton.heads[:, 2].min(), skeleton.tails[:, 2].min())
@@ -100,7 +110,7 @@ def _mirrored_legs(skeleton: _Skeleton) -> list[tuple[list[int], list[int]]]:
     low_leaves = [b for b in range(len(skeleton.names)) if b not in has_child and lowest[b] < limit]
     chains = [skeleton.chain(leaf) for leaf in low_leaves]
 
-    pairs: list[tuple[list[int], list[int]]] = []
+    pairs: list[_Pair] = []
     for i, first in enumerate(chains):
         for second in chains[i + 1 :]:
             fork = _shared_length(first, second)
@@ -131,13 +141,13 @@ def _are_mirrored(skeleton: _Skeleton, left: Sequence[int], right: Sequence[int]
     return bool(np.abs(image - a).max() < tolerance)
 
 
-def _one_per_limb(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]]) -> list[tuple[list[int], list[int]]]:
+def _one_per_limb(skeleton: _Skeleton, pairs: list[_Pair]) -> list[_Pair]:
     """The longest pair of each limb: toes of one foot share their leg, so they make many pairs."""
 
-    def reach(pair: tuple[list[int], list[int]]) -> float:
+    def reach(pair: _Pair) -> float:
         return float(np.ptp(skeleton.heads[pair[0]][:, 2]))
 
-    chosen: list[tuple[list[int], list[int]]] = []
+    chosen: list[_Pair] = []
     taken: set[int] = set()
     for pair in sorted(pairs, key=reach, reverse=True):
         roots = {pair[0][0], pair[1][0]}
@@ -147,21 +157,23 @@ def _one_per_limb(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]])
     return chosen
 
 
-def _left_axis(skeleton: _Skeleton, pairs: list[tuple[list[int], list[int]]]) -> Array:
-    """Horizontal unit vector to the character's left, by where its feet point; Blender's front view if they do not."""
-    left, right = pairs[0]
-    across = (skeleton.heads[left] - skeleton.heads[right]).mean(axis=0) * (1, 1, 0)
-    across /= np.linalg.norm(across)
-    forward = np.zeros(3)
-    for leg in pairs[0]:
+def _forward(skeleton: _Skeleton, pairs: Sequence[_Pair]) -> Array:
+    """Horizontal direction in which most feet point, not normalised; Blender's front view where they do not."""
+    total = np.zeros(3)
+    for leg in (leg for pair in pairs for leg in pair):
         foot = _segments(skeleton, leg)[2]
-        forward += (skeleton.tails[leg[-1]] - skeleton.heads[foot]) * (1, 1, 0)
-    if len(pairs) > 1:
-        forward = (skeleton.heads[pairs[1][0][0]] - skeleton.heads[left[0]]) * (1, 1, 0)
-    facing = np.cross((0.0, 0.0, 1.0), forward)
-    if abs(facing @ across) < 1e-3 * skeleton.height:
-        facing = np.array((1.0, 0.0, 0.0)) if abs(across[0]) > 0.5 else across
-    return across if facing @ across > 0 else -across
+        total += (skeleton.tails[leg[-1]] - skeleton.heads[foot]) * (1, 1, 0)
+    across = _across(skeleton, pairs[0])
+    ahead = total - (total @ across) * across
+    if np.linalg.norm(ahead) > _NO_DIRECTION * skeleton.height:
+        return ahead
+    return np.array((0.0, -1.0, 0.0)) if abs(across[0]) > abs(across[1]) else np.array((1.0, 0.0, 0.0))
+
+
+def _across(skeleton: _Skeleton, pair: _Pair) -> Array:
+    """Horizontal unit vector from the second leg of a pair to the first."""
+    across = (skeleton.heads[pair[0]] - skeleton.heads[pair[1]]).mean(axis=0) * (1, 1, 0)
+    return np.asarray(across / np.linalg.norm(across), dtype=float)
 
 
 def _segments(skeleton: _Skeleton, leg: Sequence[int]) -> tuple[int, int, int, int | None]:

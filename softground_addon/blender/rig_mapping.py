@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import bpy
+from mathutils import Vector
 
 from ..core.errors import InputError
 from .rest_pose import map_by_rest_pose
@@ -64,8 +65,8 @@ class RigMapping:
 
 _LIMBS: Mapping[str, tuple[str, ...]] = {
     "thigh": (
-        "thigh", "upleg", "upperleg", "hip", "thightwist", "thighstretch", "thighbend", "femur", "upperthigh",
-        "legupper", "hipjoint",
+        "thigh", "upleg", "upperleg", "thighbend", "thightwist", "thighstretch", "femur", "upperthigh", "legupper",
+        "hip", "hipjoint",
     ),
     "shin": (
         "shin", "calf", "lowerleg", "loleg", "lowleg", "leg", "knee", "legstretch", "crus", "tibia", "leglower",
@@ -73,12 +74,12 @@ _LIMBS: Mapping[str, tuple[str, ...]] = {
     ),
     "foot": ("foot", "ankle", "feet", "footjoint", "anklejoint"),
     "toe": (
-        "toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe", "toe11",
+        "toe11", "toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe",
         "toejoint",
     ),
     "upper_arm": (
-        "upperarm", "uparm", "arm", "shoulder", "armtwist", "armstretch", "upperarmbend", "shldr", "shldrbend",
-        "humerus", "armupper",
+        "upperarm", "uparm", "arm", "upperarmbend", "shldrbend", "armtwist", "armstretch", "humerus", "armupper",
+        "shldr", "shoulder",
     ),
     "forearm": (
         "forearm", "lowerarm", "loarm", "lowarm", "elbow", "forearmstretch", "forearmbend", "armlower", "radius",
@@ -88,13 +89,16 @@ _LIMBS: Mapping[str, tuple[str, ...]] = {
 """Words for the segments of a limb, most telling first, as they read without side, number and decoration."""
 
 _TRUNK: Mapping[str, tuple[str, ...]] = {
-    "hips": ("hips", "pelvis", "hip", "root", "cog", "spine"),
+    "hips": ("hips", "pelvis", "hip"),
     "spine": (
         "spine", "abdomen", "lowerback", "torso", "waist", "chest", "spinelower", "abdomenlower", "back", "upperbody",
     ),
-    "neck": ("neck", "lowerneck", "necklower", "spine4"),
+    "neck": ("neck", "lowerneck", "necklower", "necktwist", "spine4"),
     "head": ("head", "skull", "spine6"),
 }  # fmt: skip
+
+_HIPS_OF_SOME = ("root", "cog", "spine")
+"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
 
 _DECORATION = frozenset(
     (
@@ -227,7 +231,8 @@ def _settle_ambiguities(
     if ankle and foot and _is_ancestor(bones, ankle, foot):
         limb["foot"] = ankle
         limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
-    if limb["toe"] and limb["foot"] and _is_ancestor(bones, limb["toe"], limb["foot"]):
+    toe, foot = limb["toe"], limb["foot"]
+    if toe and foot and (_is_ancestor(bones, toe, foot) or bones[foot].use_deform > bones[toe].use_deform):
         limb["toe"] = ""
 
 
@@ -236,9 +241,11 @@ def _map_trunk(
 ) -> dict[str, tuple[str, str]]:
     """Hips, spine, neck and head; the hips may also be where the thighs meet."""
     found = {joint: _best(readings, words, "") for joint, words in _TRUNK.items()}
-    if not found["hips"]:
-        thighs = [limbs[joint][0] for joint in ("hip_l", "hip_r") if joint in limbs]
-        found["hips"] = _common_ancestor(bones, thighs)
+    thighs = [bones[limbs[joint][0]] for joint in ("hip_l", "hip_r") if joint in limbs]
+    if not found["hips"] or not bones[found["hips"]].use_deform:
+        candidates = [found["hips"], *(_best(readings, (word,), "") for word in _HIPS_OF_SOME)]
+        candidates.append(_common_ancestor([thigh.name for thigh in thighs], bones))
+        found["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones)
     top = found["neck"] or found["head"]
     if found["hips"] and top:
         chain = _ancestors(bones, top)
@@ -265,7 +272,7 @@ def _best(readings: list[_Reading], words: tuple[str, ...], side: str) -> str:
         numbered = f"{reading.word}{reading.number}"
         if numbered in rank:
             fits.append((not reading.deforms, rank[numbered], 0, reading.decoration, reading.depth, reading.bone))
-        elif reading.word in rank:
+        elif reading.word in rank and reading.number <= _HIGHEST_NUMBER:
             number = max(reading.number, 0)
             fits.append(
                 (not reading.deforms, rank[reading.word], number, reading.decoration, reading.depth, reading.bone)
@@ -317,6 +324,9 @@ def _read(bone: bpy.types.Bone, words: list[str]) -> _Reading | None:
     return _Reading(bone.name, side, word, number, decoration, bone.use_deform, len(bone.parent_recursive))
 
 
+_HIGHEST_NUMBER = 9
+"""Bones with larger numbers belong to series (fingers, toes, twists), not to the limb."""
+
 _BODY_WORDS = frozenset(word for words in _LIMBS.values() for word in words)
 
 
@@ -339,9 +349,17 @@ def _is_ancestor(bones: Mapping[str, bpy.types.Bone], ancestor: str, descendant:
     return ancestor in _ancestors(bones, descendant)
 
 
-def _common_ancestor(bones: Mapping[str, bpy.types.Bone], names: list[str]) -> str:
+def _common_ancestor(names: list[str], bones: Mapping[str, bpy.types.Bone]) -> str:
     """Nearest bone that all of the given ones hang from; empty if there is none."""
     if not names:
         return ""
     chains = [_ancestors(bones, name) for name in names]
     return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")
+
+
+def _nearest_to_thighs(candidates: list[str], thighs: list[bpy.types.Bone], bones: Mapping[str, bpy.types.Bone]) -> str:
+    """The bone that starts nearest to the middle between the thighs, deforming ones first; empty without candidates."""
+    if not thighs or not candidates:
+        return candidates[0] if candidates else ""
+    middle = sum((thigh.head_local for thigh in thighs), start=Vector()) / len(thighs)
+    return min(candidates, key=lambda name: (not bones[name].use_deform, (bones[name].head_local - middle).length))
