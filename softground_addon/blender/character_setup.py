@@ -35,13 +35,7 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
-    for joint, (bone, end) in mapping.joints.items():
-        entry = character.joints.add()
-        entry.name, entry.bone, entry.end = joint, bone, end.upper()
-    for source in mapping.soles:
-        sole = character.soles.add()
-        sole.name, sole.bone, sole.toe_bone = source.name, source.bone, source.toe_bone
-        sole.side = _SIDE_TO_ENUM[source.side]
+    _fill(character, mapping)
     settings.active_character = len(settings.characters) - 1
     frames = animated_frames(armature)
     if frames and len(settings.characters) == 1:
@@ -52,13 +46,40 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     return character
 
 
+def detect_bones(character: SoftGroundCharacter) -> None:
+    """Set a character's joints and soles as they are recognised, in place of those in the list.
+
+    Raises
+    ------
+    InputError
+        If it has no armature, or its feet are not found.
+    """
+    require_armature(character.armature)
+    _fill(character, map_rig(character.armature))
+
+
+def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
+    character.joints.clear()
+    character.soles.clear()
+    character.active_sole = 0
+    for joint, (bone, end) in mapping.joints.items():
+        entry = character.joints.add()
+        entry.name, entry.bone, entry.end = joint, bone, end.upper()
+    for source in mapping.soles:
+        sole = character.soles.add()
+        sole.name, sole.bone, sole.toe_bone = source.name, source.bone, source.toe_bone
+        sole.side = _SIDE_TO_ENUM[source.side]
+
+
 def mapping_of(character: SoftGroundCharacter) -> RigMapping:
     """The joints and soles of a character as the user left them."""
     joints = {entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone}
     soles = tuple(
-        SoleSource(sole.name, _SIDE_TO_CODE[sole.side], sole.bone, sole.toe_bone)
+        SoleSource(
+            sole.name, _SIDE_TO_CODE[sole.side], sole.bone, sole.toe_bone, sole.object.name_full if sole.object else ""
+        )
         for sole in character.soles
-        if sole.bone
+        if sole.bone or sole.object
     )
     return RigMapping(joints, soles, "settings")
 

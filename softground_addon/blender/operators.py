@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import bpy
 from bpy.props import StringProperty
@@ -100,21 +100,6 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_bake(bpy.types.Operator):
-    """Press the footprints of all characters into the ground"""
-
-    bl_idname = "softground.bake"
-    bl_label = "Bake Footprints"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        result = bake_job.run(bake_job.bake(settings.scene_of(context)))
-        totals: Any = result.report["totals"]
-        self.report({"INFO"}, f"{totals['steps']} steps, deepest print {totals['max_depth_m'] * 100:.1f} cm")
-        return {"FINISHED"}
-
-
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     """Take the footprints off the ground: it is again what it was before the bake"""
 
@@ -140,6 +125,5 @@ CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_create_ground,
     SOFTGROUND_OT_load_preset,
-    SOFTGROUND_OT_bake,
     SOFTGROUND_OT_clear_bake,
 )

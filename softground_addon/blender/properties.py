@@ -60,6 +60,12 @@ class SoftGroundSole(bpy.types.PropertyGroup):
     )
     bone: StringProperty(name="Foot", description="Bone that carries the sole from heel to ball")
     toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
+    object: PointerProperty(
+        name="Object",
+        description="Object that prints with its own mesh in place of a bone, such as a snowshoe or a wheel",
+        type=bpy.types.Object,
+        poll=_is_mesh,
+    )
 
 
 class SoftGroundCharacter(bpy.types.PropertyGroup):

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import bpy
 
-from . import cli, operators, properties
+from . import character_editing, cli, modal_bake, operators, panels, properties, session
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES)
+CLASSES = (
+    *session.CLASSES,
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *character_editing.CLASSES,
+    *modal_bake.CLASSES,
+    *panels.CLASSES,
+)
 
 _command: object | None = None
 """Handle of the registered command, which Blender wants back to take it away."""
@@ -18,6 +25,7 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.softground = bpy.props.PointerProperty(name="SoftGround", type=properties.SoftGroundSettings)
+    bpy.types.WindowManager.softground = bpy.props.PointerProperty(type=session.SoftGroundSession)
     _command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
 
 
@@ -27,6 +35,8 @@ def unregister() -> None:
     if _command is not None:
         bpy.utils.unregister_cli_command(_command)
         _command = None
+    modal_bake.stop()
+    del bpy.types.WindowManager.softground
     del bpy.types.Scene.softground
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -1,0 +1,208 @@
+"""The bake as the user runs it: in small steps between events, with progress, time left, and a way out."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, cast
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..core.errors import SoftGroundError
+from . import bake_job, session, settings
+from .operators import reports_errors
+
+TICK = 0.03
+"""Longest work between two looks at the user's events [s]; a single step of the bake may exceed it."""
+
+TIMER_STEP = 0.005
+"""Time left to the events between two ticks [s]."""
+
+STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
+
+_NAVIGATION = (
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "MIDDLEMOUSE",
+    "WHEEL",
+    "TRACKPAD",
+    "MOUSEROTATE",
+    "MOUSESMARTZOOM",
+    "NDOF",
+    "TIMER",
+    "WINDOW_DEACTIVATE",
+)
+"""Events that change nothing in the file (first parts of their names): they go on to Blender during a bake."""
+
+_running: list[SOFTGROUND_OT_bake] = []
+"""The operator that is baking, for the handlers that have to end it before its scene goes away; at most one."""
+
+
+class SOFTGROUND_OT_bake(bpy.types.Operator):
+    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
+
+    bl_idname = "softground.bake"
+    bl_label = "Bake Footprints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is something to bake; otherwise the button says what is missing."""
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        self._show(bake_job.run(bake_job.bake(settings.scene_of(context))))
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
+        return cast("set[str]", run(context))
+
+    @reports_errors
+    def _start(self, context: bpy.types.Context) -> set[str]:
+        self._job = bake_job.bake(settings.scene_of(context))
+        self._started = time.perf_counter()
+        next(self._job)  # what cannot be baked is refused before anything moves
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
+        self._workspace = context.workspace.name
+        state = session.current()
+        state.is_baking, state.cancel_requested, state.progress, state.status = True, False, 0.0, ""
+        manager.progress_begin(0.0, 1.0)
+        manager.modal_handler_add(self)
+        _running.append(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self not in _running:
+            return {"CANCELLED"}  # ended by `stop`
+        if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
+            self._end()
+            self.report({"INFO"}, rpt_("Bake cancelled: nothing was changed"))
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            return self._tick()
+        return {"PASS_THROUGH"} if _is_harmless(context, event) else {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """End the bake as Blender quits or opens another file."""
+        self._end()
+
+    def _tick(self) -> set[str]:
+        until = time.perf_counter() + TICK
+        try:
+            while time.perf_counter() < until:
+                progress = next(self._job)
+        except StopIteration as finished:
+            self._end()
+            self._show(finished.value)
+            return {"FINISHED"}
+        except (SoftGroundError, ReferenceError) as error:
+            self._end()
+            gone = rpt_("Something that the bake needs was removed while it ran: bake again")
+            self.report({"ERROR"}, str(error) if isinstance(error, SoftGroundError) else gone)
+            return {"CANCELLED"}
+        except BaseException:
+            self._end()
+            raise
+        self._show_progress(progress)
+        return {"PASS_THROUGH"}
+
+    def _show_progress(self, progress: bake_job.Progress) -> None:
+        state = session.current()
+        state.progress = max(state.progress, progress.overall)
+        passed = time.perf_counter() - self._started
+        left = passed * (1.0 - state.progress) / max(state.progress, 1e-3)
+        state.status = iface_("{stage}: {seconds} s left").format(
+            stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))
+        )
+        bpy.context.window_manager.progress_update(state.progress)
+        label, way_out = iface_("Bake Footprints"), iface_("Cancel")
+        self._write_status_bar(f"{label} {state.progress:.0%}  |  {state.status}  |  [Esc] {way_out}")
+        session.redraw()
+
+    def _write_status_bar(self, text: str | None) -> None:
+        workspace = bpy.data.workspaces.get(self._workspace)
+        if workspace:
+            workspace.status_text_set(text)
+
+    def _end(self) -> None:
+        """Leave nothing behind: no job, no timer, no progress. What the job has not written yet is never written."""
+        if self not in _running:
+            return
+        _running.remove(self)
+        self._job.close()
+        manager = bpy.context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        self._write_status_bar(None)
+        state = session.current()
+        state.is_baking, state.cancel_requested, state.progress, state.status = False, False, 0.0, ""
+        session.redraw()
+
+    def _show(self, result: bake_job.BakeResult) -> None:
+        totals: Any = result.report["totals"]
+        warnings: Any = result.report["warnings"]
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
+        text = rpt_("{steps} steps, deepest print {depth:.1f} cm")
+        self.report({"INFO"}, text.format(steps=totals["steps"], depth=totals["max_depth_m"] * 100))
+
+
+class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
+    """End the bake now; the scene stays as it was"""
+
+    bl_idname = "softground.cancel_bake"
+    bl_label = "Cancel Bake"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        cls.poll_message_set("No bake is running")
+        return bool(session.current().is_baking)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session.current().cancel_requested = True
+        return {"FINISHED"}
+
+
+def stop() -> None:
+    """End the bake that may be running, as the scene that it works on is about to be replaced."""
+    for operator in list(_running):
+        operator._end()
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """What keeps a bake from starting, or an empty text."""
+    state = session.current()
+    if state.is_baking:
+        return "A bake is running"
+    if state.is_live:
+        return "Live mode is on: stop it first"
+    if not any(character.armature for character in settings.scene_of(context).softground.characters):
+        return "Add a character first: select its armature and press Add Character"
+    return ""
+
+
+def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Whether an event cannot edit the file: it navigates, or it is meant for the panel with the Cancel button."""
+    if event.type.startswith(_NAVIGATION):
+        return True
+    for area in context.screen.areas if context.screen else ():
+        for region in area.regions:
+            if (
+                area.type in session.PANEL_AREAS
+                and region.type == "UI"
+                and 0 <= event.mouse_x - region.x < region.width
+                and 0 <= event.mouse_y - region.y < region.height
+            ):
+                return True
+    return False
+
+
+CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_cancel_bake)

@@ -1,0 +1,245 @@
+"""The sidebar: what to set, in the order of work. Panels read and show; nothing is computed or changed in `draw`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ..core.motion import JOINTS
+from . import ground_mesh, session, settings
+from .character_editing import active_character, active_sole
+
+CATEGORY = "SoftGround"
+
+BYTES_PER_CELL = 16 + 64
+"""Memory of one touched cell: two 64-bit floats of state, and a mesh vertex with its rest position, keys, and shading."""
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+
+    layout: bpy.types.UILayout
+
+    def column(self) -> bpy.types.UILayout:
+        """The layout in Blender's property style; greyed while a bake runs."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.enabled = not session.current().is_baking
+        return layout
+
+
+class SOFTGROUND_UL_characters(bpy.types.UIList):
+    """Characters by name, each with its armature."""
+
+    def draw_item(
+        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+    ) -> None:
+        icon = "ARMATURE_DATA" if item.armature else "ERROR"
+        layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
+
+
+class SOFTGROUND_UL_soles(bpy.types.UIList):
+    """Soles by name, each with its side."""
+
+    def draw_item(
+        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+    ) -> None:
+        layout.prop(item, "name", text="", emboss=False, icon="MOD_DYNAMICPAINT")
+        layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
+
+
+class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
+    """Who walks"""
+
+    bl_label = "Character"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        options = settings.scene_of(context).softground
+        if not options.characters:
+            column = layout.column()
+            column.scale_y = 1.4
+            column.operator("softground.add_character", icon="ARMATURE_DATA")
+            return
+        row = layout.row()
+        row.template_list(
+            "SOFTGROUND_UL_characters", "", options, "characters", options, "active_character", rows=2, maxrows=5
+        )
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_character", text="", icon="ADD")
+        buttons.operator("softground.remove_character", text="", icon="REMOVE")
+        character = active_character(settings.scene_of(context))
+        if character:
+            layout.prop(character, "armature")
+            layout.prop(character, "mass")
+            layout.prop(character, "force_model")
+
+
+class _OfCharacter(_Panel):
+    bl_parent_id = "SOFTGROUND_PT_character"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen."""
+        character = active_character(settings.scene_of(context))
+        return bool(character and character.armature)
+
+
+class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
+    """What prints"""
+
+    bl_label = "Soles"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        scene = settings.scene_of(context)
+        character = active_character(scene)
+        row = layout.row()
+        row.template_list("SOFTGROUND_UL_soles", "", character, "soles", character, "active_sole", rows=3, maxrows=6)
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_sole", text="", icon="ADD")
+        buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        sole = active_sole(scene)
+        if not sole:
+            return
+        bones = character.armature.data
+        layout.prop(sole, "side")
+        column = layout.column(align=True)
+        column.active = sole.object is None
+        column.prop_search(sole, "bone", bones, "bones")
+        column.prop_search(sole, "toe_bone", bones, "bones")
+        layout.prop(sole, "object")
+
+
+class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
+    """Where the body's mass is"""
+
+    bl_label = "Hips and Limbs"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        character = active_character(settings.scene_of(context))
+        layout.operator("softground.detect_bones", icon="FILE_REFRESH")
+        column = layout.column(align=True)
+        order = {joint: place for place, joint in enumerate(JOINTS)}
+        for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
+            row = column.row(align=True)
+            row.prop_search(joint, "bone", character.armature.data, "bones", text=_joint_label(joint.name))
+            row.prop(joint, "end", text="", expand=False)
+
+
+def _joint_label(joint: str) -> str:
+    """`ankle_l` as people write it."""
+    name, _, side = joint.partition("_")
+    label = iface_(name.capitalize())
+    return f"{label} {side.upper()}" if side else label
+
+
+class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
+    """What gives way"""
+
+    bl_label = "Ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        options = settings.scene_of(context).softground
+        column = layout.column()
+        column.prop(options, "ground")
+        if options.ground is None:
+            row = column.row()
+            row.operator("softground.create_ground", icon="MESH_GRID")
+        column.prop(options, "cell_size")
+        estimate = _estimate(options)
+        if estimate:
+            _note(layout, estimate)
+
+
+class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
+    """How it gives way"""
+
+    bl_label = "Material"
+    bl_parent_id = "SOFTGROUND_PT_ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        material = settings.scene_of(context).softground.material
+        column = layout.column()
+        column.prop(material, "youngs_modulus")
+        column.prop(material, "poisson_ratio")
+        column.prop(material, "characteristic_time")
+
+
+class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
+    """The layer, its rim and its look"""
+
+    bl_label = "Details"
+    bl_parent_id = "SOFTGROUND_PT_material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.column().column()
+        material = settings.scene_of(context).softground.material
+        for field in ("layer_depth", "rim_reach", "blur_sigma"):
+            column.prop(material, field)
+        column.prop(material, "surface")
+
+
+class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
+    """Press the prints"""
+
+    bl_label = "Bake"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        state = session.current()
+        options = settings.scene_of(context).softground
+        column = layout.column(align=True)
+        column.prop(options, "frame_start")
+        column.prop(options, "frame_end")
+        if state.is_baking:
+            layout.enabled = True
+            column.enabled = False
+            layout.progress(factor=state.progress, text=state.status)
+            layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
+            return
+        column = layout.column()
+        column.scale_y = 1.4
+        column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
+        layout.operator("softground.clear_bake", icon="TRASH")
+
+
+def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:
+    """A line of small information under the fields."""
+    row = layout.row()
+    row.active = False
+    row.label(text=text, icon=icon, translate=False)
+
+
+def _estimate(options: Any) -> str:
+    """Cells and memory of the ground, from its bounding box."""
+    ground = options.ground
+    if ground is None or ground.type != "MESH" or options.cell_size <= 0:
+        return ""
+    metre = options.id_data.unit_settings.scale_length
+    cells = ground.dimensions.x * ground.dimensions.y * metre**2 / options.cell_size**2
+    text = iface_("{cells} cells, up to {megabytes} MB")
+    return text.format(cells=f"{cells:,.0f}", megabytes=f"{cells * BYTES_PER_CELL / 1e6:,.0f}")
+
+
+CLASSES = (
+    SOFTGROUND_UL_characters,
+    SOFTGROUND_UL_soles,
+    SOFTGROUND_PT_character,
+    SOFTGROUND_PT_soles,
+    SOFTGROUND_PT_joints,
+    SOFTGROUND_PT_ground,
+    SOFTGROUND_PT_material,
+    SOFTGROUND_PT_material_details,
+    SOFTGROUND_PT_bake,
+)

@@ -1,0 +1,39 @@
+"""What goes on at the moment: `window_manager.softground`. Never saved with a file and no part of undo."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+
+PANEL_AREAS = ("VIEW_3D",)
+"""Editors that show the add-on's panels and overlay."""
+
+
+class SoftGroundSession(bpy.types.PropertyGroup):
+    """Progress of the bake, and whether live mode is on."""
+
+    is_baking: BoolProperty(name="Baking", description="A bake is under way")
+    cancel_requested: BoolProperty(name="Cancel Requested", description="The bake is to end at its next step")
+    progress: FloatProperty(name="Progress", description="Finished part of the bake", min=0.0, max=1.0)
+    status: StringProperty(name="Status", description="What the bake is doing, and the time it still needs")
+    is_live: BoolProperty(name="Live", description="The ground gives way while the timeline plays")
+
+
+CLASSES = (SoftGroundSession,)
+
+
+def current() -> Any:
+    """The session's state."""
+    return bpy.context.window_manager.softground
+
+
+def redraw(*, region_type: str = "UI") -> None:
+    """Have the regions of one type drawn again in all editors that show something of the add-on."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in PANEL_AREAS:
+                for region in area.regions:
+                    if region.type == region_type:
+                        region.tag_redraw()
