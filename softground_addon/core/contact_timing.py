@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from .body_dynamics import FREE_FALL, BodyDynamics
 from .centre_of_pressure import lowest_points
-from .contacts import Contacts, runs
+from .contacts import Contacts, close_short, runs
+from .load_sharing import whole_body_shares
 from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
@@ -35,6 +36,14 @@ LANDING_DEVIATION = 0.07
 """Standard deviation of the time of a landing after flight as heights and speeds tell it, in the same unit (20 ms)."""
 ONSET_DEVIATION = 0.035
 """Standard deviation of that time as the rise of the total force tells it, in the same unit (10 ms)."""
+SHORTEST_SUPPORT = 0.165
+"""A push up that lasts less does not prove a contact, in the same unit (50 ms)."""
+HIGHEST_SUPPORT = 0.2
+"""A sole higher than this bears nothing, whatever pushes the body up, in leg lengths."""
+SUPPORT_RANGE = 0.08
+"""A sole bears while it is within this of its lowest place, in leg lengths."""
+IDLE_LOAD = 0.15
+"""A sole that never bears more than this only drags, in body weights."""
 QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
 """Phases at which a sine has a quarter and a half of its peak."""
 
@@ -70,7 +79,9 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         Of that motion, before anything is known about flight.
     """
     unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
-    touching = contacts.touching.copy()
+    touching = _supported(contacts, body.force[:, 2], motion.leg_length, round(SHORTEST_SUPPORT * unit))
+    for sole in range(touching.shape[1]):
+        touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
     pressure = lowest_points(motion)
     for change in transitions(touching, round(SEARCH * unit)):
         gap = body.force[change.leave : change.strike, 2]
@@ -84,7 +95,38 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         weight = LANDING_DEVIATION**2 / (LANDING_DEVIATION**2 + ONSET_DEVIATION**2)
         strike = round(first + weight * (onset - first))
         touching[min(strike, first) : max(strike, first), sole] = strike < first
-    return dataclasses.replace(contacts, touching=touching)
+    load = whole_body_shares(motion, touching, body) * body.force[:, 2:]
+    return dataclasses.replace(contacts, touching=_without_idle(touching, load))
+
+
+def _without_idle(touching: NDArray[np.bool_], load: Array) -> NDArray[np.bool_]:
+    """Contacts less those whose load (N, S) [body weights] is never worth the name: a foot that drags bears nothing."""
+    bearing = touching.copy()
+    for sole in range(touching.shape[1]):
+        for first, last in zip(*runs(touching[:, sole]), strict=True):
+            bearing[first:last, sole] = load[first:last, sole].max() > IDLE_LOAD
+    return np.where(bearing.any(axis=1, keepdims=True), bearing, touching)
+
+
+def _supported(contacts: Contacts, force: Array, leg_length: float, shortest: int) -> NDArray[np.bool_]:
+    """Contacts, with a sole on the ground wherever the body is pushed up: the lowest one, and any about as low.
+
+    Feet that float by more in one step than in another are missed by their height.
+    """
+    touching = contacts.touching.copy()
+    pushed = force > FREE_FALL
+    same_height = SUPPORT_RANGE * leg_length
+    for first, last in zip(*runs(pushed & ~touching.any(axis=1)), strict=True):
+        lowest = contacts.clearance[first:last].min(axis=0)
+        if last - first < shortest or lowest.min() > HIGHEST_SUPPORT * leg_length:
+            continue
+        for sole in np.flatnonzero(lowest < lowest.min() + same_height):
+            near = (contacts.clearance[:, sole] < lowest[sole] + same_height) & (force > 0)
+            instant = first + int(contacts.clearance[first:last, sole].argmin())
+            for start, end in zip(*runs(near), strict=True):
+                if start <= instant < end:
+                    touching[start:end, sole] = True
+    return touching
 
 
 def _landings(touching: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -63,11 +63,14 @@ class Contacts:
         Constant float (positive) or sink (negative) of each sole that detection removed [m].
     normal : (N, S, 3) float array
         The ground's unit normal under each sole.
+    clearance : (N, S) float array
+        Distance of each sole from its ground after `offset` is removed [m], infinite where nothing can bear it.
     """
 
     touching: Mask
     offset: Array
     normal: Array
+    clearance: Array
 
 
 def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
@@ -94,7 +97,8 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     limit = np.maximum(TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length), body_speed)
     touching, offset = zip(*(_detect(track, drift, limit, motion) for track in tracks), strict=True)
     normal = np.stack([track.normal for track in tracks], axis=1)
-    return Contacts(np.stack(touching, axis=1), np.array(offset), normal)
+    clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
+    return Contacts(np.stack(touching, axis=1), np.array(offset), normal, clearance)
 
 
 def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:

@@ -14,16 +14,12 @@ from .body_dynamics import body_dynamics
 from .centre_of_mass import centre_of_mass
 from .centre_of_pressure import lowest_points
 from .contacts import Contacts, runs
-from .load_sharing import share_by_moment, share_through_transitions
+from .load_sharing import share_by_moment, whole_body_shares
 from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
-POINT_DEVIATION = 0.05
-"""Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
-LONGEST_RAMP = 1.0
-"""Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +96,7 @@ def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactFor
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
     pressure = lowest_points(motion)
-    ground = (pressure[..., 2] * contacts.touching).sum(axis=1) / np.maximum(contacts.touching.sum(axis=1), 1)
-    share = share_through_transitions(
-        pressure[..., :2],
-        body.point_of_action(ground),
-        contacts.touching,
-        deviation=POINT_DEVIATION * motion.leg_length / np.clip(total[:, 2], 0.1, 1.0),
-        longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
-    )
+    share = whole_body_shares(motion, contacts.touching, body)
     forces = body_weight * share[..., None] * total[:, None]
     weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)

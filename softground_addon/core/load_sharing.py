@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_dynamics import BodyDynamics
+from .centre_of_pressure import lowest_points
 from .contacts import runs
+from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -16,6 +19,23 @@ _SUM_WEIGHT = 1e6
 """How much more the sum of the shares counts than their prior; the rest is normalised away."""
 SHARE_DEVIATION = 0.5
 """Standard deviation of the share of a sole in the middle of its contact about an even split: not known at all."""
+POINT_DEVIATION = 0.05
+"""Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
+LONGEST_RAMP = 1.0
+"""Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
+
+
+def whole_body_shares(motion: CharacterMotion, touching: Mask, body: BodyDynamics) -> Array:
+    """Each sole's share of the total force, from when it touches and from where the total force acts, (N, S)."""
+    pressure = lowest_points(motion)
+    ground = (pressure[..., 2] * touching).sum(axis=1) / np.maximum(touching.sum(axis=1), 1)
+    return share_through_transitions(
+        pressure[..., :2],
+        body.point_of_action(ground),
+        touching,
+        deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
+        longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
+    )
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:

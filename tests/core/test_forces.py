@@ -13,7 +13,8 @@ WEIGHT = MASS * GRAVITY
 
 def contacts(touching, normal=(0.0, 0.0, 1.0)):
     touching = np.asarray(touching, dtype=bool)
-    return Contacts(touching, np.zeros(touching.shape[1]), np.tile(normal, (*touching.shape, 1)).astype(float))
+    normals = np.tile(normal, (*touching.shape, 1)).astype(float)
+    return Contacts(touching, np.zeros(touching.shape[1]), normals, np.zeros(touching.shape))
 
 
 def landing(rate=120.0, speed=2.0):

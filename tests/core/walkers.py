@@ -115,7 +115,7 @@ def loads_of(
     zero = np.zeros((count, len(soles)))
     return CharacterLoads(
         motion,
-        Contacts(touching, np.zeros(len(soles)), normals),
+        Contacts(touching, np.zeros(len(soles)), normals, zero),
         ContactForces(forces, forces.sum(axis=1), np.zeros_like(forces), zero, zero),
     )
 
