@@ -63,7 +63,7 @@ class Footprint:
     start_frame, end_frame : float
         First and last scene frame of the contact.
     position : (3,) float array
-        Middle of the pressure over the contact [m].
+        Middle of the pressure over the contact, on the undisturbed ground [m].
     heading : float
         Direction of the toes, counter-clockwise from world x [rad].
     area_m2 : float

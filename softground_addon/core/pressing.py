@@ -196,7 +196,10 @@ class Stance:
         pressing = force * (sinking.target > 0)
         self._area = max(self._area, float(sinking.area[pressing > 0].max(initial=0.0)))
         touching = area * touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
-        self._moment += pressing @ centroid(points, poses, touching)
+        middle = centroid(points, poses, touching)
+        above = (touching * over_ground.clearance).sum(axis=1) / np.maximum(touching.sum(axis=1), 1e-300)
+        middle[:, 2] -= over_ground.lowest + above
+        self._moment += pressing @ middle
         self._load += float(pressing.sum())
         coverage = cell_coverage(
             self.sole,

@@ -127,8 +127,9 @@ def test_a_shift_by_whole_cells_changes_nothing_but_the_place():
 
 def test_a_constant_float_of_the_animation_does_not_change_the_print():
     reference, _ = pressed(walk(steps=2), SNOW)
-    floating, _ = pressed(walk(steps=2, origin=(0, 0, 0.03)), SNOW)
-    assert floating.volumes() == pytest.approx(reference.volumes(), rel=1e-9)
+    floating, footprints = pressed(walk(steps=2, origin=(0, 0, 0.03)), SNOW)
+    assert floating.volumes() == pytest.approx(reference.volumes(), rel=1e-6)
+    assert [footprint.position[2] for footprint in footprints] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_the_prints_lie_under_the_feet_in_the_order_of_the_steps():
