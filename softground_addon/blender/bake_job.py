@@ -128,7 +128,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     options = scene.softground
     characters = [character for character in options.characters if character.armature]
     check_settings(scene, characters)
-    material = settings.material_of(scene)
+    material, cell_size = settings.material_of(scene), settings.cell_size_of(scene)
     unit_scale = scene.unit_settings.scale_length
     motions = yield from _sample(scene, characters)
     sampled = time.perf_counter()
@@ -142,7 +142,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         for motion, character in zip(motions, characters, strict=True)
     ]
     _check_contacts(loads, terrain, ground)
-    footprints, forces = yield from _simulate(loads, terrain, material, options.cell_size)
+    footprints, forces = yield from _simulate(loads, terrain, material, cell_size)
     check_volumes(footprints, material)
     simulated = time.perf_counter()
 
@@ -151,7 +151,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         footprints,
         frame=float(options.frame_end),
         frame_rate=motions[0].frame_rate,
-        cell_size=options.cell_size,
+        cell_size=cell_size,
         blur_sigma=material.blur_sigma,
     )
     vertices = None
@@ -196,7 +196,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
 
 def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
     """A new flat ground with the material of the scene's preset, set as the scene's ground."""
-    ground = ground_mesh.create_grid(scene, plan, scene.softground.cell_size, scene.unit_settings.scale_length)
+    ground = ground_mesh.create_grid(scene, plan, settings.cell_size_of(scene), scene.unit_settings.scale_length)
     ground_mesh.mesh_of(ground).materials.append(ensure_material(scene.softground.material.surface))
     scene.softground.ground = ground
     for layer in scene.view_layers:
@@ -255,7 +255,7 @@ def _sample(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -
             mapping_of(character),
             frame_start=options.frame_start,
             frame_end=options.frame_end,
-            mass=character.mass,
+            mass=settings.typed(character.mass),
         )
         while True:
             try:
@@ -393,7 +393,7 @@ def _inputs(
         "characters": [
             {
                 "armature": character.armature.name,
-                "mass_kg": character.mass,
+                "mass_kg": settings.typed(character.mass),
                 "force_model": character.force_model,
                 "joints": {joint: list(place) for joint, place in mapping_of(character).joints.items()},
                 "soles": [asdict(source) for source in mapping_of(character).soles],
@@ -402,7 +402,7 @@ def _inputs(
         ],
         "preset": options.material.preset,
         "material": asdict(material),
-        "cell_size_m": options.cell_size,
+        "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,
     }

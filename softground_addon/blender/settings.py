@@ -19,10 +19,20 @@ def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     return cast("bpy.types.Scene", context.scene)
 
 
+def typed(value: float) -> float:
+    """The number that the user typed, from the single precision that Blender keeps it in: 0.01, not 0.00999999978."""
+    return float(f"{value:.7g}")
+
+
+def cell_size_of(scene: bpy.types.Scene) -> float:
+    """Side of the ground's cells [m]."""
+    return typed(scene.softground.cell_size)
+
+
 def material_of(scene: bpy.types.Scene) -> GroundMaterial:
     """The scene's ground material as the core's type."""
     values = scene.softground.material
-    return GroundMaterial(**{field: getattr(values, field) for field in MATERIAL_FIELDS})
+    return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
 
 
 def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:
