@@ -1,0 +1,326 @@
+"""Detail where it is wanted: the faces of a coarse surface, bisected along the trail down to the size of the cells.
+
+Triangles are cut in two across their base, again and again, and their neighbours with them wherever an edge is cut
+(newest vertex bisection), so that no crack opens and the sizes fall off gradually. Only the faces near the trail are
+looked at; the work does not depend on how large the ground is.
+
+References
+----------
+Mitchell, "Adaptive refinement for arbitrary finite-element spaces with hierarchical bases" (1991).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+COARSEST_LEG = 2.0**0.25
+"""Largest leg of a half square, in cells: halving areas leaves legs from 0.84 to 1.19 cells, about 1 in the middle."""
+
+_ROW = 1 << 32
+"""Cells are found by row·_ROW + column."""
+
+
+class Region:
+    """The part of the plane where detail is wanted, as cells, with a pyramid of coarser ones above them.
+
+    Parameters
+    ----------
+    columns, rows : (N,) int arrays
+        The cells.
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, columns: Indices, rows: Indices, cell_size: float) -> None:
+        self.cell_size = cell_size
+        self._levels = [np.unique(np.asarray(rows, dtype=np.int64) * _ROW + np.asarray(columns, dtype=np.int64))]
+
+    def touches(self, low: Array, high: Array) -> Mask:
+        """Which of the boxes from `low` to `high`, (N, 2) [m], reach into the region, to about a cell."""
+        if not len(self._levels[0]):
+            return np.zeros(len(low), dtype=bool)
+        extent = (high - low).max(axis=1) / (2 * self.cell_size)
+        level = np.ceil(np.log2(np.maximum(extent, 1.0))).astype(int)
+        touched = np.zeros(len(low), dtype=bool)
+        for number in np.unique(level):
+            boxes = np.flatnonzero(level == number)
+            size = self.cell_size * 2.0**number
+            first, last = (np.floor(corner[boxes] / size).astype(np.int64) for corner in (low, high))
+            found = np.zeros(len(boxes), dtype=bool)
+            for row in (first[:, 1], (first[:, 1] + last[:, 1]) // 2, last[:, 1]):
+                for column in (first[:, 0], (first[:, 0] + last[:, 0]) // 2, last[:, 0]):
+                    found |= self._holds(row * _ROW + column, int(number))
+            touched[boxes] = found
+        return touched
+
+    def _holds(self, cells: NDArray[np.int64], level: int) -> Mask:
+        while len(self._levels) <= level:
+            row, column = _row_and_column(self._levels[-1])
+            self._levels.append(np.unique((row >> 1) * _ROW + (column >> 1)))
+        known = self._levels[level]
+        return np.asarray(known[np.minimum(np.searchsorted(known, cells), len(known) - 1)] == cells)
+
+
+def _row_and_column(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    row = (cells + _ROW // 2) // _ROW
+    return row, cells - row * _ROW
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Faces of any number of corners, and the triangles that they are shown as.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        World positions [m], Z up.
+    corner_vertex : (L,) int array
+        Vertex of each corner, face by face.
+    face_start : (P + 1,) int array
+        First corner of each face, and the number of corners.
+    triangle_corners : (T, 3) int array
+        Corners of each triangle.
+    triangle_face : (T,) int array
+        Face of each triangle, ascending.
+    """
+
+    vertices: Array
+    corner_vertex: Indices
+    face_start: Indices
+    triangle_corners: Indices
+    triangle_face: Indices
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What becomes of a surface: some of its faces are kept, the others become triangles.
+
+    Attributes
+    ----------
+    kept_faces : (K,) int array
+        Faces that stay as they are, ascending.
+    triangles : (N, 3) int array
+        Vertices of the new triangles; those from V on are new.
+    face : (N,) int array
+        Face that each lies in.
+    corners : (N, 3) int array
+        Corners of the surface's triangle that each lies in.
+    weights : (N, 3, 3) float32 array
+        Barycentric coordinates of each corner in that triangle.
+    new_vertex : (M,) int array
+        Where each new vertex occurs first among the triangles' corners, 3·triangle + corner.
+    edges : (E, 2) int array
+        New edges that are parts of the surface's edges.
+    edge_of : (E, 2) int array
+        Vertices of the surface's edge that each is a part of.
+    """
+
+    kept_faces: Indices
+    triangles: Indices
+    face: Indices
+    corners: Indices
+    weights: NDArray[np.float32]
+    new_vertex: Indices
+    edges: Indices
+    edge_of: Indices
+
+    def vertex_sources(self, surface: Surface) -> tuple[Indices, NDArray[np.float32]]:
+        """Vertices of the surface that each new vertex lies between, (M, 3), and their weights (M, 3)."""
+        triangle, corner = np.divmod(self.new_vertex, 3)
+        return surface.corner_vertex[self.corners[triangle]], self.weights[triangle, corner]
+
+
+def refine(surface: Surface, region: Region, spacing: float) -> Refinement:
+    """Cut the faces of a surface until their corners are about `spacing` apart where the region is.
+
+    Parameters
+    ----------
+    surface : Surface
+    region : Region
+    spacing : float
+        Distance between vertices [m].
+
+    Returns
+    -------
+    Refinement
+        Its undisplaced surface is the given one: every new vertex lies in one of its triangles, those on an edge
+        belong to all faces at the edge.
+    """
+    triangle_vertices = surface.corner_vertex[surface.triangle_corners]
+    at_work = _faces_at(surface, triangle_vertices, region, COARSEST_LEG * spacing)
+    while True:
+        chosen = np.flatnonzero(at_work[surface.triangle_face])
+        mesh = _Bisection(surface.vertices, triangle_vertices[chosen])
+        mesh.run(region, COARSEST_LEG * spacing)
+        reached = _faces_with_edges(surface, mesh.cut_edges()) & ~at_work
+        if not reached.any():
+            return mesh.result(surface, chosen)
+        at_work |= reached
+
+
+def _faces_at(surface: Surface, triangle_vertices: Indices, region: Region, leg: float) -> Mask:
+    """Faces that are too large and reach into the region, with all faces that share a vertex with them."""
+    place = surface.vertices[:, :2]
+    corners = place[triangle_vertices]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    wanted = region.touches(low, high)
+    wanted[wanted] = _longest(surface.vertices, triangle_vertices[wanted]) > leg * np.sqrt(2)
+    touched = np.zeros(len(place), dtype=bool)
+    touched[triangle_vertices[wanted]] = True
+    return np.logical_or.reduceat(touched[surface.corner_vertex], surface.face_start[:-1])
+
+
+def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
+    """Faces that have one of the given edges, (E, 2) ascending pairs."""
+    faces = np.zeros(len(surface.face_start) - 1, dtype=bool)
+    if not len(edges):
+        return faces
+    ends = np.zeros(len(surface.vertices), dtype=bool)
+    ends[edges] = True
+    near = np.flatnonzero(np.logical_or.reduceat(ends[surface.corner_vertex], surface.face_start[:-1]))
+    count = np.diff(surface.face_start)[near]
+    face = np.repeat(near, count)
+    within = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
+    first = surface.face_start[face]
+    here = surface.corner_vertex[first + within]
+    there = surface.corner_vertex[first + (within + 1) % np.repeat(count, count)]
+    size = len(surface.vertices)
+    keys = np.minimum(here, there) * size + np.maximum(here, there)
+    faces[face[np.isin(keys, edges[:, 0] * size + edges[:, 1])]] = True
+    return faces
+
+
+def _longest(points: Array, triangles: Indices) -> Array:
+    corner = points[triangles]
+    side = corner - np.roll(corner, 1, axis=1)
+    longest: Array = np.sqrt(np.einsum("tki,tki->tk", side, side)).max(axis=1, initial=0.0)
+    return longest
+
+
+class _Bisection:
+    """Triangles that are cut in two across their base, which lies opposite their first corner.
+
+    Edge k of a triangle lies opposite its corner k. A cut edge has two halves; the first is at its first end.
+    """
+
+    def __init__(self, vertices: Array, triangles: Indices) -> None:
+        self.vertex, local = np.unique(triangles, return_inverse=True)
+        self.points = vertices[self.vertex]
+        corner = local.reshape(-1, 3)
+        side = self.points[np.roll(corner, -1, axis=1)] - self.points[np.roll(corner, 1, axis=1)]
+        base = np.argmax(np.einsum("tki,tki->tk", side, side), axis=1)
+        turn = (base[:, None] + np.arange(3)) % 3
+        self.corner = np.take_along_axis(corner, turn, axis=1)
+        ends = np.sort(np.stack([np.roll(self.corner, -1, axis=1), np.roll(self.corner, 1, axis=1)], axis=-1), axis=-1)
+        keys, edge = np.unique(ends.reshape(-1, 2) @ (len(self.vertex), 1), return_inverse=True)
+        self.ends = np.stack(np.divmod(keys, max(len(self.vertex), 1)), axis=-1)
+        self.edge = edge.reshape(-1, 3)
+        self.root = np.arange(len(keys))
+        self.half = np.full(len(keys), -1)
+        self.middle = np.full(len(keys), -1)
+        self.source = np.arange(len(triangles))
+        self.weight = np.eye(3, dtype=np.float32)[turn]
+        self._roots = self.ends
+
+    def run(self, region: Region, leg: float) -> None:
+        """Cut until no triangle with a longer leg reaches into the region."""
+        fresh = np.arange(len(self.corner))
+        while True:
+            long = fresh[_longest(self.points, self.corner[fresh]) > leg * np.sqrt(2)]
+            place = self.points[self.corner[long], :2]
+            wanted = long[region.touches(place.min(axis=1), place.max(axis=1))] if len(long) else long
+            if not len(wanted):
+                return
+            marked = np.zeros(len(self.ends), dtype=bool)
+            marked[self.edge[wanted, 0]] = True
+            self._close(marked)
+            self._cut_edges(np.flatnonzero(marked))
+            fresh = self._cut_triangles()
+
+    def _close(self, marked: Mask) -> None:
+        """Mark the base of every triangle that has a marked edge."""
+        while True:
+            behind = (marked[self.edge[:, 1]] | marked[self.edge[:, 2]]) & ~marked[self.edge[:, 0]]
+            if not behind.any():
+                return
+            marked[self.edge[behind, 0]] = True
+
+    def _cut_edges(self, edges: Indices) -> None:
+        ends = self.ends[edges]
+        middle = len(self.points) + np.arange(len(edges))
+        self.points = np.concatenate([self.points, (self.points[ends[:, 0]] + self.points[ends[:, 1]]) / 2])
+        self.middle[edges] = middle
+        halves = np.stack([ends, np.stack([middle, middle], axis=-1)], axis=-1).reshape(-1, 2)
+        self.half[edges] = self._add_edges(halves, np.repeat(self.root[edges], 2))[::2]
+
+    def _add_edges(self, ends: Indices, root: Indices) -> Indices:
+        first = len(self.ends)
+        self.ends = np.concatenate([self.ends, ends])
+        self.root = np.concatenate([self.root, root])
+        self.half, self.middle = (np.concatenate([of, np.full(len(ends), -1)]) for of in (self.half, self.middle))
+        return first + np.arange(len(ends))
+
+    def _cut_triangles(self) -> Indices:
+        """Cut every triangle whose base is cut, and again where a part's base is; returns the parts."""
+        parts = [np.zeros(0, dtype=np.intp)]
+        candidates = np.arange(len(self.corner))
+        while True:
+            cut = candidates[self.half[self.edge[candidates, 0]] >= 0]
+            if not len(cut):
+                return np.unique(np.concatenate(parts))
+            candidates = np.concatenate([cut, len(self.corner) + np.arange(len(cut))])
+            self._halve(cut)
+            parts.append(candidates)
+
+    def _halve(self, triangles: Indices) -> None:
+        apex, left, right = self.corner[triangles].T
+        base, by_right, by_left = self.edge[triangles].T  # edges opposite apex, left and right
+        middle = self.middle[base]
+        across = self._add_edges(np.stack([apex, middle], axis=-1), np.full(len(triangles), -1))
+        at_left = self.half[base] + (self.ends[base, 0] != left)
+        at_right = self.half[base] + (self.ends[base, 0] != right)
+        weight = self.weight[triangles]
+        between = (weight[:, 1] + weight[:, 2]) / 2
+        self.corner[triangles] = np.stack([middle, apex, left], axis=-1)
+        self.edge[triangles] = np.stack([by_left, at_left, across], axis=-1)
+        self.weight[triangles] = np.stack([between, weight[:, 0], weight[:, 1]], axis=1)
+        self.corner = np.concatenate([self.corner, np.stack([middle, right, apex], axis=-1)])
+        self.edge = np.concatenate([self.edge, np.stack([by_right, across, at_right], axis=-1)])
+        self.weight = np.concatenate([self.weight, np.stack([between, weight[:, 2], weight[:, 0]], axis=1)])
+        self.source = np.concatenate([self.source, self.source[triangles]])
+
+    def cut_edges(self) -> Indices:
+        """The surface's edges that were cut, as ascending pairs of its vertices, (E, 2)."""
+        return self.vertex[self._roots[self.half[: len(self._roots)] >= 0]]
+
+    def result(self, surface: Surface, chosen: Indices) -> Refinement:
+        """The refinement, where the triangles were those of the surface that were chosen."""
+        given = len(self.vertex)
+        face = surface.triangle_face[chosen]
+        parts = np.bincount(self.source, minlength=len(chosen))
+        changed = np.zeros(len(surface.face_start) - 1, dtype=bool)
+        changed[face[parts > 1]] = True
+        ours = np.flatnonzero(changed[face[self.source]])
+        corner = self.corner[ours]
+        total = len(surface.vertices) + len(self.points) - given
+        vertex = np.concatenate([self.vertex, np.arange(len(surface.vertices), total)])
+        first = np.zeros(len(self.points), dtype=np.intp)
+        first[corner.ravel()[::-1]] = np.arange(corner.size)[::-1]
+        leaf = np.flatnonzero((self.half < 0) & (self.root >= 0) & (np.arange(len(self.ends)) >= len(self._roots)))
+        return Refinement(
+            kept_faces=np.flatnonzero(~changed),
+            triangles=vertex[corner],
+            face=face[self.source[ours]],
+            corners=surface.triangle_corners[chosen[self.source[ours]]],
+            weights=self.weight[ours],
+            new_vertex=first[given:],
+            edges=vertex[self.ends[leaf]],
+            edge_of=self.vertex[self._roots[self.root[leaf]]],
+        )

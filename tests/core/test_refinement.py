@@ -1,0 +1,220 @@
+"""Cutting coarse faces along a trail."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import Delaunay
+
+from softground_addon.core.refinement import COARSEST_LEG, Region, Surface, refine
+
+
+def surface_of(vertices, faces):
+    """Faces of any number of corners, each shown as a fan of triangles."""
+    size = np.array([len(face) for face in faces])
+    start = np.concatenate([[0], np.cumsum(size)])
+    corners, owner = [], []
+    for number, count in enumerate(size):
+        for k in range(1, count - 1):
+            corners.append(start[number] + np.array([0, k, k + 1]))
+            owner.append(number)
+    return Surface(np.asarray(vertices, float), np.concatenate(faces), start, np.array(corners), np.array(owner))
+
+
+def grid(count, size, height=lambda x, y: 0 * x):
+    axis = np.linspace(-size / 2, size / 2, count + 1)
+    x, y = (values.ravel() for values in np.meshgrid(axis, axis))
+    corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
+    return surface_of(np.stack([x, y, height(x, y)], axis=-1), corner[:, None] + np.array([0, 1, count + 2, count + 1]))
+
+
+def scattered(seed, count=60, size=3.0):
+    """A rough terrain of irregular triangles."""
+    rng = np.random.default_rng(seed)
+    around = size * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    place = np.concatenate([rng.uniform(-size / 2, size / 2, (count, 2)), around])
+    triangles = Delaunay(place).simplices
+    side = place[triangles]
+    turned = np.cross(side[:, 1] - side[:, 0], side[:, 2] - side[:, 0]) < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return surface_of(np.column_stack([place, rng.uniform(-0.3, 0.3, len(place))]), triangles)
+
+
+def trail(cell_size, steps=3, origin=(0.0, 0.0)):
+    """The cells of a few prints of 30 by 12 cm."""
+    columns, rows = [], []
+    for step in range(steps):
+        x, y = origin[0] + 0.5 * step - 0.5, origin[1] + 0.09 * (-1) ** step
+        i, j = (
+            np.arange(int(x / cell_size), int((x + 0.3) / cell_size)),
+            np.arange(int((y - 0.06) / cell_size), int((y + 0.06) / cell_size)),
+        )
+        columns.append(np.repeat(i, len(j)))
+        rows.append(np.tile(j, len(i)))
+    return Region(np.concatenate(columns), np.concatenate(rows), cell_size)
+
+
+def all_faces(surface, refinement):
+    kept = [
+        surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]].tolist()
+        for face in refinement.kept_faces
+    ]
+    return kept + refinement.triangles.tolist()
+
+
+def faces_at_edges(faces):
+    """How many faces each edge has, and the net direction in which they run along it."""
+    count, direction = {}, {}
+    for face in faces:
+        for a, b in zip(face, [*face[1:], face[0]], strict=True):
+            edge = (min(a, b), max(a, b))
+            count[edge] = count.get(edge, 0) + 1
+            direction[edge] = direction.get(edge, 0) + (1 if a < b else -1)
+    return count, direction
+
+
+def positions(surface, refinement):
+    sources, weights = refinement.vertex_sources(surface)
+    return np.concatenate([surface.vertices, np.einsum("mk,mki->mi", weights, surface.vertices[sources])])
+
+
+def original_faces(surface):
+    return np.split(surface.corner_vertex, surface.face_start[1:-1])
+
+
+def boundary_length(faces, points):
+    count, _ = faces_at_edges(faces)
+    edges = np.array([edge for edge, number in count.items() if number == 1])
+    return np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).sum()
+
+
+SURFACES = {
+    "one face of 8 m": lambda: grid(1, 8.0),
+    "one face of 1 km": lambda: grid(1, 1000.0),
+    "faces of 20 cm": lambda: grid(20, 4.0, lambda x, y: 0.1 * np.sin(3 * x) * np.cos(2 * y)),
+    "irregular": lambda: scattered(4),
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_result_is_watertight(name):
+    surface = SURFACES[name]()
+    refinement = refine(surface, trail(0.02), 0.02)
+    faces, points = all_faces(surface, refinement), positions(surface, refinement)
+    count, direction = faces_at_edges(faces)
+    assert max(count.values()) == 2
+    assert all(direction[edge] == 0 for edge, number in count.items() if number == 2), "a face is turned over"
+    assert boundary_length(faces, points) == pytest.approx(boundary_length(original_faces(surface), points), rel=1e-9)
+    assert set(np.unique(np.concatenate(faces)).tolist()) == set(range(len(points))), "a vertex belongs to no face"
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**16), st.floats(-1, 1), st.floats(-1, 1))
+def test_any_terrain_stays_watertight_and_keeps_its_area(seed, x, y):
+    surface = scattered(seed)
+    refinement = refine(surface, trail(0.03, 2, (x, y)), 0.03)
+    faces, points = all_faces(surface, refinement), positions(surface, refinement)
+    count, _ = faces_at_edges(faces)
+    assert max(count.values()) <= 2
+    assert boundary_length(faces, points) == pytest.approx(boundary_length(original_faces(surface), points), rel=1e-9)
+
+    def area(triangles):
+        corner = points[np.array(triangles)]
+        return np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
+
+    assert area(faces) == pytest.approx(area(original_faces(surface)), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_corners_lie_in_their_triangle_of_the_surface_at_their_weights(name):
+    surface = SURFACES[name]()
+    refinement = refine(surface, trail(0.02), 0.02)
+    points = positions(surface, refinement)
+    assert (refinement.weights >= 0).all()
+    np.testing.assert_array_equal(refinement.weights.sum(axis=-1), 1)
+    source = surface.vertices[surface.corner_vertex[refinement.corners]]
+    placed = np.einsum("nck,nki->nci", refinement.weights.astype(float), source)
+    np.testing.assert_allclose(placed, points[refinement.triangles], atol=1e-9 * np.abs(points).max())
+
+
+def test_vertices_are_about_a_cell_apart_in_the_region_and_few_elsewhere():
+    cell = 0.01
+    for size in (7.0, 8.0, 9.0, 10.0, 11.0):
+        surface, region = grid(1, size), trail(cell, 3)
+        refinement = refine(surface, region, cell)
+        corner = positions(surface, refinement)[refinement.triangles]
+        side = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=-1)
+        inside = region.touches(corner[..., :2].min(axis=1), corner[..., :2].max(axis=1))
+        assert side[inside].max() <= COARSEST_LEG * np.sqrt(2) * cell * 1.0001
+        assert side[inside].min() >= 0.8 * cell
+        cells = 3 * 30 * 12
+        assert 0.5 * cells < len(refinement.new_vertex) < 2.6 * cells
+
+
+def test_sizes_fall_off_gradually():
+    refinement = refine(grid(1, 64.0), trail(0.01), 0.01)
+    surface = grid(1, 64.0)
+    corner = positions(surface, refinement)[refinement.triangles]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=-1).max(axis=1)
+    owner = {}
+    for number, face in enumerate(refinement.triangles.tolist()):
+        for a, b in zip(face, [*face[1:], face[0]], strict=True):
+            owner.setdefault((min(a, b), max(a, b)), []).append(number)
+    ratios = [longest[pair[0]] / longest[pair[1]] for pair in owner.values() if len(pair) == 2]
+    assert max(*ratios, *(1 / ratio for ratio in ratios)) <= np.sqrt(2) * 1.001
+
+
+def test_faces_away_from_the_trail_are_kept():
+    surface = grid(200, 40.0)
+    refinement = refine(surface, trail(0.02), 0.02)
+    assert len(refinement.kept_faces) > 0.99 * 200**2
+    assert len(np.intersect1d(refinement.kept_faces, refinement.face)) == 0
+    assert len(np.union1d(refinement.kept_faces, refinement.face)) == 200**2
+
+
+def test_new_edges_know_the_edges_they_are_parts_of():
+    surface = grid(4, 4.0)
+    refinement = refine(surface, trail(0.05), 0.05)
+    points = positions(surface, refinement)
+    parts = np.linalg.norm(np.diff(points[refinement.edges], axis=1)[:, 0], axis=1)
+    whole, first = np.unique(refinement.edge_of, axis=0, return_inverse=True)
+    length = np.linalg.norm(np.diff(points[whole], axis=1)[:, 0], axis=1)
+    np.testing.assert_allclose(np.bincount(first.ravel(), parts), length, rtol=1e-9)
+
+
+def test_a_surface_that_is_fine_enough_or_far_away_stays_as_it_is():
+    for surface, region in ((grid(200, 2.0), trail(0.02)), (grid(3, 3.0), trail(0.01, 2, (50.0, 0.0)))):
+        refinement = refine(surface, region, 0.02)
+        assert not len(refinement.triangles)
+        assert len(refinement.kept_faces) == len(surface.face_start) - 1
+
+
+def test_the_work_does_not_grow_with_the_size_of_the_ground():
+    def best_of_three(size):
+        surface, region = grid(1, size), trail(0.005, 6)
+        times = []
+        for _ in range(3):
+            start = time.perf_counter()
+            count = len(refine(surface, region, 0.005).new_vertex)
+            times.append(time.perf_counter() - start)
+        return min(times), count
+
+    # 8 m and 1024 m halve to the same final size, so that the same work is left on the trail.
+    near, far = best_of_three(8.0), best_of_three(1024.0)
+    assert far[1] < 1.1 * near[1]
+    assert far[0] < 1.5 * near[0]
+
+
+@given(st.integers(0, 2**16), st.sampled_from([0.01, 0.3, 7.0]))
+@settings(deadline=None)
+def test_a_region_finds_every_box_that_reaches_into_it(seed, size):
+    rng = np.random.default_rng(seed)
+    columns, rows = rng.integers(-300, 300, (2, 40))
+    region = Region(columns, rows, 0.01)
+    low = rng.uniform(-4, 4, (60, 2))
+    high = low + rng.uniform(0, size, (60, 2))
+    cells = np.stack([columns, rows], axis=-1) * 0.01
+    overlap = ((low[:, None] < cells + 0.01) & (high[:, None] > cells)).all(axis=-1).any(axis=1)
+    assert region.touches(low, high)[overlap].all()
