@@ -1,7 +1,7 @@
 """What a rig does over a range of frames, as a `CharacterMotion`; the user's scene is only read.
 
-The rig is evaluated in a temporary scene that holds nothing else: constraints, drivers, NLA, parents and object motion
-act as in the user's scene, its meshes cost nothing, and the user's frame, pose and handlers are left alone.
+The rig is evaluated in a temporary scene that depends on nothing else: constraints, drivers, NLA, parents and object
+motion act as in the user's scene, its meshes cost nothing, and the user's frame, pose and handlers are left alone.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ Sampling = Generator[int, None, CharacterMotion]
 
 _SCALE_TOLERANCE = 1e-3
 """Relative difference of scale between axes, and cosine between them, that still counts as uniform."""
+
+_TEMPORARY = "SoftGround Sampling"
+"""Name of what exists only while a rig is read."""
 
 _SCENE_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 """Render settings that decide which time a frame number means."""
@@ -123,7 +126,7 @@ def _evaluate(
     bone_matrices = np.empty((len(frames), len(bones), 4, 4))
     thing_matrices = np.empty((len(frames), len(things), 4, 4))
     armature_matrices = np.empty((len(frames), 4, 4))
-    with _sampling_scene(scene, [armature, *things]) as name:
+    with _sampling_scene(scene, armature, bones, things) as name:
         for done, frame in enumerate(frames):
             temporary = bpy.data.scenes.get(name)
             if temporary is None:
@@ -156,21 +159,31 @@ def _evaluate(
 
 
 @contextmanager
-def _sampling_scene(scene: bpy.types.Scene, objects: Sequence[str]) -> Iterator[str]:
-    """Name of a scene with only the given objects that keeps the user's time; gone afterwards, whatever happens."""
-    temporary = bpy.data.scenes.new("SoftGround Sampling")
-    name = temporary.name
+def _sampling_scene(
+    scene: bpy.types.Scene, armature: str, bones: Sequence[str], things: Sequence[str]
+) -> Iterator[str]:
+    """Name of a scene in which only the given bones and objects are evaluated; gone afterwards, whatever happens.
+
+    It holds a probe that depends on them instead of themselves: so they are evaluated even where the user hides them,
+    and the objects' meshes are not.
+    """
+    temporary = bpy.data.scenes.new(_TEMPORARY)
+    probe = bpy.data.objects.new(_TEMPORARY, None)
+    names = temporary.name, probe.name
     try:
         for setting in _SCENE_TIME:
             setattr(temporary.render, setting, getattr(scene.render, setting))
-        for thing in objects:
-            temporary.collection.objects.link(_object_named(thing))
-        yield name
+        for thing, bone in (*((armature, bone) for bone in bones), *((thing, "") for thing in things)):
+            dependence = probe.constraints.new("COPY_LOCATION")
+            dependence.target, dependence.subtarget = _object_named(thing), bone
+        temporary.collection.objects.link(probe)
+        yield names[0]
     finally:
-        left_over = bpy.data.scenes.get(name)
-        if left_over is not None:
-            with _handlers_silent():
-                bpy.data.scenes.remove(left_over)
+        with _handlers_silent():
+            for blocks, name in zip((bpy.data.scenes, bpy.data.objects), names, strict=True):
+                left_over = blocks.get(name)
+                if left_over is not None:
+                    blocks.remove(left_over)
 
 
 def _object_named(name: str) -> bpy.types.Object:

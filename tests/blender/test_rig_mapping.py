@@ -143,9 +143,15 @@ def test_an_armature_without_bones_is_refused(scene):
         map_rig(bpy.data.objects.new("Empty", bpy.data.armatures.new("Empty")))
 
 
-def test_a_rigify_human_maps_to_its_deform_bones(scene):
-    with rigs.rigify_human() as rig:
-        mapping = map_rig(rig)
+@pytest.fixture(scope="module")
+def rigify_file(addon, tmp_path_factory):
+    path = tmp_path_factory.mktemp("rigify") / "human.blend"
+    rigs.make_rigify_file(path)
+    return path
+
+
+def test_a_rigify_human_maps_to_its_deform_bones(rigify_file):
+    mapping = map_rig(rigs.open_rigify(rigify_file, "Generated"))
     assert [(s.bone, s.toe_bone) for s in mapping.soles] == [(f"DEF-foot.{s}", f"DEF-toe.{s}") for s in "LR"]
     assert mapping.joints["hips"] == ("DEF-spine", "head")
     assert mapping.joints["neck"] == ("DEF-spine.004", "head")
@@ -156,9 +162,8 @@ def test_a_rigify_human_maps_to_its_deform_bones(scene):
     assert all(bone.startswith("DEF-") for bone, _ in mapping.joints.values())
 
 
-def test_a_rigify_metarig_maps_to_its_own_bones(scene):
-    with rigs.rigify_human(generate=False) as rig:
-        mapping = map_rig(rig)
+def test_a_rigify_metarig_maps_to_its_own_bones(rigify_file):
+    mapping = map_rig(rigs.open_rigify(rigify_file, "Metarig"))
     assert [(s.bone, s.toe_bone) for s in mapping.soles] == [(f"foot.{s}", f"toe.{s}") for s in "LR"]
     assert mapping.joints["hips"] == ("spine", "head")
     assert mapping.joints["neck"] == ("spine.004", "head")

@@ -1,0 +1,433 @@
+"""What is sampled is what the rig does, and reading it changes nothing."""
+
+import csv
+import itertools
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.rig_mapping import RigMapping, SoleSource, map_rig
+from softground_addon.blender.rig_sampling import sample_character, sample_character_now
+from softground_addon.core.errors import InputError
+
+from . import fingerprints, rigs, shots
+
+BLENDER = rigs.FAMILIES["blender"]
+
+
+def sample(scene, armature, mapping=None, *, start=1, end=20, **options):
+    return sample_character_now(
+        scene,
+        armature,
+        mapping or map_rig(armature),
+        mass=70.0,
+        frame_start=start,
+        frame_end=end,
+        **options,
+    )
+
+
+def moving_human(**options):
+    """The standing figure with keys on hips, thigh and foot."""
+    armature = rigs.human(BLENDER, **options)
+    rigs.key(armature, "location", {1: (0, 0, 0), 20: (0.3, 0.1, 0.5)}, bone="hips")
+    rigs.key(armature, "rotation_euler", {1: (0, 0, 0), 20: (0.6, 0.1, 0.2)}, bone="thigh.L")
+    rigs.key(armature, "rotation_euler", {1: (0.1, 0, 0), 20: (-0.4, 0.2, 0)}, bone="foot.L")
+    return armature
+
+
+class Bvh:
+    """A BVH file with forward kinematics of its own, in the file's axes and units."""
+
+    def __init__(self, path: Path):
+        hierarchy, motion = path.read_text().split("MOTION")
+        self.names, self.parents, self.offsets, self.channels = [], [], [], []
+        stack, tokens = [], iter(hierarchy.split())
+        for token in tokens:
+            if token in ("ROOT", "JOINT", "End"):
+                name = next(tokens)
+                self.names.append(name if token != "End" else f"{self.names[stack[-1]]} end")
+                self.parents.append(stack[-1] if stack else -1)
+                self.channels.append([])
+            elif token == "{":
+                stack.append(len(self.names) - 1)
+            elif token == "}":
+                stack.pop()
+            elif token == "OFFSET":
+                self.offsets.append([float(next(tokens)) for _ in range(3)])
+            elif token == "CHANNELS":
+                self.channels[-1] = [next(tokens) for _ in range(int(next(tokens)))]
+        rows = motion.split("Frame Time:")[1].split("\n", 1)[1].split()
+        self.values = np.array(rows, dtype=float).reshape(-1, sum(map(len, self.channels)))
+
+    def positions(self):
+        """Path of every joint, by name."""
+        count = len(self.values)
+        rotations, places, paths = [], [], {}
+        columns = iter(self.values.T)
+        for name, parent, offset, channels in zip(self.names, self.parents, self.offsets, self.channels, strict=True):
+            turn = np.tile(np.eye(3), (count, 1, 1))
+            shift = np.tile(np.array(offset), (count, 1))
+            for channel in channels:
+                axis = "XYZ".index(channel[0])
+                value = next(columns)
+                if channel.endswith("position"):
+                    shift[:, axis] = value  # a position channel replaces the offset
+                else:
+                    turn = turn @ rotation_about(axis, np.radians(value))
+            if parent >= 0:
+                shift = places[parent] + np.einsum("fij,fj->fi", rotations[parent], shift)
+                turn = rotations[parent] @ turn
+            rotations.append(turn)
+            places.append(shift)
+            paths[name] = shift
+        return paths
+
+
+def rotation_about(axis, angle):
+    matrix = np.tile(np.eye(3), (len(angle), 1, 1))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
+    matrix[:, j, i] = np.sin(angle)
+    matrix[:, i, j] = -matrix[:, j, i]
+    return matrix
+
+
+def file_to_world(motion: shots.MotionFile):
+    """Columns: where the file's axes go in Blender (forward becomes +Y, up becomes +Z)."""
+    axes = {sign + name: (1 if not sign else -1) * np.eye(3)[i] for i, name in enumerate("XYZ") for sign in ("", "-")}
+    forward, up = axes[motion.forward], axes[motion.up]
+    return np.stack([np.cross(forward, up), forward, up]) * motion.scale
+
+
+@pytest.mark.parametrize("name", shots.MOTION_FILES)
+def test_joints_equal_independent_forward_kinematics_of_the_motion_file(scene, name):
+    armature = shots.import_motion(name)
+    motion_file = shots.MOTION_FILES[name]
+    truth = Bvh(shots.SHARED / motion_file.path).positions()
+    count = len(next(iter(truth.values())))
+    mapping = map_rig(armature)
+    motion = sample(scene, armature, mapping, end=count)
+    to_world = file_to_world(motion_file)
+    checked = 0
+    for joint, (bone, end) in mapping.joints.items():
+        if end == "head":
+            np.testing.assert_allclose(motion.joints[joint], truth[bone] @ to_world.T, atol=1e-4, err_msg=joint)
+            checked += 1
+    assert checked >= 18
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_joints_of_a_measured_gait_follow_the_measured_joint_centres(scene, name):
+    armature = shots.import_motion(name)
+    path = (shots.SHARED / shots.MOTION_FILES[name].path).with_suffix(".csv")
+    with path.open() as stream:
+        rows = list(csv.DictReader(stream))
+    motion = sample(scene, armature, end=len(rows))
+    for joint in ("knee_l", "knee_r", "ankle_l", "ankle_r", "ball_l", "ball_r"):
+        measured = np.array([[float(row[f"{joint}_{axis}"]) for axis in "xyz"] for row in rows])
+        # the file looks along -Z in its own axes, so that X forward becomes Blender's X
+        gap = np.linalg.norm(motion.joints[joint] - measured, axis=1)
+        assert np.sqrt(np.mean(gap**2)) < 0.03, joint
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_soles_of_a_measured_gait_lie_flat_in_mid_stance(scene, name):
+    armature = shots.import_motion(name)
+    path = (shots.SHARED / shots.MOTION_FILES[name].path).with_suffix(".csv")
+    with path.open() as stream:
+        rows = list(csv.DictReader(stream))
+    motion = sample(scene, armature, end=len(rows))
+    for sole, side in zip(motion.soles, "lr", strict=True):
+        load = np.array([float(row[f"grf_{side}_z"]) for row in rows])
+        ball, ankle = motion.joints[f"ball_{side}"], motion.joints[f"ankle_{side}"]
+        speed = np.linalg.norm(np.gradient(ball, axis=0), axis=1) + np.linalg.norm(np.gradient(ankle, axis=0), axis=1)
+        flat = np.argsort(np.where(load > 300, speed, np.inf))[:5]
+        tilt = np.degrees(np.arccos(sole.transforms[flat, 0, 2, 2]))
+        assert np.median(tilt) < 6.0, sole.sole.name
+        heights = sole.landmark_positions()[flat][..., 2]
+        assert np.median(np.ptp(heights, axis=1)) < 0.025
+
+
+def test_samples_follow_object_motion_and_parents(scene):
+    armature = moving_human()
+    cart = bpy.data.objects.new("Cart", None)
+    scene.collection.objects.link(cart)
+    rigs.key(cart, "location", {1: (0, 0, 0), 20: (4, 2, 1)})
+    rigs.key(armature, "rotation_euler", {1: (0, 0, 0), 20: (0, 0, 1.5)})
+    armature.parent = cart
+    assert_samples_equal_the_users_scene(scene, armature)
+
+
+def test_samples_follow_constraints_to_objects_outside_drivers_and_nla(scene):
+    armature = moving_human()
+    target = bpy.data.objects.new("Target", None)
+    scene.collection.objects.link(target)
+    rigs.key(target, "location", {1: (0.1, 0, 0.1), 20: (0.1, -0.6, 0.4)})
+    ik = armature.pose.bones["shin.L"].constraints.new("IK")
+    ik.target, ik.chain_count = target, 2
+    driver = armature.pose.bones["foot.R"].driver_add("rotation_quaternion", 1).driver
+    driver.expression = "sin(frame / 5) + v"
+    variable = driver.variables.new()
+    variable.name, variable.type = "v", "TRANSFORMS"
+    variable.targets[0].id, variable.targets[0].transform_type = target, "LOC_Z"
+    animation = armature.animation_data
+    strip = animation.nla_tracks.new().strips.new("Strip", 3, animation.action)
+    strip.scale = 0.7
+    animation.action = None
+    assert_samples_equal_the_users_scene(scene, armature)
+
+
+def assert_samples_equal_the_users_scene(scene, armature, frames=(1, 2, 7, 13, 20)):
+    """Compare with stepping the user's own scene."""
+    mapping = map_rig(armature)
+    motion = sample(scene, armature, mapping)
+    moved = 0.0
+    for frame in frames:
+        scene.frame_set(frame)
+        for joint, (bone, end) in mapping.joints.items():
+            truth = armature.matrix_world @ getattr(armature.pose.bones[bone], end)
+            np.testing.assert_allclose(motion.joints[joint][frame - 1], truth, atol=1e-5, err_msg=joint)
+    for path in motion.joints.values():
+        moved = max(moved, float(np.ptp(path, axis=0).max()))
+    assert moved > 0.2
+
+
+@pytest.mark.parametrize("action", ["finish", "close", "fail"])
+def test_sampling_leaves_the_file_as_it_was(scene, action):
+    armature = moving_human()
+    mesh = bpy.data.meshes.new("Body")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    body = bpy.data.objects.new("Body", mesh)
+    scene.collection.objects.link(body)
+    body.parent = armature
+    scene.frame_set(7)
+    armature.pose.bones["hips"].location = (1, 2, 3)  # not keyed: the next frame change would lose it
+    scene.view_layers[0].update()
+    handler_calls = []
+
+    def on_frame(*_arguments):
+        handler_calls.append(1)
+
+    bpy.app.handlers.frame_change_post.append(on_frame)
+    try:
+        before = state(scene, armature)
+        sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frame_start=1, frame_end=30)
+        next(sampling)
+        if action == "finish":
+            for _ in sampling:
+                pass
+        elif action == "close":
+            sampling.close()
+        else:
+            with pytest.raises(ZeroDivisionError):
+                sampling.throw(ZeroDivisionError)
+        assert state(scene, armature) == before
+        assert bpy.app.handlers.frame_change_post[-1] is on_frame
+        assert not handler_calls
+    finally:
+        bpy.app.handlers.frame_change_post.remove(on_frame)
+
+
+def state(scene, armature):
+    return (
+        fingerprints.of_file(),
+        [tuple(value) for bone in armature.pose.bones for row in bone.matrix for value in [row]],
+        {
+            kind: [(block.name, block.users) for block in getattr(bpy.data, kind)]
+            for kind in ("objects", "actions", "scenes", "armatures", "collections", "meshes")
+        },
+        bpy.context.scene.name,
+        bpy.context.view_layer.objects.active.name,
+        [thing.name for thing in bpy.context.selected_objects],
+        armature.mode,
+        [
+            list(getattr(bpy.app.handlers, name))
+            for name in ("frame_change_pre", "frame_change_post", "depsgraph_update_post")
+        ],
+    )
+
+
+def test_sampling_takes_one_step_per_frame(scene):
+    sampling = sample_character(
+        scene, moving_human(), map_rig(bpy.data.objects["Human"]), mass=70.0, frame_start=1, frame_end=9
+    )
+    assert list(sampling) == list(range(1, 10))
+
+
+def test_lengths_are_metres_in_any_unit_and_at_any_object_scale(scene):
+    armature = moving_human()
+    reference = sample(scene, armature)
+    scene.unit_settings.scale_length = 0.01
+    armature.scale = (100.0,) * 3
+    centimetres = sample(scene, armature)
+    scene.unit_settings.scale_length = 1.0
+    for other in (centimetres,):
+        assert other.leg_length == pytest.approx(reference.leg_length, rel=1e-5)
+        for joint, path in reference.joints.items():
+            np.testing.assert_allclose(other.joints[joint], path, atol=1e-5)
+        for a, b in zip(reference.soles, other.soles, strict=True):
+            np.testing.assert_allclose(b.transforms, a.transforms, atol=1e-5)
+            np.testing.assert_allclose(b.sole.outline, a.sole.outline, atol=1e-6)
+
+
+def test_a_centimetre_rig_at_scale_001_equals_the_metre_rig(scene):
+    reference = sample(scene, moving_human())
+    scaled = rigs.human(BLENDER, name="Scaled")
+    bpy.ops.object.select_all(action="DESELECT")
+    scaled.select_set(True)
+    bpy.context.view_layer.objects.active = scaled
+    scaled.scale = (100.0,) * 3
+    bpy.ops.object.transform_apply(scale=True)
+    scaled.scale = (0.01,) * 3
+    rigs.key(scaled, "location", {1: (0, 0, 0), 20: (30, 10, 50)}, bone="hips")
+    rigs.key(scaled, "rotation_euler", {1: (0, 0, 0), 20: (0.6, 0.1, 0.2)}, bone="thigh.L")
+    rigs.key(scaled, "rotation_euler", {1: (0.1, 0, 0), 20: (-0.4, 0.2, 0)}, bone="foot.L")
+    motion = sample(scene, scaled)
+    for a, b in zip(reference.soles, motion.soles, strict=True):
+        np.testing.assert_allclose(b.transforms, a.transforms, atol=1e-5)
+        assert b.sole.area == pytest.approx(a.sole.area, rel=1e-4)
+
+
+def test_frame_rate_and_step_give_times_in_seconds(scene):
+    armature = moving_human()
+    scene.render.fps, scene.render.fps_base = 30, 1.001
+    motion = sample(scene, armature, frame_step=3)
+    np.testing.assert_array_equal(motion.frames, np.arange(1, 21, 3))
+    assert motion.frame_rate == pytest.approx(29.97, rel=1e-4)
+    assert motion.time_step == pytest.approx(3 * 1.001 / 30)
+    every = sample(scene, armature)
+    np.testing.assert_allclose(motion.joints["knee_l"], every.joints["knee_l"][::3])
+
+
+def test_a_hidden_rig_still_moves(scene):
+    armature = moving_human()
+    visible = sample(scene, armature)
+    armature.hide_viewport = armature.hide_render = True
+    hidden = sample(scene, armature)
+    np.testing.assert_allclose(hidden.joints["knee_l"], visible.joints["knee_l"], atol=1e-6)
+
+
+def test_linked_and_overridden_rigs_are_read(scene, tmp_path):
+    reference = sample(scene, moving_human())
+    path = tmp_path / "human.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = ["Human"]
+    scene = bpy.context.scene
+    linked = bpy.data.objects["Human"]
+    scene.collection.objects.link(linked)
+    motion = sample(scene, linked)
+    np.testing.assert_allclose(motion.joints["knee_l"], reference.joints["knee_l"], atol=1e-6)
+    override = linked.override_create(remap_local_usages=True)
+    motion = sample(scene, override)
+    np.testing.assert_allclose(motion.joints["knee_l"], reference.joints["knee_l"], atol=1e-6)
+
+
+def test_an_animated_object_prints_with_its_own_mesh(scene):
+    armature = moving_human()
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    cube = bpy.context.active_object
+    cube.scale = (0.4, 0.2, 0.1)
+    rigs.key(cube, "location", {1: (1, 0, 0.05), 20: (2, 0, 1)})
+    mapping = RigMapping(joints={}, soles=(SoleSource("box", object="Cube"),))
+    motion = sample(scene, armature, mapping)
+    (box,) = motion.soles
+    assert box.sole.area == pytest.approx(0.08, rel=0.02)
+    lowest = box.landmark_positions()[..., 2].min(axis=1)
+    np.testing.assert_allclose(lowest[[0, -1]], [0.0, 0.95], atol=1e-5)
+
+
+def flattened(armature):
+    armature.scale = (1, 1, 2)
+
+
+def vanished(armature):
+    armature.scale = (0, 0, 0)
+
+
+def sheared(armature):
+    bpy.context.scene.collection.objects.link(parent := bpy.data.objects.new("Parent", None))
+    parent.scale = (1, 3, 1)
+    armature.parent = parent
+    armature.rotation_euler = (0, 0, 0.7)
+
+
+def in_edit_mode(armature):
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def at_rest(armature):
+    armature.data.pose_position = "REST"
+
+
+def with_broken_keys(armature):
+    armature.animation_data_clear()
+    rigs.key(armature, "location", {1: (0, 0, 0), 20: (float("inf"), 0, 0)}, bone="hips")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (flattened, r"'Human' is stretched or sheared .*apply it"),
+        (sheared, r"'Human' is stretched or sheared"),
+        (vanished, r"'Human' has a scale of zero"),
+        (in_edit_mode, r"'Human' is in edit mode"),
+        (at_rest, r"'Human' shows its rest position"),
+        (with_broken_keys, r"'Human' has no finite pose at frame \d+"),
+        (lambda armature: armature.animation_data_clear(), r"'Human' has no animation"),
+        (lambda armature: armature.data.bones.__getitem__("foot.L").__setattr__("name", "fin"), r"no bone 'foot.L'"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, message):
+    armature = moving_human()
+    mapping = map_rig(armature)
+    spoil(armature)
+    names = [scene.name for scene in bpy.data.scenes]
+    with pytest.raises(InputError, match=message):
+        sample(scene, armature, mapping)
+    assert [scene.name for scene in bpy.data.scenes] == names
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mass": 0.0}, "positive mass"),
+        ({"mass": float("nan")}, "positive mass"),
+        ({"frame_end": 0}, "frame range 1 to 0"),
+        ({"frame_step": 0}, "positive step"),
+        ({"mapping": RigMapping()}, "has no soles"),
+        ({"mapping": RigMapping(soles=(SoleSource("foot"),))}, "neither a bone nor an object"),
+        ({"mapping": RigMapping(soles=(SoleSource("foot", object="Gone"),))}, "'Gone' is gone"),
+    ],
+)
+def test_settings_that_cannot_be_used_are_refused(scene, change, message):
+    armature = moving_human()
+    settings = {"mapping": map_rig(armature), "mass": 70.0, "frame_start": 1, "frame_end": 5, **change}
+    mapping = settings.pop("mapping")
+    with pytest.raises(InputError, match=message):
+        sample_character_now(scene, armature, mapping, **settings)
+
+
+def test_left_and_right_are_not_swapped_whatever_way_the_rig_faces(scene):
+    for turn, mirror in itertools.product((0.0, 2.0), (1.0, -1.0)):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        armature = moving_human(turn=turn)
+        armature.scale = (mirror, 1.0, 1.0)
+        motion = sample(scene, armature)
+        for sole in motion.soles:
+            pose = sole.transforms[0, 0]
+            assert np.linalg.det(pose[:3, :3]) == pytest.approx(1.0)
+            other = next(o for o in motion.soles if o is not sole).transforms[0, 0, :3, 3]
+            to_other = pose[:3, :3].T @ (other - pose[:3, 3])
+            # the big toe is on the side of the other foot
+            tip = sole.sole.outline[sole.sole.outline[:, 0].argmax()]
+            assert np.sign(tip[1]) == np.sign(to_other[1])
+            # and the toes are ahead of the ankle
+            ahead = motion.joints[f"toe_{sole.sole.side.lower()}"] - motion.joints[f"ankle_{sole.sole.side.lower()}"]
+            assert ahead[0] @ pose[:3, 0] > 0.15
