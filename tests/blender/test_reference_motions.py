@@ -1,0 +1,80 @@
+"""Motion-capture files as users bring them, baked with the automatic set-up: prints where the feet were, and only there."""
+
+from itertools import pairwise
+
+import bpy
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from softground_addon.blender import bake_job
+from softground_addon.blender.character_setup import mapping_of
+from softground_addon.blender.rig_sampling import sample_character_now
+from tests.blender import shots
+
+STEPS = {"walk": 6, "run": 15, "jumping": 6, "jumping_jacks": 14}
+"""Contacts counted in the motion: heel and toe markers for walk and run, by eye for the others."""
+
+ALTERNATING = ("walk", "run")
+
+UNDER_THE_FOOT = 0.01
+"""Every print lies under its foot to this distance [m]."""
+
+
+@pytest.fixture
+def baked(scene, request):
+    shots.import_motion(request.param)
+    bpy.ops.softground.add_character()
+    result = bake_job.run(bake_job.bake(scene))
+    options = scene.softground
+    character = options.characters[0]
+    motion = sample_character_now(
+        scene,
+        character.armature,
+        mapping_of(character),
+        mass=character.mass,
+        frame_start=options.frame_start,
+        frame_end=options.frame_end,
+    )
+    return request.param, result, motion
+
+
+every_file = pytest.mark.parametrize("baked", sorted(shots.MOTION_FILES), indirect=True)
+
+
+@every_file
+def test_the_steps_are_those_that_one_counts_in_the_motion(baked):
+    name, result, _ = baked
+    contacts = [step["contact"] for step in result.report["steps"]]
+    if name in STEPS:
+        assert len(contacts) == STEPS[name]
+    if name in ALTERNATING:
+        assert all(a != b for a, b in pairwise(contacts))
+
+
+def undersides(sole, first, last):
+    """World places (N, 2) of points all over the posed patches of a sole, at the frames of a contact."""
+    places = []
+    for number, patch in enumerate(sole.sole.patches):
+        row, column = np.nonzero(patch.signed_distance <= 0)
+        flat = patch.origin + np.stack([column, row], axis=1) * patch.spacing
+        points = np.column_stack([flat, patch.heights[row, column]])
+        pose = sole.transforms[first:last, number]
+        posed = np.einsum("fij,nj->fni", pose[:, :3, :3], points) + pose[:, None, :3, 3]
+        places.append(posed[..., :2].reshape(-1, 2))
+    return np.concatenate(places)
+
+
+@every_file
+def test_every_print_lies_under_its_foot_and_nowhere_else(baked):
+    """Each pressed cell has been under the sole as it stood at some frame of the contact, to a centimetre."""
+    _, result, motion = baked
+    steps = 4  # feet that slide move by centimetres from frame to frame
+    soles = {sole.sole.name: sole for sole in motion.resampled(steps).soles}
+    for footprint in result.footprints:
+        first = max(0, int((footprint.start_frame - motion.frames[0]) * steps) - 1)
+        last = int((footprint.end_frame - motion.frames[0]) * steps) + 2
+        row, column = np.divmod(footprint.contact_cells, footprint.window.columns)
+        centre = np.stack([footprint.window.column + column, footprint.window.row + row], axis=1) + 0.5
+        distance, _ = KDTree(undersides(soles[footprint.sole], first, last)).query(centre * footprint.cell_size)
+        assert distance.max() < UNDER_THE_FOOT
