@@ -1,0 +1,262 @@
+"""Where each sole belongs on the ground that gave way under it: turned to its slope, let down or lifted onto it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contacts import runs
+from .motion import Sole, SoleMotion, SolePatch
+from .rigid import displacement, rotation
+from .slopes import fitted_slope, smoothed, upper_envelope
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ANKLE_PITCH = np.radians(25.0)
+"""Largest pitch that a foot takes on beside that of the source [rad]: feet bend up by 20-30° (dorsiflexion)."""
+ANKLE_ROLL = np.radians(15.0)
+"""Largest roll that a foot takes on beside that of the source [rad]: it everts by about 15°."""
+EDGE = 0.06
+"""The outermost part of a sole that its ground is not read under, in sole lengths: prints have soft edges there."""
+POINTS_ALONG = 9
+"""Points along a sole at which the ground is read."""
+ALIGN_TIME = 0.05
+"""Standard deviation of the smoothing of a foot's turn over time [s], for an adult."""
+CLEAR_TIME = 0.10
+"""Half the time over which a swinging foot is lifted over what is in its way [s], for an adult."""
+
+
+class PressedGround(Protocol):
+    """The ground over time, as `ground_history.GroundHistory`."""
+
+    def heights(self, x: Array, y: Array, frame: Array) -> Array:
+        """Heights at places and frames [m], NaN where there is no ground."""
+        ...
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where one sole belongs.
+
+    Attributes
+    ----------
+    carry : (F, 4, 4) float array
+        Rigid displacement from the source's sole.
+    lift : (F,) float array
+        Its vertical part [m].
+    sinkage : (F,) float array
+        How much lower it stands than it would on the undisturbed ground, 0 where it does not touch [m].
+    """
+
+    carry: Array
+    lift: Array
+    sinkage: Array
+
+
+def underside(sole: Sole, edge: float = EDGE) -> list[tuple[int, Array]]:
+    """Points spread over a sole, inside its edge: patch and positions (K, 3) in the patch's frame [m].
+
+    The landmarks where the sole has no patches.
+    """
+    if not sole.patches:
+        return [(int(p), sole.landmarks[sole.landmark_patch == p]) for p in np.unique(sole.landmark_patch)]
+    length = float(np.ptp(sole.outline, axis=0).max())
+    return [(number, _inside(patch, length, edge)) for number, patch in enumerate(sole.patches)]
+
+
+def _inside(patch: SolePatch, length: float, edge: float) -> Array:
+    stride = max(1, round(length / POINTS_ALONG / patch.spacing))
+    deepest = -float(patch.signed_distance.min())
+    inside = patch.signed_distance < -min(edge * length, 0.7 * deepest)
+    rows, columns = np.nonzero(inside)
+    on_lattice = ((rows - rows.min()) % stride == 0) & ((columns - columns.min()) % stride == 0)
+    rows, columns = rows[on_lattice], columns[on_lattice]
+    x = patch.origin[0] + columns * patch.spacing
+    y = patch.origin[1] + rows * patch.spacing
+    return np.stack([x, y, patch.heights[rows, columns]], axis=-1)
+
+
+def posed_points(motion: SoleMotion, edge: float = EDGE) -> Array:
+    """World positions of a sole's `underside`, (F, Q, 3) [m]."""
+    return np.concatenate(
+        [
+            points @ np.swapaxes(motion.transforms[:, patch, :3, :3], -1, -2) + motion.transforms[:, patch, None, :3, 3]
+            for patch, points in underside(motion.sole, edge)
+        ],
+        axis=1,
+    )
+
+
+def lowest_clearance(points: Array, ground: PressedGround, frames: Array) -> Array:
+    """Height of the lowest of the points (F, Q, 3) above the ground, (F,) [m]; infinite off the ground."""
+    heights = ground.heights(points[..., 0], points[..., 1], np.broadcast_to(frames[:, None], points.shape[:2]))
+    return np.asarray(np.where(np.isfinite(heights), points[..., 2] - heights, np.inf).min(axis=1))
+
+
+def place_sole(
+    motion: SoleMotion,
+    touching: Mask,
+    ground: PressedGround,
+    undisturbed: PressedGround,
+    frames: Array,
+    *,
+    frame_rate: float,
+    time_scale: float = 1.0,
+    align: float = 1.0,
+    lock: float = 0.0,
+) -> Placement:
+    """Put a sole on the ground.
+
+    While it touches, its lowest point lies on the ground, and it is turned by the ground's slope as far as the ankle
+    allows. Between contacts both change smoothly, and the sole keeps above the ground.
+
+    Parameters
+    ----------
+    motion : SoleMotion
+        The source, at scene frames.
+    touching : (F,) bool array
+    ground, undisturbed : PressedGround
+        As it stands at each frame, and before the bake.
+    frames : (F,) float array
+        Scene frames.
+    frame_rate : float
+        [Hz]
+    time_scale : float
+        How much slower than an adult's the motion is: sqrt(leg length / 0.9 m).
+    align : float
+        How much of the slope the foot takes on, 0 to 1.
+    lock : float
+        How much of the source's sliding during a contact is taken out, 0 to 1.
+
+    Returns
+    -------
+    Placement
+        Without effect where the sole never touches.
+    """
+    points = posed_points(motion)
+    if not touching.any():
+        carry = np.broadcast_to(np.eye(4), (len(frames), 4, 4)).copy()
+        return Placement(carry, np.zeros(len(frames)), np.zeros(len(frames)))
+    centre = points.mean(axis=1)
+    per_second = frame_rate * time_scale
+    slide = lock * slide_offset(points, touching) if lock else np.zeros_like(centre)
+    turn = rotation(
+        align
+        * _alignment(motion, points + slide[:, None], touching, ground, undisturbed, frames, ALIGN_TIME * per_second)
+    )
+    turned = np.einsum("fij,fqj->fqi", turn, points - centre[:, None]) + (centre + slide)[:, None]
+    needed = -lowest_clearance(turned, ground, frames)
+    lift = _between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching)
+    lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * per_second)))
+    moved = slide + lift[:, None] * (0.0, 0.0, 1.0)
+    on_top = -lowest_clearance(turned, undisturbed, frames)
+    sinkage = np.maximum(np.where(touching & np.isfinite(on_top), on_top - needed, 0.0), 0.0)
+    return Placement(displacement(turn, centre, centre + moved), lift, sinkage)
+
+
+def slide_offset(points: Array, touching: Mask) -> Array:
+    """What takes out the sliding of a sole's lowest points during each contact, (F, 3) [m], level.
+
+    Each contact is held where it is in its middle; between contacts the correction changes smoothly.
+    """
+    count = len(points)
+    height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    scale = 0.01 * max(float(np.ptp(points[0], axis=0).max()), 1e-9)
+    weight = np.exp(-height / scale)
+    weight /= weight.sum(axis=1, keepdims=True)
+    step = np.zeros((count, 3))
+    step[1:] = np.einsum("fq,fqi->fi", (weight[1:] + weight[:-1]) / 2, np.diff(points, axis=0))
+    step[:, 2] = 0.0
+    offset = np.zeros((count, 3))
+    for first, end in zip(*runs(touching), strict=True):
+        slid = np.cumsum(np.concatenate([np.zeros((1, 3)), step[first + 1 : end]]), axis=0)
+        offset[first:end] = slid[len(slid) // 2] - slid
+    return np.stack([_between_contacts(offset[:, i], touching) for i in range(3)], axis=-1)
+
+
+def _alignment(
+    motion: SoleMotion,
+    points: Array,
+    touching: Mask,
+    ground: PressedGround,
+    undisturbed: PressedGround,
+    frames: Array,
+    width: float,
+) -> Array:
+    """Rotation vectors (F, 3) that turn the foot by the slope under it, against the slope that it was posed for."""
+    heading = motion.transforms[:, 0, :2, 0]
+    heading = heading / np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-9)
+    slope = _slope(points, ground, frames) - _posed_for(motion, points, touching, undisturbed, frames)
+    left = np.stack([-heading[:, 1], heading[:, 0]], axis=-1)
+    pitch = np.clip(np.sum(slope * heading, axis=1), -ANKLE_PITCH, ANKLE_PITCH)
+    roll = np.clip(np.sum(slope * left, axis=1), -ANKLE_ROLL, ANKLE_ROLL)
+    slope = pitch[:, None] * heading + roll[:, None] * left
+    contact = np.flatnonzero(touching)
+    now = np.arange(len(frames))
+    slope = np.stack([np.interp(now, contact, slope[contact, i]) for i in range(2)], axis=-1)
+    slope = smoothed(slope, width)
+    return np.stack([slope[:, 1], -slope[:, 0], np.zeros(len(slope))], axis=-1)
+
+
+def _slope(points: Array, ground: PressedGround, frames: Array) -> Array:
+    when = np.broadcast_to(frames[:, None], points.shape[:2])
+    heights = ground.heights(points[..., 0], points[..., 1], when)
+    return fitted_slope(np.concatenate([points[..., :2], heights[..., None]], axis=-1), np.ones(heights.shape))
+
+
+def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: PressedGround, frames: Array) -> Array:
+    """Slope (F, 2) of the ground that the source's foot was posed for: in each contact level, or the terrain's own."""
+    terrain = _slope(points, undisturbed, frames)
+    posed = np.zeros_like(terrain)
+    up = motion.transforms[:, 0, :3, 2]
+    normal = np.concatenate([-np.tan(terrain), np.ones((len(terrain), 1))], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    to_terrain = np.arccos(np.clip(np.sum(up * normal, axis=1), -1, 1))
+    to_level = np.arccos(np.clip(up[:, 2], -1, 1))
+    for first, end in zip(*runs(touching), strict=True):
+        if to_terrain[first:end].min() < to_level[first:end].min():
+            posed[first:end] = terrain[first:end]
+    return posed
+
+
+def _between_contacts(values: Array, touching: Mask) -> Array:
+    """Values (F,) of the contacts, with a cubic from the end of each to the start of the next; the ends held."""
+    starts, ends = runs(touching)
+    result = values.copy()
+    result[: starts[0]] = values[starts[0]]
+    result[ends[-1] :] = values[ends[-1] - 1]
+    for last, first in zip(ends[:-1] - 1, starts[1:], strict=True):
+        gap = first - last
+        u = np.arange(1, gap) / gap
+        a, b = values[last], values[first]
+        steepest = 1.5 * max(abs(b - a), 1e-3)
+        before = np.clip((a - values[last - 1]) * gap if last > 0 and touching[last - 1] else 0.0, -steepest, steepest)
+        further = first + 1 < len(values) and touching[first + 1]
+        after = np.clip((values[first + 1] - b) * gap if further else 0.0, -steepest, steepest)
+        result[last + 1 : first] = a + u * (
+            before + u * (3 * (b - a) - 2 * before - after + u * (2 * (a - b) + before + after))
+        )
+    return result
+
+
+def _swing_clearance(missing: Array, touching: Mask, reach: int) -> Array:
+    """Further lift (F,) over what is in the way between contacts, 0 at their ends [m]."""
+    extra = np.zeros(len(missing))
+    wanted = upper_envelope(np.where(touching | ~np.isfinite(missing), 0.0, np.maximum(missing, 0.0)), reach)
+    distance = _frames_from_contact(touching)
+    fade = np.clip(distance / (reach + 1), 0.0, 1.0)
+    extra[~touching] = (wanted * fade * fade * (3 - 2 * fade))[~touching]
+    return extra
+
+
+def _frames_from_contact(touching: Mask) -> Array:
+    index = np.arange(len(touching))
+    contact = np.flatnonzero(touching)
+    place = np.searchsorted(contact, index)
+    before = np.abs(index - contact[np.maximum(place - 1, 0)])
+    after = np.abs(contact[np.minimum(place, len(contact) - 1)] - index)
+    return np.minimum(before, after).astype(float)

@@ -1,0 +1,84 @@
+"""The height of the pressed ground at any place and frame, from the record of footprints and without simulating."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .footprints import QUANTUM, Changes, Footprint
+from .heightfield import Terrain, Window
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Print:
+    """One footprint's change of height over time: `change[k]` holds from frame `frames[k]` on."""
+
+    window: Window
+    frames: Array
+    change: NDArray[np.float32]  # (K + 1, cells), 0 at first
+
+
+class GroundHistory:
+    """The ground as it stood at the scene frames of a bake.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        The undisturbed ground.
+    footprints : sequence of Footprint
+        In any order.
+    """
+
+    def __init__(self, terrain: Terrain, footprints: Sequence[Footprint] = ()) -> None:
+        self.terrain = terrain
+        self._cell_size = footprints[0].cell_size if footprints else 1.0
+        self._prints = [_series(footprint) for footprint in footprints]
+
+    def heights(self, x: Array, y: Array, frame: Array) -> Array:
+        """Heights at places and frames, arrays of one shape [m]; NaN where there is no ground."""
+        return np.asarray(self.terrain.heights(x, y) + self.change(x, y, frame))
+
+    def change(self, x: Array, y: Array, frame: Array) -> Array:
+        """Change of height against the undisturbed ground [m], bilinear between the centres of cells."""
+        shape = np.shape(x)
+        column, row = np.ravel(x) / self._cell_size - 0.5, np.ravel(y) / self._cell_size - 0.5
+        when = np.ravel(frame)
+        total = np.zeros(len(when))
+        for footprint in self._prints:
+            window = footprint.window
+            u, v = column - window.column, row - window.row
+            near = np.flatnonzero(
+                (u > -1) & (u < window.columns) & (v > -1) & (v < window.rows) & (when >= footprint.frames[0] - 1e-6)
+            )
+            if len(near):
+                step = np.searchsorted(footprint.frames, when[near] + 1e-6, side="right")
+                total[near] += _bilinear(footprint, step, u[near], v[near])
+        return total.reshape(shape)
+
+
+def _series(footprint: Footprint) -> _Print:
+    parts: list[Changes] = [footprint.compression, footprint.rim]
+    frames = np.unique(np.concatenate([np.asarray(part.frames) for part in parts] + [[footprint.start_frame]]))
+    change = np.zeros((len(frames) + 1, footprint.window.cells), dtype=np.float32)
+    for part, sign in zip(parts, (-1.0, 1.0), strict=True):
+        step = np.repeat(np.searchsorted(frames, part.frames) + 1, np.diff(part.first))
+        np.add.at(change, (step, part.cells), (sign * QUANTUM * part.amounts).astype(np.float32))
+    np.cumsum(change, axis=0, out=change)
+    return _Print(footprint.window, frames, change)
+
+
+def _bilinear(footprint: _Print, step: NDArray[np.intp], u: Array, v: Array) -> Array:
+    window = footprint.window
+    left, low = np.floor(u).astype(int), np.floor(v).astype(int)
+    result = np.zeros(len(u))
+    for i, part_u in ((left, 1 - (u - left)), (left + 1, u - left)):
+        for j, part_v in ((low, 1 - (v - low)), (low + 1, v - low)):
+            inside = (i >= 0) & (i < window.columns) & (j >= 0) & (j < window.rows)
+            cell = np.where(inside, j * window.columns + i, 0)
+            result += np.where(inside, part_u * part_v * footprint.change[step, cell], 0.0)
+    return result

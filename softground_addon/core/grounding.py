@@ -1,0 +1,248 @@
+"""Hips and legs that follow the soles: how far the body comes down, and what carries each part of each leg."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .foot_placement import Placement
+from .legs import Leg, solve
+from .motion import CharacterMotion, SoleMotion
+from .rigid import carried, displacement, rotation
+from .slopes import smoothed, upper_envelope
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ADULT_LEG = 0.9
+"""Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
+ON_THE_ANKLE = 0.4
+"""A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
+LOWER_FOOT = 0.02
+"""How much lower one foot must stand for the hips to follow it rather than the other, in leg lengths."""
+HIPS_TIME = 0.10
+"""Standard deviation of the smoothing of the hips' height over time [s], for an adult."""
+LOAD_TIME = 0.05
+"""Standard deviation of the passing of weight from foot to foot [s], for an adult."""
+REACH_TIME = 0.15
+"""Time before and after in which the hips come down to what the legs can reach [s], for an adult."""
+COMFORTABLE_REACH = 0.985
+"""A leg may stretch so far, over its length, or as far as in the source where that is more."""
+
+
+@dataclass(frozen=True)
+class LegResponse:
+    """What carries the parts of one leg from the source to where they belong, (F, 4, 4) rigid displacements."""
+
+    thigh: Array
+    shank: Array
+    foot: Array
+
+
+@dataclass(frozen=True)
+class Response:
+    """How a character answers the ground: rigid displacements of its parts in the world, on top of the source.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+        Scene frames.
+    body : (F, 4, 4) float array
+        Of hips, trunk, head and arms.
+    legs : mapping of str to LegResponse
+        By side, "l" and "r".
+    lean : (F, 2) float array
+        Angle that the body leans toward +x and +y [rad].
+    arms : (F,) float array
+        Angle by which the upper arms are raised sideways [rad].
+    """
+
+    frames: Array
+    body: Array
+    legs: Mapping[str, LegResponse]
+    lean: Array
+    arms: Array
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing moves."""
+        parts = [self.body, *(part for leg in self.legs.values() for part in (leg.thigh, leg.shank, leg.foot))]
+        return not self.arms.any() and all(np.allclose(part, np.eye(4), atol=1e-7) for part in parts)
+
+
+def leg_soles(motion: CharacterMotion) -> dict[str, int]:
+    """For each side with a whole leg, the sole that it stands on."""
+    found: dict[str, int] = {}
+    for side in "lr":
+        if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee", "ankle")):
+            continue
+        ankle = motion.joints[f"ankle_{side}"]
+        distances = [
+            float(np.linalg.norm(sole.landmark_positions().mean(axis=1) - ankle, axis=-1).mean())
+            for sole in motion.soles
+        ]
+        near = [
+            index
+            for index, sole in enumerate(motion.soles)
+            if sole.sole.side.lower() == side and distances[index] < ON_THE_ANKLE * motion.leg_length
+        ]
+        if near:
+            found[side] = min(near, key=lambda index: distances[index])
+    return found
+
+
+def leg_of(motion: CharacterMotion, side: str, sole: int) -> Leg:
+    """The joints of one leg."""
+    joints = motion.joints
+    return Leg(
+        joints[f"hip_{side}"],
+        joints[f"knee_{side}"],
+        joints[f"ankle_{side}"],
+        motion.soles[sole].transforms[:, 0, :3, 0],
+    )
+
+
+def time_scale(motion: CharacterMotion) -> float:
+    """How much slower than an adult's a motion of the same kind is."""
+    return float(np.sqrt(motion.leg_length / ADULT_LEG))
+
+
+def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> Array:
+    """Height that the hips gain (F,) [m]: what the standing soles gain on the whole, less the sinkage of the deeper.
+
+    Smooth over time: weight passes from foot to foot, and hips that would drop into every print anew bounce.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    placements : mapping of int to Placement
+        By sole.
+    touching : (F, S) bool array
+    """
+    per_second = motion.frame_rate * time_scale(motion)
+    if not placements:
+        return np.zeros(len(motion.frames))
+    stands = touching[:, list(placements)]
+    load = smoothed(stands.astype(float), LOAD_TIME * per_second) ** 2 * stands
+    sinkage = np.stack([placement.sinkage for placement in placements.values()], axis=1)
+    unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
+    deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
+    width = HIPS_TIME * per_second
+    return _mean_over_time(unsunk, load, width) - _mean_over_time(sinkage, load * deeper, width)
+
+
+def _mean_over_time(values: Array, weights: Array, width: float) -> Array:
+    """Weighted mean (F,) of values (F, S) under a Gaussian over time, straight where nothing has weight for long."""
+    total = smoothed(weights.sum(axis=1), width)
+    known = np.flatnonzero(total > 1e-3 * max(float(total.max()), 1e-12))
+    if not len(known):
+        return np.zeros(len(values))
+    mean = smoothed((weights * values).sum(axis=1), width)[known] / total[known]
+    return smoothed(np.interp(np.arange(len(values)), known, mean), width / 2)
+
+
+def settle(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    *,
+    crouch: Array | None = None,
+) -> Response:
+    """Bring the hips to where they belong and solve the legs.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    placements : mapping of str to (int, Placement)
+        By side: the leg's sole and where it belongs.
+    touching : (F, S) bool array
+    lean : (F, 2) float array
+        Angle that the body leans toward +x and +y [rad], pivoting about the ground below the hips.
+    crouch : (F,) float array, optional
+        How much deeper the hips go by choice [m].
+    """
+    count = len(motion.frames)
+    hips = hips_of(motion)
+    height = hips_follow(motion, dict(placements.values()), touching)
+    if crouch is not None:
+        height = height - crouch
+    turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(count)], axis=-1))
+    pivot = hips - (0.0, 0.0, motion.leg_length)
+    tilted = displacement(turn, pivot, pivot)
+    raised = np.zeros((count, 3))
+    raised[:, 2] = height
+    legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
+    ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
+    short = np.zeros(count)
+    for side, leg in legs.items():
+        hip = carried(tilted, leg.hip) + raised
+        short = np.maximum(short, _out_of_reach(leg, hip, ankles[side]))
+    reach = round(REACH_TIME * motion.frame_rate * time_scale(motion))
+    raised[:, 2] -= upper_envelope(short, max(1, reach))
+    body = tilted.copy()
+    body[:, :3, 3] += raised
+    responses = {}
+    for side, leg in legs.items():
+        solved = solve(leg, carried(body, leg.hip), ankles[side])
+        foot = placements[side][1].carry.copy()
+        foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
+        responses[side] = LegResponse(solved.thigh, solved.shank, foot)
+    return Response(motion.frames, body, responses, lean, np.zeros(count))
+
+
+def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:
+    """How far the hip must come down for the ankle to be in reach, (F,) [m]."""
+    reach = leg.length * np.maximum(leg.extension, COMFORTABLE_REACH)
+    level = np.linalg.norm((ankle - hip)[:, :2], axis=1)
+    below = hip[:, 2] - ankle[:, 2]
+    return np.asarray(np.where(below > 0, below - np.sqrt(np.maximum(reach**2 - level**2, 0.0)), 0.0).clip(min=0.0))
+
+
+def hips_of(motion: CharacterMotion) -> Array:
+    """Path of the hips (F, 3) [m]; the middle of the hip joints, or above the soles, where they are not mapped."""
+    joints = motion.joints
+    if "hips" in joints:
+        return joints["hips"]
+    if "hip_l" in joints and "hip_r" in joints:
+        return (joints["hip_l"] + joints["hip_r"]) / 2
+    middle = np.mean([sole.landmark_positions().mean(axis=1) for sole in motion.soles], axis=0)
+    return middle + np.array((0.0, 0.0, motion.leg_length))
+
+
+def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
+    """The motion with the response on top of it."""
+    feet = leg_soles(motion)
+    carry_of_joint = {
+        f"{joint}_{side}": part
+        for side, leg in response.legs.items()
+        for joint, part in (
+            ("hip", response.body),
+            ("knee", leg.thigh),
+            ("ankle", leg.shank),
+            ("ball", leg.foot),
+            ("toe", leg.foot),
+        )
+    }
+    joints = {name: carried(carry_of_joint.get(name, response.body), path) for name, path in motion.joints.items()}
+    soles = []
+    for index, sole in enumerate(motion.soles):
+        side = next((side for side in response.legs if feet.get(side) == index or _worn(motion, sole, side)), None)
+        carry = response.legs[side].foot if side else response.body
+        soles.append(SoleMotion(sole.sole, carry[:, None] @ sole.transforms))
+    return dataclasses.replace(motion, joints=joints, soles=tuple(soles))
+
+
+def _worn(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
+    """Whether a sole, such as a snowshoe, goes with the foot of a side."""
+    if sole.sole.side.lower() not in (side, ""):
+        return False
+    distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
+    return (
+        float(distance.mean()) < ON_THE_ANKLE * motion.leg_length and float(np.ptp(distance)) < 0.05 * motion.leg_length
+    )

@@ -1,0 +1,228 @@
+"""How a character answers the ground it presses: the composer of tilt and grounding (MODEL.md section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contacts import detect_contacts
+from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
+from .footprints import Footprint
+from .ground_history import GroundHistory
+from .grounding import Response, hips_of, leg_soles, responding, settle, time_scale
+from .heightfield import FlatTerrain, Terrain
+from .motion import CharacterMotion
+from .slopes import fitted_slope, smoothed
+from .tilt import LARGEST_LEAN, TiltGains, along_heading, lean, ring_around
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HEADING_TIME = 0.25
+"""Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""
+RING_WEIGHT = 0.15
+"""What a place of the ring around the body counts beside one under a sole that stands."""
+
+
+@dataclass(frozen=True)
+class TiltOptions:
+    """How the body leans.
+
+    Attributes
+    ----------
+    gains : TiltGains
+    strength : float
+        Part of the controller's lean that the body takes on.
+    lateral : float
+        The same of the lean across the direction of walking, 0 to 1 of the strength.
+    """
+
+    gains: TiltGains = field(default_factory=TiltGains)
+    strength: float = 0.5
+    lateral: float = 1.0
+
+
+@dataclass(frozen=True)
+class GroundingOptions:
+    """How the feet find the ground.
+
+    Attributes
+    ----------
+    align : float
+        How much of the ground's slope the feet take on, 0 to 1.
+    lock : float
+        How much of the source's sliding is taken out of contacts, 0 to 1.
+    """
+
+    align: float = 1.0
+    lock: float = 0.0
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """How far the lowest point of each sole is off the ground while it touches.
+
+    Attributes
+    ----------
+    frames : (K,) float array
+        Scene frames.
+    soles : (K,) int array
+    heights : (K,) float array
+        Positive where the sole floats, negative where it is in the ground [m].
+    """
+
+    frames: Array
+    soles: NDArray[np.intp]
+    heights: Array
+
+
+def respond(
+    motion: CharacterMotion,
+    touching: Mask,
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    *,
+    tilt: TiltOptions | None,
+    grounding: GroundingOptions | None,
+) -> Response:
+    """The response to a ground that has been pressed.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    touching : (F, S) bool array
+        At scene frames.
+    terrain : Terrain
+        The undisturbed ground.
+    footprints : sequence of Footprint
+        All that the ground holds, of all characters.
+    tilt, grounding : options, or None to leave that out
+    """
+    history = GroundHistory(terrain, footprints)
+    undisturbed = GroundHistory(terrain)
+    feet = leg_soles(motion)
+    placements = {}
+    for side, sole in feet.items():
+        if grounding is None:
+            placement = _unmoved(len(motion.frames))
+        else:
+            placement = place_sole(
+                motion.soles[sole],
+                touching[:, sole],
+                history,
+                undisturbed,
+                motion.frames,
+                frame_rate=motion.frame_rate,
+                time_scale=time_scale(motion),
+                align=grounding.align,
+                lock=grounding.lock,
+            )
+        placements[side] = (sole, placement)
+    leaning = np.zeros((len(motion.frames), 2))
+    if tilt is not None:
+        leaning = tilt.strength * _lean(motion, touching, history, tilt)
+    return settle(motion, placements, touching, leaning)
+
+
+def _unmoved(count: int) -> Placement:
+    return Placement(np.broadcast_to(np.eye(4), (count, 4, 4)), np.zeros(count), np.zeros(count))
+
+
+def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt: TiltOptions) -> Array:
+    slope = along_heading(seen_slope(motion, touching, history), _heading(motion), tilt.lateral)
+    supported = smoothed(touching.any(axis=1).astype(float), 1.0)
+    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=supported, limit=LARGEST_LEAN)
+
+
+def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) -> Array:
+    """Slope of the ground that carries the body (F, 2) [rad], at each frame as it stood one frame before."""
+    ring = ring_around(hips_of(motion)[:, :2], motion.leg_length)
+    soles = [posed_points(sole)[..., :2] for sole in motion.soles]
+    places = np.concatenate([*soles, ring], axis=1)
+    weights = [np.broadcast_to(touching[:, i, None], part.shape[:2]) / part.shape[1] for i, part in enumerate(soles)]
+    weight = np.concatenate([*weights, np.full(ring.shape[:2], RING_WEIGHT)], axis=1)
+    before = motion.frames - motion.time_step * motion.frame_rate
+    heights = history.heights(places[..., 0], places[..., 1], np.broadcast_to(before[:, None], weight.shape))
+    return fitted_slope(np.concatenate([places, heights[..., None]], axis=-1), weight)
+
+
+def _heading(motion: CharacterMotion) -> Array:
+    """Level direction in which the body walks (F, 2), where its feet point while it stands."""
+    width = HEADING_TIME * motion.frame_rate * time_scale(motion)
+    path = smoothed(hips_of(motion)[:, :2], width)
+    velocity = np.gradient(path, axis=0) * motion.frame_rate if len(path) > 1 else np.zeros_like(path)
+    feet = np.mean([sole.transforms[:, 0, :2, 0] for sole in motion.soles], axis=0)
+    slow = 0.05 * np.sqrt(motion.gravity * motion.leg_length)
+    direction = velocity + slow * smoothed(feet, width)
+    return np.asarray(direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9))
+
+
+def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: Sequence[Footprint]) -> Gaps:
+    """Distance of each standing sole's lowest point from the ground as it is at that frame."""
+    history = GroundHistory(terrain, footprints)
+    frames, soles, heights = [], [], []
+    for index, sole in enumerate(motion.soles):
+        stands = np.flatnonzero(touching[:, index])
+        clearance = lowest_clearance(posed_points(sole)[stands], history, motion.frames[stands])
+        known = np.isfinite(clearance)
+        frames.append(motion.frames[stands][known])
+        soles.append(np.full(int(known.sum()), index))
+        heights.append(clearance[known])
+    return Gaps(np.concatenate(frames), np.concatenate(soles), np.concatenate(heights))
+
+
+def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
+    """The motion on the terrain that it will walk on: as it is where it was made for it, else put on it.
+
+    A walk that was made for level ground and is placed on a hill or on bumps touches nothing as it is. Its contacts
+    are those with the level that it was made for; its feet are put on the terrain, and hips and legs follow.
+    """
+    level = _level_of(motion)
+    if level is None or not _fits_better(motion, level, terrain):
+        return motion
+    touching = detect_contacts(motion, FlatTerrain(level)).touching
+    response = respond(motion, touching, terrain, (), tilt=None, grounding=GroundingOptions())
+    return responding(motion, response)
+
+
+_UNEVEN = 0.005
+"""Spread of the terrain's height under the soles from which on a motion for level ground needs to be put on it, in leg
+lengths."""
+
+
+def _level_of(motion: CharacterMotion) -> float | None:
+    """Height of the level that the soles stand on [m]; None where they stand at no one height."""
+    lowest = [sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles]
+    low = float(np.median([np.percentile(height, 10.0) for height in lowest]))
+    offset = detect_contacts(motion, FlatTerrain(low)).offset
+    return low + float(np.median(offset)) if np.isfinite(offset).all() else None
+
+
+def _fits_better(motion: CharacterMotion, level: float, terrain: Terrain) -> bool:
+    """Whether the soles stand at one level more nearly than on the terrain, and the terrain is not level itself."""
+    on_level = detect_contacts(motion, FlatTerrain(level)).touching
+    heights, clearances = [], []
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        place = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
+        ground = terrain.heights(place[:, 0], place[:, 1])
+        stands = on_level[:, index] & np.isfinite(ground)
+        heights.append(ground[stands])
+        clearances.append((place[:, 2] - ground)[stands])
+    ground_heights, clearance = np.concatenate(heights), np.concatenate(clearances)
+    if len(clearance) < 2:
+        return False
+    return (
+        float(np.ptp(ground_heights)) > _UNEVEN * motion.leg_length
+        and float(np.std(clearance)) > _UNEVEN * motion.leg_length
+    )
+
+
+def at_scene_frames(touching: Mask, frames: Array, motion: CharacterMotion) -> Mask:
+    """States (N, S) of the simulation's time grid at the scene frames of a motion, (F, S)."""
+    index = np.searchsorted(frames, motion.frames - 1e-6)
+    return np.asarray(touching[np.minimum(index, len(frames) - 1)])
