@@ -7,12 +7,20 @@ VENV := .venv$(if $(filter-out 4.5.15,$(BPY)),-$(BPY))
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready-$(BPY)
 
-.PHONY: test slow bench validate lint types clean
+# make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found.
+MOTION ?=
+SCALE ?= 0.01
+UP ?=
+
+.PHONY: demo test slow bench validate lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet bpy==$(BPY) -r requirements/test.txt
 	touch $@
+
+demo: $(READY)
+	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
 
 test: $(READY)
 	$(BIN)/python -m pytest $(TESTS)

@@ -113,7 +113,8 @@ def _material(part: str) -> bpy.types.Material:
     if material is None:
         colour, roughness = _LOOKS[part]
         material = bpy.data.materials.new(name)
-        material.use_nodes = True
+        if material.node_tree is None:
+            material.use_nodes = True
         shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         shader.inputs["Base Color"].default_value = (*colour, 1.0)
         shader.inputs["Roughness"].default_value = roughness
