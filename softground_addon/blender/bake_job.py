@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import asdict, dataclass
-from typing import TypeVar
+from dataclasses import asdict, dataclass, replace
+from typing import Any, TypeVar
 
 import bpy
 import numpy as np
@@ -90,6 +90,28 @@ class BakeResult:
     footprints: tuple[Footprint, ...]
 
 
+@dataclass(frozen=True)
+class Shot:
+    """A shot as it was read from the scene.
+
+    Attributes
+    ----------
+    motions : tuple of CharacterMotion
+        At scene frames.
+    plan : GroundPlan
+        Area and height of the walk.
+    surface : GroundSurface or None
+        The scene's ground, if it has one.
+    terrain : Terrain
+        The undisturbed ground.
+    """
+
+    motions: tuple[CharacterMotion, ...]
+    plan: GroundPlan
+    surface: GroundSurface | None
+    terrain: Terrain
+
+
 Job = Generator[Progress, None, Result]
 
 
@@ -127,21 +149,14 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     started = time.perf_counter()
     options = scene.softground
     characters = [character for character in options.characters if character.armature]
-    check_settings(scene, characters)
     material, cell_size = settings.material_of(scene), settings.cell_size_of(scene)
     unit_scale = scene.unit_settings.scale_length
-    motions = yield from _sample(scene, characters)
+    shot = yield from read_shot(scene)
+    motions, plan, surface, terrain = shot.motions, shot.plan, shot.surface, shot.terrain
+    ground: bpy.types.Object | None = options.ground
     sampled = time.perf_counter()
 
-    ground: bpy.types.Object | None = options.ground
-    surface = ground_mesh.undisturbed_surface(ground, unit_scale) if ground else None
-    plan = plan_ground(motions)
-    terrain = surface.terrain(np.stack([plan.lower, plan.upper])) if surface else FlatTerrain(plan.height)
-    loads = [
-        estimate_loads(motion, terrain, force_model=character.force_model, material=material)
-        for motion, character in zip(motions, characters, strict=True)
-    ]
-    _check_contacts(loads, terrain, ground)
+    loads = yield from estimate_shot(scene, shot)
     footprints, forces = yield from _simulate(loads, terrain, material, cell_size)
     check_volumes(footprints, material)
     simulated = time.perf_counter()
@@ -190,8 +205,49 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         warnings=_warnings(footprints),
         forces=forces if options.keep_forces else None,
     )
+    if write and ground:
+        ground_mesh.mesh_of(ground)[ground_mesh.SUMMARY] = _summary(result)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
+
+
+def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
+    """What the scene's characters do, and the ground that they do it on.
+
+    Raises
+    ------
+    InputError
+        If the settings, a character or the ground cannot be used; names it and the remedy.
+    """
+    options = scene.softground
+    characters = [character for character in options.characters if character.armature]
+    check_settings(scene, characters)
+    motions = yield from _sample(scene, characters)
+    plan = plan_ground(motions)
+    if options.ground is None:
+        return Shot(tuple(motions), plan, None, FlatTerrain(plan.height))
+    surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length)
+    yield Progress("sample", 1.0)
+    return Shot(tuple(motions), plan, surface, surface.terrain(np.stack([plan.lower, plan.upper])))
+
+
+def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads]]:
+    """The loads of all characters of a shot, with the masses and force models that the scene has now.
+
+    Raises
+    ------
+    InputError
+        If nobody touches the ground.
+    """
+    material = settings.material_of(scene)
+    characters = [character for character in scene.softground.characters if character.armature]
+    loads = []
+    for motion, character in zip(shot.motions, characters, strict=True):
+        moved = replace(motion, mass=settings.typed(character.mass))
+        loads.append(estimate_loads(moved, shot.terrain, force_model=character.force_model, material=material))
+        yield Progress("sample", 1.0)
+    _check_contacts(loads, shot.terrain, scene.softground.ground)
+    return loads
 
 
 def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
@@ -280,7 +336,7 @@ def _simulate(
         frames.append(result.frame)
         forces.append(result.forces)
         yield Progress("simulate", min(1.0, len(frames) * _steps_per_frame(loads) / count))
-    footprints.sort(key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
+    footprints.sort(key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole))
     return footprints, _force_table(loads, frames, forces)
 
 
@@ -370,6 +426,13 @@ def _warnings(footprints: Sequence[Footprint]) -> list[str]:
     if unplaced <= 0:
         return []
     return [f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."]
+
+
+def _summary(result: dict[str, Any]) -> dict[str, float]:
+    """What the panel shows of a bake."""
+    totals, timings = result["totals"], result["timings"]
+    seconds = sum(timings[stage] for stage in STAGES)
+    return {key: totals[key] for key in ("steps", "max_depth_m", "peak_force_n")} | {"seconds": seconds}
 
 
 def _offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:

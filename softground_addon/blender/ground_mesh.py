@@ -34,6 +34,7 @@ RIM = "softground_rim"
 AGE = "softground_age"
 SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
 RECORD = "softground_record"
+SUMMARY = "softground_summary"
 
 ON_SURFACE = 2e-3
 """Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
@@ -132,7 +133,7 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     InputError
         If some are no numbers.
     """
-    vertices = _transform(_to_world(ground, unit_scale), _rest_positions(mesh_of(ground)))
+    vertices = _transform(to_world_of(ground, unit_scale), _rest_positions(mesh_of(ground)))
     if not np.isfinite(vertices).all():
         raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
     return vertices
@@ -148,11 +149,11 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
     """
     mesh = mesh_of(ground)
     vertices = rest_vertices(ground, unit_scale)
-    to_world = _to_world(ground, unit_scale)
+    to_world = to_world_of(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
         surface, triangles = vertices, _triangles(mesh)
     else:
-        with _undisturbed_copy(ground, _rest_positions(mesh)) as evaluated:
+        with undisturbed_copy(ground) as evaluated:
             surface = _transform(to_world, _positions(evaluated))
             triangles = _triangles(evaluated)
         if len(surface) == len(vertices):
@@ -162,7 +163,7 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
     return GroundSurface(vertices, surface, triangles)
 
 
-def _to_world(ground: bpy.types.Object, unit_scale: float) -> Array:
+def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     """Object space to world space in metres, (4, 4)."""
     matrix = np.array(ground.matrix_world, dtype=np.float64)
     matrix[:3] *= unit_scale
@@ -170,12 +171,14 @@ def _to_world(ground: bpy.types.Object, unit_scale: float) -> Array:
 
 
 @contextmanager
-def _undisturbed_copy(ground: bpy.types.Object, rest: NDArray[np.float32]) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh of the ground with its modifiers but without its bake."""
+def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     copy, mesh = ground.copy(), mesh_of(ground).copy()
     try:
         copy.data = mesh
+        copy.hide_viewport = False
+        rest = _rest_positions(mesh)
         copy.shape_key_clear()
         if played := playback.modifier_of(copy):
             copy.modifiers.remove(played)
@@ -322,6 +325,7 @@ def restore(ground: bpy.types.Object) -> None:
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
     del mesh[RECORD]
+    mesh.pop(SUMMARY, None)
     _write_positions(mesh, rest)
 
 

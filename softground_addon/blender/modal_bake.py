@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import Any, cast
+from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core.errors import SoftGroundError
 from . import bake_job, session, settings
 from .operators import reports_errors
+from .translation import iface_, rpt_
 
 TICK = 0.03
 """Longest work between two looks at the user's events [s]; a single step of the bake may exceed it."""
@@ -61,7 +60,7 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
-        return cast("set[str]", run(context))
+        return run(context)
 
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
@@ -162,7 +161,8 @@ class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether there is a bake to cancel."""
         cls.poll_message_set("No bake is running")
         return bool(session.current().is_baking)
 

@@ -5,24 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.motion import JOINTS
-from . import ground_mesh, session, settings
+from . import session, settings
 from .character_editing import active_character, active_sole
+from .translation import iface_
 
 CATEGORY = "SoftGround"
 
 BYTES_PER_CELL = 16 + 64
-"""Memory of one touched cell: two 64-bit floats of state, and a mesh vertex with its rest position, keys, and shading."""
+"""Memory of one touched cell: its state, and a mesh vertex with rest position, keys and shading."""
 
 
 class _Panel:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
+    bl_space_type: Any = "VIEW_3D"
+    bl_region_type: Any = "UI"
     bl_category = CATEGORY
 
-    layout: bpy.types.UILayout
+    layout: Any
 
     def column(self) -> bpy.types.UILayout:
         """The layout in Blender's property style; greyed while a bake runs."""
@@ -37,7 +37,15 @@ class SOFTGROUND_UL_characters(bpy.types.UIList):
     """Characters by name, each with its armature."""
 
     def draw_item(
-        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+        self,
+        _context: Any,
+        layout: Any,
+        _data: Any,
+        item: Any,
+        _icon: Any,
+        _active: Any,
+        _property: Any,
+        _index: int = 0,
     ) -> None:
         icon = "ARMATURE_DATA" if item.armature else "ERROR"
         layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
@@ -47,7 +55,15 @@ class SOFTGROUND_UL_soles(bpy.types.UIList):
     """Soles by name, each with its side."""
 
     def draw_item(
-        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: Any, _active: Any, _property: Any, _index: int = 0
+        self,
+        _context: Any,
+        layout: Any,
+        _data: Any,
+        item: Any,
+        _icon: Any,
+        _active: Any,
+        _property: Any,
+        _index: int = 0,
     ) -> None:
         layout.prop(item, "name", text="", emboss=False, icon="MOD_DYNAMICPAINT")
         layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
@@ -82,7 +98,7 @@ class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
 
 class _OfCharacter(_Panel):
     bl_parent_id = "SOFTGROUND_PT_character"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -180,7 +196,7 @@ class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
 
     bl_label = "Details"
     bl_parent_id = "SOFTGROUND_PT_material"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.column().column()

@@ -1,0 +1,113 @@
+"""A hand on mouse and keyboard of a real Blender, and an eye on its window. Runs inside Blender."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+Pause = float
+"""Seconds until the story goes on; Blender handles events and draws in between."""
+
+Steps = Iterator[Pause]
+
+SHORT: Pause = 0.05
+ROW = 9
+"""Distance between two places where a button is looked for, less than half a button's height [px]."""
+
+
+class Hand:
+    """Moves, clicks, types and looks, by simulated events of the first window."""
+
+    def __init__(self, pictures: Path) -> None:
+        self.pictures = pictures
+        self.place = (0, 0)
+
+    @property
+    def window(self) -> Any:
+        return bpy.context.window_manager.windows[0]
+
+    def area(self, kind: str = "VIEW_3D") -> Any:
+        return max((a for a in self.window.screen.areas if a.type == kind), key=lambda a: a.width * a.height)
+
+    def region(self, kind: str = "UI", area: str = "VIEW_3D") -> Any:
+        return next(region for region in self.area(area).regions if region.type == kind)
+
+    def event(self, kind: str, value: str, **modifiers: bool) -> None:
+        x, y = self.place
+        self.window.event_simulate(kind, value, x=x, y=y, **modifiers)
+
+    def move(self, x: int, y: int) -> Steps:
+        self.place = (int(x), int(y))
+        self.event("MOUSEMOVE", "NOTHING")
+        yield SHORT
+
+    def click(self, x: int, y: int) -> Steps:
+        yield from self.move(x, y)
+        yield SHORT
+        self.event("LEFTMOUSE", "PRESS")
+        yield SHORT
+        self.event("LEFTMOUSE", "RELEASE")
+        yield SHORT
+
+    def key(self, kind: str, **modifiers: bool) -> Steps:
+        self.event(kind, "PRESS", **modifiers)
+        yield SHORT
+        self.event(kind, "RELEASE", **modifiers)
+        yield SHORT
+
+    def type(self, text: str) -> Steps:
+        names = {".": "PERIOD", " ": "SPACE", "_": "MINUS", **dict(zip("0123456789", _DIGITS, strict=True))}
+        for letter in text:
+            x, y = self.place
+            kind = names.get(letter, letter.upper())
+            self.window.event_simulate(kind, "PRESS", unicode=letter, x=x, y=y)
+            yield SHORT
+            self.window.event_simulate(kind, "RELEASE", x=x, y=y)
+        yield SHORT
+
+    def wait_for(self, condition: Callable[[], bool], seconds: float) -> Steps:
+        waited = 0.0
+        while not condition():
+            if waited > seconds:
+                raise TimeoutError(f"waited {seconds} s in vain")
+            yield 0.1
+            waited += 0.1
+
+    def picture(self, name: str) -> Steps:
+        yield 0.5
+        subprocess.run(["import", "-window", "root", str(self.pictures / f"{name}.png")], check=True)
+
+    def open_sidebar(self, tab: str = "SoftGround") -> Steps:
+        self.area().spaces.active.show_region_ui = True
+        yield 0.5
+        self.region().active_panel_category = tab
+        self.region().tag_redraw()
+        yield 0.5
+
+    def find_button(self, operator: str, offset: float = 0.5) -> Any:
+        """Place of the button that runs an operator, by what Ctrl-C copies from it; None where there is none.
+
+        A generator like the others: `place = yield from hand.find_button(...)`.
+        """
+        region = self.region()
+        x = region.x + int(region.width * offset)
+        for y in range(region.y + region.height - ROW, region.y, -ROW):
+            bpy.context.window_manager.clipboard = ""
+            yield from self.move(x, y)
+            yield from self.key("C", ctrl=True)
+            if operator in bpy.context.window_manager.clipboard:
+                return x, y
+        return None
+
+    def press_button(self, operator: str, offset: float = 0.5) -> Steps:
+        place = yield from self.find_button(operator, offset)
+        if place is None:
+            raise LookupError(f"there is no button for {operator} in the sidebar")
+        yield from self.click(*place)
+
+
+_DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
