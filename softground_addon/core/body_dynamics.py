@@ -18,6 +18,10 @@ Mask = NDArray[np.bool_]
 CUTOFF = 16.0
 """Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, above the sixth
 harmonic of running and far below the frame rate of motion capture."""
+CUTOFF_CHOICES = np.array([1.0, 0.7, 0.5])
+"""Cut-offs to choose from, as fractions of the highest."""
+PASSED_BAND = np.pi / 3
+"""Integral of the low-pass's gain over frequency in cut-offs: the share of white noise that passes."""
 HIGHEST_CUTOFF = 0.34
 """Highest cut-off as a fraction of the scene's frame rate: 8 Hz at 24 fps."""
 FREE_FALL = 0.5
@@ -45,11 +49,17 @@ class BodyDynamics:
         Force that the motion asks for, per weight [body weights].
     moment : (N, 3) float array
         Rate of the angular momentum about the centre of mass, per weight [m].
+    points : MassPoints
+        The body that this holds for.
+    cutoff : float
+        Cut-off of the low-pass that suits the motion [Hz].
     """
 
     centre: Array
     force: Array
     moment: Array
+    points: MassPoints
+    cutoff: float
 
     def point_of_action(self, ground: Array, steps: slice = slice(None)) -> Array:
         """Where the total force meets the level `ground` (M,) [m] at M steps, (M, 2) [m]: the zero moment point.
@@ -65,44 +75,65 @@ class BodyDynamics:
         return np.where(known[:, None], np.stack([x, y], axis=1), centre[:, :2])
 
 
-def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> BodyDynamics:
-    """Forces that the motion asks for.
+def body_dynamics(motion: CharacterMotion) -> BodyDynamics:
+    """Forces that the motion asks for, before anything is known about flight.
 
     Parameters
     ----------
     motion : CharacterMotion
         On the simulation's time grid.
-    airborne : (N,) bool array, optional
-        Steps at which nothing touches. There the force is 0 where the motion is near free fall, and the body's mass
-        is fitted to that.
     """
     step, gravity = motion.time_step, motion.gravity
     points = mass_points(motion)
-    count = len(points.positions)
-    at_frame = np.abs((motion.frames - motion.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
+    sampled = _at_frames(motion)
+    frame_step = step * len(sampled) / sampled.sum()
     pendulum = np.sqrt(gravity / motion.leg_length) / (2 * np.pi)
-    cutoff = min(CUTOFF * pendulum, HIGHEST_CUTOFF * at_frame.sum() / (count * step))
+    highest = min(CUTOFF * pendulum, HIGHEST_CUTOFF / frame_step)
+    cutoff = _suited_cutoff(points.centre[sampled], frame_step, highest)
+    _, moment, _ = smooth_path(_angular_momentum(points, step), step, cutoff, sampled=sampled)
+    centre, _, acceleration = smooth_path(points.centre, step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS)
+    force = acceleration / gravity + (0.0, 0.0, 1.0)
+    return BodyDynamics(centre, force, moment / gravity, points, cutoff)
 
-    falling, fall = None, gravity
-    if airborne is not None and airborne.any():
-        parts = points.part_centres()
-        _, _, acceleration = smooth_path(parts.reshape(count, -1), step, cutoff, sampled=at_frame)
-        acceleration = acceleration.reshape(parts.shape)
-        fractions = np.bincount(points.parts, weights=points.fractions)
-        downward = -np.einsum("p,npc->nc", fractions, acceleration)[:, 2]
-        falling = _flights(airborne, 1 - downward / gravity)
-        if falling.any():
-            fall = _rate_of_fall(downward, falling, gravity, round(0.5 / (cutoff * step)))
-            points = fitted_to_free_fall(points, acceleration[falling], fall)
 
-    _, rate, _ = smooth_path(_angular_momentum(points, step), step, cutoff, sampled=at_frame)
+def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
+    """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,).
+
+    In flight the force is 0, and the body's mass is fitted to that; where the motion is nowhere near free fall while
+    nothing touches, it stays as it was.
+    """
+    flying = _flights(airborne, body.force[:, 2])
+    if not flying.any():
+        return body
+    step, sampled = motion.time_step, _at_frames(motion)
+    frame_step = step * len(sampled) / sampled.sum()
+    parts = body.points.part_centres()[sampled]
+    _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), frame_step, body.cutoff)
+    fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * step)))
+    falling = acceleration.reshape(parts.shape)[flying[sampled]]
+    points = fitted_to_free_fall(body.points, falling, fall, independent=min(2 * body.cutoff * frame_step, 1.0))
     centre, _, acceleration = smooth_path(
-        points.centre, step, cutoff, sampled=at_frame, falling=falling, fall=fall, steady_ends=STEADY_ENDS
+        points.centre, step, body.cutoff, sampled=sampled, falling=flying, fall=fall, steady_ends=STEADY_ENDS
     )
     force = acceleration / fall + (0.0, 0.0, 1.0)
-    if falling is not None:
-        force[falling] = 0.0
-    return BodyDynamics(centre, force, rate / gravity)
+    force[flying] = 0.0
+    return BodyDynamics(centre, force, body.moment, points, body.cutoff)
+
+
+def _at_frames(motion: CharacterMotion) -> Mask:
+    """Which steps are scene frames: between them the motion is interpolated."""
+    return np.abs((motion.frames - motion.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
+
+
+def _suited_cutoff(path: Array, step: float, highest: float) -> float:
+    """Cut-off that predicts each sample best from the others [Hz]: lower for noise, higher for a lively motion.
+
+    Generalised cross-validation (Craven and Wahba 1979, "Smoothing noisy data with spline functions").
+    """
+    cutoffs = highest * CUTOFF_CHOICES
+    unexplained = [((smooth_path(path, step, cutoff)[0] - path) ** 2).sum() for cutoff in cutoffs]
+    passed = np.minimum(2 * cutoffs * step * PASSED_BAND, 0.9)
+    return float(cutoffs[np.argmin(unexplained / (1 - passed) ** 2)])
 
 
 def _flights(airborne: Mask, force: Array) -> Mask:
@@ -113,18 +144,18 @@ def _flights(airborne: Mask, force: Array) -> Mask:
     return flights
 
 
-def _rate_of_fall(downward: Array, falling: Mask, gravity: float, edge: int) -> float:
+def _rate_of_fall(body: BodyDynamics, flying: Mask, gravity: float, edge: int) -> float:
     """Acceleration of the body in flight [m/s²]: gravity, unless the animation's time or size is another.
 
     A jump made by hand, retimed or put on a larger rig hangs in the air or drops like a stone. Its forces are those
     of the same motion at the time scale at which it falls with gravity.
     """
-    window = np.lib.stride_tricks.sliding_window_view(np.pad(falling, edge // 2, mode="edge"), edge // 2 * 2 + 1)
-    inner = downward[window.all(axis=1)]
+    window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge // 2, mode="edge"), edge // 2 * 2 + 1)
+    inner = 1 - body.force[window.all(axis=1), 2]
     if not len(inner):
         return gravity
-    rate = float(np.clip(np.median(inner), *(gravity * np.array(RATES_OF_FALL))))
-    return rate if abs(rate / gravity - 1) > TRUE_FALL else gravity
+    ratio = float(np.clip(np.median(inner), *RATES_OF_FALL))
+    return ratio * gravity if abs(ratio - 1) > TRUE_FALL else gravity
 
 
 def _angular_momentum(points: MassPoints, step: float) -> Array:
@@ -132,4 +163,4 @@ def _angular_momentum(points: MassPoints, step: float) -> Array:
     if len(points.positions) < 2:
         return np.zeros((len(points.positions), 3))
     arm = points.positions - points.centre[:, None]
-    return np.einsum("k,nkc->nc", points.fractions, np.cross(arm, np.gradient(arm, step, axis=0)))
+    return points.fractions @ np.cross(arm, np.gradient(arm, step, axis=0))

@@ -7,6 +7,7 @@ parameters", J. Biomechanics 29(9), table 4, male.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +51,8 @@ _TOWARD_HIPS = {
 _FRACTION_DEVIATION = 0.2
 """Standard deviation of a body part's mass fraction about de Leva's, relative: people differ, and markers and bones
 slide against the flesh that they stand for."""
-_FALL_DEVIATION = 0.1
-"""Standard deviation of a measured acceleration from free fall, in gravities."""
+_FALL_DEVIATION = 0.03
+"""Standard deviation of an independent measurement of the acceleration in free fall, in gravities."""
 
 
 @dataclass(frozen=True)
@@ -71,15 +72,15 @@ class MassPoints:
     fractions: Array
     parts: NDArray[np.intp]
 
-    @property
+    @cached_property
     def centre(self) -> Array:
         """Centre of mass, (N, 3) [m]."""
-        return np.einsum("k,nkc->nc", self.fractions, self.positions)
+        return self.fractions @ self.positions
 
     def part_centres(self) -> Array:
         """Centre of mass of each part, (N, parts, 3) [m]."""
         membership = np.eye(self.parts.max() + 1)[self.parts] * self.fractions[:, None]
-        return np.einsum("kp,nkc->npc", membership / membership.sum(axis=0), self.positions)
+        return (membership / membership.sum(axis=0)).T @ self.positions
 
 
 def centre_of_mass(motion: CharacterMotion) -> Array:
@@ -114,7 +115,9 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
     return MassPoints(positions, fractions / fractions.sum(), np.array(parts))
 
 
-def fitted_to_free_fall(points: MassPoints, accelerations: Array, gravity: float) -> MassPoints:
+def fitted_to_free_fall(
+    points: MassPoints, accelerations: Array, gravity: float, *, independent: float = 1.0
+) -> MassPoints:
     """The same body with the mass fractions that make it fall freely when it does.
 
     In flight the centre of mass falls with g whatever the limbs do, so that what it seems to do beside tells how the
@@ -127,6 +130,8 @@ def fitted_to_free_fall(points: MassPoints, accelerations: Array, gravity: float
         Acceleration of each part's centre at steps of free fall [m/s²].
     gravity : float
         [m/s²]
+    independent : float
+        Share of the M steps that tell something new: low-passed accelerations change slowly.
     """
     prior = np.bincount(points.parts, weights=points.fractions)
     deviation = _FRACTION_DEVIATION * prior
@@ -134,10 +139,11 @@ def fitted_to_free_fall(points: MassPoints, accelerations: Array, gravity: float
     rows = np.moveaxis(excess, 1, -1).reshape(-1, len(prior))
     # Least squares for the changes in deviations, under the condition that they sum to 0 (its own last equation).
     system = np.zeros((len(prior) + 1, len(prior) + 1))
-    scaled = rows * deviation / _FALL_DEVIATION
+    row_deviation = _FALL_DEVIATION / np.sqrt(independent)
+    scaled = rows * deviation / row_deviation
     system[:-1, :-1] = scaled.T @ scaled + np.eye(len(prior))
     system[:-1, -1] = system[-1, :-1] = deviation
-    right = np.append(-scaled.T @ (rows @ prior) / _FALL_DEVIATION, 0.0)
+    right = np.append(-scaled.T @ (rows @ prior) / row_deviation, 0.0)
     fitted = np.maximum(prior + deviation * np.linalg.solve(system, right)[:-1], 0.0)
     fractions = points.fractions * (fitted / prior)[points.parts]
     return MassPoints(points.positions, fractions / fractions.sum(), points.parts)

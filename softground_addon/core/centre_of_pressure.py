@@ -25,3 +25,36 @@ def lowest_points(motion: CharacterMotion) -> Array:
         nearness = np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
         centres.append((nearness[..., None] * points).sum(axis=1) / nearness.sum(axis=1)[:, None])
     return np.stack(centres, axis=1)
+
+
+def centres_of_pressure(motion: CharacterMotion, share: Array, target: Array, trust: Array) -> Array:
+    """Where each sole presses when the loads' common point of action is known, (N, S, 3) [m].
+
+    Each sole's centre moves along the sole from its `lowest_points` toward the place at which the loads' moment
+    agrees with the point of action, as far as landmarks are low enough to bear: from the heel at heel strike to the
+    toes at toe-off.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    share : (N, S) float array
+        Each sole's share of the total force.
+    target : (N, 2) float array
+        Point of action of the total force on the ground [m].
+    trust : (N,) float array
+        How far `target` is followed, 0 to 1.
+    """
+    centres = lowest_points(motion)
+    missing = trust[:, None] * (target - (share[..., None] * centres[..., :2]).sum(axis=1))
+    emphasis = share / np.maximum((share**2).sum(axis=1, keepdims=True), 1e-9)
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        along = points[:, -1, :2] - points[:, 0, :2]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+        place = ((points[..., :2] - centres[:, index, None, :2]) * along[:, None]).sum(axis=-1)
+        height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+        place *= np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
+        wanted = (missing * along).sum(axis=1) * emphasis[:, index]
+        centres[:, index, :2] += np.clip(wanted, place.min(axis=1), place.max(axis=1))[:, None] * along
+    return centres

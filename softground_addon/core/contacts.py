@@ -72,6 +72,10 @@ class Contacts:
     normal: Array
     clearance: Array
 
+    def during(self, steps: slice) -> Contacts:
+        """The contacts at some of the steps."""
+        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps])
+
 
 def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     """Find when each sole touches the terrain, by height and speed with hysteresis.

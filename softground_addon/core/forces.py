@@ -5,16 +5,17 @@ Two models (MODEL.md section 3): the paper's impulse model, causal, and the whol
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .body_dynamics import body_dynamics
+from .body_dynamics import BodyDynamics, body_dynamics, with_flight
 from .centre_of_mass import centre_of_mass
-from .centre_of_pressure import lowest_points
+from .centre_of_pressure import centres_of_pressure, lowest_points
 from .contacts import Contacts, runs
-from .load_sharing import share_by_moment, whole_body_shares
+from .load_sharing import point_of_action, share_by_moment, whole_body_shares
 from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
@@ -46,6 +47,10 @@ class ContactForces:
     weight: Array
     momentum: Array
 
+    def during(self, steps: slice) -> ContactForces:
+        """The forces at some of the steps."""
+        return ContactForces(*(getattr(self, field.name)[steps] for field in dataclasses.fields(self)))
+
 
 def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> ContactForces:
     """The paper's model, Eq. 3-8 with the corrections 1, 5 and 6 of MODEL.md section 2.
@@ -76,7 +81,7 @@ def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_t
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, momentum)
 
 
-def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactForces:
+def whole_body_forces(motion: CharacterMotion, contacts: Contacts, body: BodyDynamics | None = None) -> ContactForces:
     """Forces that accelerate the centre of mass as the motion shows: m·(g + a_com), where something touches.
 
     Parameters
@@ -85,6 +90,8 @@ def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactFor
         On the simulation's time grid.
     contacts : Contacts
         Of that motion, best after `refine_contacts`.
+    body : BodyDynamics, optional
+        Of that motion, where it is known already.
 
     Returns
     -------
@@ -92,11 +99,12 @@ def whole_body_forces(motion: CharacterMotion, contacts: Contacts) -> ContactFor
         None pulls; they are 0 where nothing touches.
     """
     grounded = contacts.touching.any(axis=1)
-    body = body_dynamics(motion, ~grounded)
+    body = with_flight(motion, body or body_dynamics(motion), ~grounded)
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
-    pressure = lowest_points(motion)
     share = whole_body_shares(motion, contacts.touching, body)
+    target = point_of_action(motion, contacts.touching, body)
+    pressure = centres_of_pressure(motion, share, target, np.clip(total[:, 2], 0.0, 1.0))
     forces = body_weight * share[..., None] * total[:, None]
     weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)

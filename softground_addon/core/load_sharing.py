@@ -17,9 +17,9 @@ _EVENNESS = 1e-6
 """How much an even split counts: decides only where force and moment leave the shares open."""
 _SUM_WEIGHT = 1e6
 """How much more the sum of the shares counts than their prior; the rest is normalised away."""
-SHARE_DEVIATION = 0.5
+SHARE_DEVIATION = 1.0
 """Standard deviation of the share of a sole in the middle of its contact about an even split: not known at all."""
-POINT_DEVIATION = 0.05
+POINT_DEVIATION = 0.03
 """Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
 LONGEST_RAMP = 1.0
 """Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
@@ -27,15 +27,19 @@ LONGEST_RAMP = 1.0
 
 def whole_body_shares(motion: CharacterMotion, touching: Mask, body: BodyDynamics) -> Array:
     """Each sole's share of the total force, from when it touches and from where the total force acts, (N, S)."""
-    pressure = lowest_points(motion)
-    ground = (pressure[..., 2] * touching).sum(axis=1) / np.maximum(touching.sum(axis=1), 1)
     return share_through_transitions(
-        pressure[..., :2],
-        body.point_of_action(ground),
+        lowest_points(motion)[..., :2],
+        point_of_action(motion, touching, body),
         touching,
         deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
         longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
     )
+
+
+def point_of_action(motion: CharacterMotion, touching: Mask, body: BodyDynamics) -> Array:
+    """Where the total force meets the level of the soles that touch, (N, 2) [m]."""
+    height = lowest_points(motion)[..., 2]
+    return body.point_of_action((height * touching).sum(axis=1) / np.maximum(touching.sum(axis=1), 1))
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:

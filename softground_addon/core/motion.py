@@ -161,7 +161,7 @@ class CharacterMotion:
         count = (len(self.frames) - 1) * steps_per_frame + 1
         position = np.arange(count) / steps_per_frame
         soles = tuple(
-            dataclasses.replace(sole, transforms=_orthonormal(_interpolate(sole.transforms, position)))
+            dataclasses.replace(sole, transforms=orthonormal(_interpolate(sole.transforms, position)))
             for sole in self.soles
         )
         return dataclasses.replace(
@@ -188,7 +188,7 @@ def _interpolate(samples: Array, position: Array) -> Array:
     return a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db)))
 
 
-def _orthonormal(transforms: Array) -> Array:
+def orthonormal(transforms: Array) -> Array:
     """Nearly rigid transforms made rigid: one Newton step of the polar decomposition."""
     rotation = transforms[..., :3, :3]
     gram = np.swapaxes(rotation, -1, -2) @ rotation

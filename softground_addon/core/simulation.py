@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .body_dynamics import body_dynamics
 from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts, runs
+from .continuation import continued, without_holds
 from .deformation import GroundMaterial
 from .errors import InputError
 from .footprints import Footprint
@@ -50,14 +51,18 @@ def estimate_loads(
     material : GroundMaterial
         Its characteristic time shapes the impulse model; the whole-body model does not depend on it.
     """
-    fine = motion.resampled(steps_per_frame(motion.frame_rate))
-    contacts = detect_contacts(fine, terrain)
+    steps = steps_per_frame(motion.frame_rate)
+    source, margin = continued(without_holds(motion))
+    source = source.resampled(steps)
+    contacts = detect_contacts(source, terrain)
     if force_model == "IMPULSE":
-        forces = impulse_forces(fine, contacts, material.characteristic_time)
+        forces = impulse_forces(source, contacts, material.characteristic_time)
     else:
-        contacts = refine_contacts(fine, contacts, body_dynamics(fine))
-        forces = whole_body_forces(fine, contacts)
-    return CharacterLoads(fine, contacts, forces)
+        body = body_dynamics(source)
+        contacts = refine_contacts(source, contacts, body)
+        forces = whole_body_forces(source, contacts, body)
+    shown = slice(margin * steps, len(source.frames) - margin * steps)
+    return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.contacts import Contacts
-from softground_addon.core.forces import impulse_forces
+from softground_addon.core.forces import impulse_forces, whole_body_forces
 from tests.core.character import character, flat_sole, standing
 
 MASS, GRAVITY = 77.5, 9.81
@@ -77,3 +77,81 @@ def test_the_impulse_of_a_landing_does_not_depend_on_the_frame_rate(rate):
     motion, touching = landing(rate)
     impulse = impulse_forces(motion, touching, 0.13).momentum.sum() / rate
     assert impulse == pytest.approx(77.5 * 2.0)
+
+
+def jump(rate=120.0, *, crouch=0.25, rise=0.3, drop=0.0, scale=1.0):
+    """A body that stands, pushes off, flies a parabola of height `rise` [m] and lands, its legs giving way alike."""
+    g = 9.81
+    speed = np.sqrt(2 * g * rise)
+    push, flight = 2 * crouch / speed, 2 * speed / g
+    time = np.arange(int((2.0 + push * 2 + flight) * rate)) / rate
+    start, takeoff = 1.0, 1.0 + push
+    landing = takeoff + flight
+    into = np.clip(time - start, 0, push) / push
+    after = np.clip(time - landing, 0, push) / push
+    height = 0.9 - crouch + crouch * (into**2)
+    air = (time > takeoff) & (time < landing)
+    height = np.where(air, 0.9 + speed * (time - takeoff) - g / 2 * (time - takeoff) ** 2, height)
+    height = np.where(time >= landing, 0.9 - crouch + crouch * (1 - after) ** 2, height)
+    lift = np.where(air, np.minimum(height - 0.9, 0.2), 0.0)
+    feet = [flat_sole(np.stack([0 * time, 0 * time + side, lift], axis=1)) for side in (0.1, -0.1)]
+    hips = np.stack([0 * time, 0 * time, height], axis=1)
+    return (
+        character(feet, hips=hips, rate=rate, mass=MASS),
+        contacts(np.stack([~air, ~air], axis=1)),
+        (takeoff, landing),
+    )
+
+
+def test_a_jump_has_no_force_in_flight_two_feet_alike_and_the_weight_on_average():
+    motion, touching, (takeoff, landing) = jump()
+    forces = whole_body_forces(motion, touching)
+    air = (motion.times > takeoff) & (motion.times < landing)
+    assert np.all(forces.total[air] == 0)
+    assert forces.forces[:, 0] == pytest.approx(forces.forces[:, 1], abs=1e-6 * WEIGHT)
+    assert forces.total[:, 2].mean() == pytest.approx(WEIGHT, rel=0.02)
+    # Uniform deceleration from sqrt(2·g·0.3) over 0.25 m: 1 + 0.3/0.25 = 2.2 body weights; the low-pass overshoots.
+    assert 2.2 < forces.total[:, 2].max() / WEIGHT < 3.0
+
+
+def test_no_force_pulls_and_the_parts_sum_to_the_total():
+    motion, touching, _ = jump(rise=0.6, crouch=0.15)
+    forces = whole_body_forces(motion, touching)
+    assert forces.forces[..., 2].min() >= 0
+    assert forces.forces.sum(axis=1) == pytest.approx(forces.total, abs=1e-9)
+    assert forces.weight + forces.momentum == pytest.approx(forces.forces[..., 2], abs=1e-9)
+
+
+def test_standing_still_bears_the_weight_under_the_centre_of_mass():
+    motion = standing(120, hips=(0.0, -0.05, 0.9), mass=MASS)
+    forces = whole_body_forces(motion, contacts(np.ones((120, 2))))
+    assert forces.forces[:, :, 2] == pytest.approx(np.tile([0.25, 0.75], (120, 1)) * WEIGHT, rel=0.05)
+
+
+def test_a_single_foot_presses_under_the_centre_of_mass():
+    for forward in (-0.06, 0.0, 0.05):
+        motion = standing(60, at=((0.0, 0.0, 0.0),), hips=(forward, 0.0, 0.9), mass=MASS)
+        forces = whole_body_forces(motion, contacts(np.ones((60, 1))))
+        assert forces.centre_of_pressure[30, 0] == pytest.approx([forward, 0, 0], abs=1e-6)
+
+
+def test_the_centre_of_pressure_stays_on_the_sole():
+    motion = standing(60, at=((0.0, 0.0, 0.0),), hips=(0.4, 0.0, 0.9), mass=MASS)
+    forces = whole_body_forces(motion, contacts(np.ones((60, 1))))
+    assert forces.centre_of_pressure[:, 0, 0] == pytest.approx(np.full(60, 0.12))
+
+
+def test_four_feet_share_the_weight_of_a_quadruped():
+    corners = ((0.4, 0.1, 0.0), (0.4, -0.1, 0.0), (-0.4, 0.1, 0.0), (-0.4, -0.1, 0.0))
+    motion = standing(60, at=corners, hips=(0.0267, 0.0, 0.6), mass=MASS, leg_length=0.6)
+    forces = whole_body_forces(motion, contacts(np.ones((60, 4))))
+    assert forces.forces[30, :, 2] == pytest.approx(np.full(4, WEIGHT / 4), rel=1e-3)
+
+
+def test_a_jump_that_hangs_in_the_air_has_the_forces_of_the_same_jump_at_its_own_time():
+    """Played at half speed, a jump falls with a quarter of g; its forces in body weights are those of the jump."""
+    motion, touching, _ = jump()
+    slow = character(list(motion.soles), hips=motion.joints["hips"], rate=motion.frame_rate / 2, mass=MASS)
+    fast_forces, slow_forces = (whole_body_forces(m, touching).total[:, 2] for m in (motion, slow))
+    assert slow_forces.mean() == pytest.approx(WEIGHT, rel=0.25)
+    assert np.all(slow_forces[fast_forces == 0] == 0)
