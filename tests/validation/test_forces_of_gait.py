@@ -1,0 +1,205 @@
+"""The whole-body model against force plates, and under what users do to a motion.
+
+Needs the reference data beside the repository; skips without it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softground_addon.core.contacts import detect_contacts
+from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.motion import CharacterMotion
+from softground_addon.core.simulation import CharacterLoads, estimate_loads
+from tests.validation.scoring import Score, plates_saw_everything, score
+from tests.validation.trials import Trial, motion_of_trial, read_trial
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "gait"
+WALK, RUN = "walk_subject01", "run_rajagopal"
+SNOW = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
+
+pytestmark = pytest.mark.skipif(not DATA.exists(), reason=f"needs the reference data in {DATA}")
+
+
+def read(name: str) -> Trial:
+    return read_trial(DATA / f"{name}.csv")
+
+
+def loads_of(motion: CharacterMotion) -> CharacterLoads:
+    return estimate_loads(motion, FlatTerrain(), force_model="WHOLE_BODY", material=SNOW)
+
+
+def forces_at_frames(motion: CharacterMotion) -> np.ndarray:
+    loads = loads_of(motion)
+    return loads.forces.forces[:: (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)]
+
+
+def scored(trial: Trial, motion: CharacterMotion | None = None) -> Score:
+    motion = motion or motion_of_trial(trial)
+    frames = plates_saw_everything(trial.forces[..., 2], detect_contacts(motion, FlatTerrain()).touching, trial.rate)
+    return score(forces_at_frames(motion), trial.forces, frames, weight=trial.mass * 9.81, rate=trial.rate)
+
+
+def with_points(trial: Trial, change) -> Trial:
+    return dataclasses.replace(trial, points={name: change(name, path) for name, path in trial.points.items()})
+
+
+def at_rate(trial: Trial, rate: float) -> Trial:
+    """The trial as if it had been captured at another rate."""
+    given = np.arange(len(trial.forces)) / trial.rate
+    wanted = np.arange(int(given[-1] * rate + 1e-9) + 1) / rate
+
+    def resampled(samples):
+        flat = samples.reshape(len(samples), -1)
+        columns = [np.interp(wanted, given, column) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(-1, *samples.shape[1:])
+
+    smooth = {name: cubic(given, path, wanted) for name, path in trial.points.items()}
+    return dataclasses.replace(trial, rate=rate, points=smooth, forces=resampled(trial.forces))
+
+
+def cubic(given, samples, wanted):
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(given, samples)(wanted)
+
+
+@pytest.mark.parametrize(("name", "per_foot", "total"), [(WALK, 0.06, 0.04), (RUN, 0.07, 0.07)])
+def test_forces_and_timing_are_within_the_bars(name, per_foot, total):
+    result = scored(read(name))
+    assert result.rms_bw_left <= per_foot
+    assert result.rms_bw_right <= per_foot
+    assert result.rms_bw_total <= total + 5e-4
+    assert result.heel_strike_ms <= 15
+    assert result.toe_off_ms <= 15
+    assert result.mean_cycle_bw == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_walk_shows_the_double_hump():
+    trial = read(WALK)
+    left = forces_at_frames(motion_of_trial(trial))[:, 0, 2] / (trial.mass * 9.81)
+    stance = left[74:122]
+    valley = stance[15:30].min()
+    assert stance[:20].max() > valley + 0.1
+    assert stance[25:].max() > valley + 0.1
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_forces_are_whole_and_never_pull_and_vanish_in_flight(name):
+    loads = loads_of(motion_of_trial(read(name)))
+    forces = loads.forces.forces
+    assert forces[..., 2].min() >= 0
+    assert forces.sum(axis=1) == pytest.approx(loads.forces.total, abs=1e-9)
+    assert np.all(forces[~loads.contacts.touching] == 0)
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_forces_do_not_jump(name):
+    """The steepest loading that runners show is about 100 body weights a second."""
+    trial = read(name)
+    loads = loads_of(motion_of_trial(trial))
+    rate = np.abs(np.diff(loads.forces.forces[..., 2], axis=0)).max() / (trial.mass * 9.81 * loads.motion.time_step)
+    assert rate < 100
+
+
+@pytest.mark.parametrize("rate", [24.0, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize(("name", "most"), [(WALK, 0.05), (RUN, 0.15)])
+def test_the_frame_rate_hardly_changes_the_curves(name, most, rate):
+    trial = read(name)
+    given = motion_of_trial(trial)
+    other = motion_of_trial(at_rate(trial, rate))
+    reference, forces = forces_at_frames(given)[..., 2], forces_at_frames(other)[..., 2]
+    there = np.stack([np.interp(given.times, other.times, column) for column in forces.T], axis=1)
+    change = (there - reference)[given.times <= other.times[-1]] / (trial.mass * 9.81)
+    assert np.sqrt((change**2).mean(axis=0)).max() < most
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+@pytest.mark.parametrize("noise", [0.002, 0.003])
+def test_millimetres_of_noise_are_borne(name, noise):
+    random = np.random.default_rng(3)
+    noisy = with_points(read(name), lambda _, path: path + noise * random.normal(size=path.shape))
+    result = scored(noisy)
+    assert max(result.rms_bw_left, result.rms_bw_right) < 0.11
+    assert max(result.heel_strike_ms, result.toe_off_ms) < 25
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+@pytest.mark.parametrize("marker", ["heel", "ball", "toe"])
+@pytest.mark.parametrize("offset", [(0.0, 0.0, -0.02), (0.0, 0.0, 0.04), (0.02, 0.0, 0.0), (-0.02, 0.0, 0.0)])
+def test_markers_may_sit_elsewhere_on_the_foot(name, marker, offset):
+    moved = with_points(read(name), lambda point, path: path + offset if point.startswith(marker) else path)
+    result = scored(moved)
+    assert max(result.rms_bw_left, result.rms_bw_right) < 0.08
+    assert max(result.heel_strike_ms, result.toe_off_ms) < 20
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_heading_place_and_side_do_not_matter(name):
+    trial = read(name)
+    reference = forces_at_frames(motion_of_trial(trial))[..., 2]
+    turn = np.array([[np.cos(2.0), -np.sin(2.0), 0.0], [np.sin(2.0), np.cos(2.0), 0.0], [0.0, 0.0, 1.0]])
+    turned = with_points(trial, lambda _, path: path @ turn.T + (30.0, -50.0, 0.0))
+    assert forces_at_frames(motion_of_trial(turned))[..., 2] == pytest.approx(reference, abs=0.5)
+    other = {"_l": "_r", "_r": "_l"}
+    mirrored = dataclasses.replace(
+        trial,
+        points={
+            name[:-2] + other[name[-2:]] if name[-2:] in other else name: path * (1.0, -1.0, 1.0)
+            for name, path in trial.points.items()
+        },
+    )
+    assert forces_at_frames(motion_of_trial(mirrored))[:, ::-1, 2] == pytest.approx(reference, abs=0.5)
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_heavier_people_press_in_proportion(name):
+    motion = motion_of_trial(read(name))
+    heavy = dataclasses.replace(motion, mass=2 * motion.mass)
+    assert forces_at_frames(heavy) == pytest.approx(2 * forces_at_frames(motion))
+
+
+@pytest.mark.parametrize("unmapped", [("head",), ("wrist",), ("elbow", "wrist", "head")])
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_unmapped_ends_cost_little(name, unmapped):
+    trial = read(name)
+    motion = motion_of_trial(trial)
+    joints = {joint: path for joint, path in motion.joints.items() if not joint.startswith(unmapped)}
+    result = scored(trial, dataclasses.replace(motion, joints=joints))
+    assert max(result.rms_bw_left, result.rms_bw_right) < 0.08
+
+
+@pytest.mark.parametrize(("name", "most"), [(WALK, 0.08), (RUN, 0.13)])
+def test_the_hips_alone_give_plausible_forces(name, most):
+    trial = read(name)
+    motion = motion_of_trial(trial)
+    result = scored(trial, dataclasses.replace(motion, joints={"hips": motion.joints["hips"]}))
+    assert max(result.rms_bw_left, result.rms_bw_right) < most
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
+def test_a_walk_on_the_spot_has_the_forces_of_the_walk(name):
+    trial = read(name)
+    given = motion_of_trial(trial)
+    pace = (trial.points["mid_hip"][-1] - trial.points["mid_hip"][0]) / (len(trial.forces) - 1) * (1.0, 1.0, 0.0)
+    step = np.arange(len(trial.forces))[:, None]
+    in_place = motion_of_trial(with_points(trial, lambda _, path: path - step * pace))
+    change = (forces_at_frames(in_place) - forces_at_frames(given))[..., 2] / (trial.mass * 9.81)
+    assert np.sqrt((change**2).mean()) < 0.02
+
+
+@pytest.mark.parametrize(("name", "steps"), [(WALK, (3, 3)), (RUN, (7, 8))])
+def test_the_steps_are_those_of_the_plates(name, steps):
+    trial = read(name)
+    touching = loads_of(motion_of_trial(trial)).contacts.touching
+    loaded = trial.forces[..., 2] > 20
+    count = [int(np.diff(foot.astype(int), prepend=0).clip(0).sum()) for foot in touching.T]
+    measured = [int(np.diff(foot.astype(int), prepend=0).clip(0).sum()) for foot in loaded.T]
+    assert measured == list(steps)
+    # A foot that comes down with the very last frame may count or not.
+    assert np.abs(np.subtract(count, measured)).max() <= 1
