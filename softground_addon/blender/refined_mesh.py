@@ -1,0 +1,211 @@
+"""A copy of a mesh, refined along the trail, with all that its faces, corners, edges and vertices carry."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.refinement import Refinement, Surface
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+LAYOUT = {
+    "FLOAT": ("value", 1, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color_srgb", 4, np.float32),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int32),
+    "INT32_2D": ("value", 2, np.int32),
+    "BOOLEAN": ("value", 1, np.bool_),
+}
+"""How values of each type are read in bulk: property, numbers per element, type. Texts stay behind."""
+
+NOT_COPIED = ("position", "custom_normal")
+"""Positions are made first; custom normals are coded against the faces around, which have changed."""
+SEAM = ".uv_seam"
+"""Seams, as 4.2 to 4.4 call them; other names with a leading dot are Blender's own."""
+
+
+def surface_of(mesh: bpy.types.Mesh, to_world: Array) -> Surface:
+    """The faces of a mesh with world positions [m], and the triangles that Blender shows them as."""
+    mesh.calc_loop_triangles()
+    triangles = mesh.loop_triangles
+    positions = _values(mesh.attributes["position"]).astype(np.float64)
+    size = _bulk(mesh.polygons, "loop_total")
+    return Surface(
+        vertices=positions @ to_world[:3, :3].T + to_world[:3, 3],
+        corner_vertex=_bulk(mesh.loops, "vertex_index"),
+        face_start=np.concatenate([[0], np.cumsum(size)]),
+        triangle_corners=_bulk(triangles, "loops", 3),
+        triangle_face=_bulk(triangles, "polygon_index"),
+    )
+
+
+def build(name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refinement) -> bpy.types.Mesh:
+    """A new mesh: the kept faces of the source and the new triangles, with all that the source carries.
+
+    Vertices of the source keep their numbers and their positions, bit for bit.
+    """
+    mesh = bpy.data.meshes.new(name)
+    kept = refinement.kept_faces
+    size = np.diff(surface.face_start)
+    kept_corners = _runs(surface.face_start[kept], size[kept])
+    corner_vertex = np.concatenate([surface.corner_vertex[kept_corners], refinement.triangles.ravel()])
+    face_size = np.concatenate([size[kept], np.full(len(refinement.triangles), 3)])
+
+    mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
+    _add_loose_edges(mesh, source)
+    mesh.loops.add(len(corner_vertex))
+    mesh.loops.foreach_set("vertex_index", corner_vertex.astype(np.int32))
+    mesh.polygons.add(len(face_size))
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(face_size) - face_size).astype(np.int32))
+    _copy_positions(mesh, source, surface, refinement)
+    mesh.update(calc_edges=True)
+
+    for material in source.materials:
+        mesh.materials.append(material and material.original)  # an evaluated mesh holds evaluated materials
+    edges = _edge_sources(mesh, source, refinement)
+    for attribute in source.attributes:
+        if attribute.data_type not in LAYOUT or not _comes_along(attribute.name):
+            continue
+        values = _values(attribute)
+        if attribute.domain == "POINT":
+            new = _between(values, *refinement.vertex_sources(surface))
+            values = np.concatenate([values, new])
+        elif attribute.domain == "CORNER":
+            corners = np.repeat(refinement.corners, 3, axis=0)
+            new = _between(values, corners, refinement.weights.reshape(-1, 3))
+            values = np.concatenate([values[kept_corners], new])
+        elif attribute.domain == "FACE":
+            values = values[np.concatenate([kept, refinement.face])]
+        else:
+            values = np.where((edges >= 0).reshape(-1, *[1] * (values.ndim - 1)), values[edges], 0).astype(values.dtype)
+        _write(mesh, attribute, values)
+    _copy_choices(mesh, source)
+    mesh.update()
+    return mesh
+
+
+def copy_vertex_groups(
+    ground: bpy.types.Object, target: bpy.types.Object, source: bpy.types.Mesh, surface: Surface, refinement: Refinement
+) -> None:
+    """Give the refined object the vertex groups of the ground, with the weights of the source."""
+    groups = ground.vertex_groups
+    target.vertex_groups.clear()
+    if not len(groups):
+        return
+    weights = np.zeros((len(groups), len(source.vertices)), dtype=np.float32)
+    for vertex in source.vertices:
+        for membership in vertex.groups:
+            weights[membership.group, vertex.index] = membership.weight
+    vertices, shares = refinement.vertex_sources(surface)
+    for group, own in zip(groups, weights, strict=True):
+        copy = target.vertex_groups.new(name=group.name)
+        everywhere = np.concatenate([own, (own[vertices] * shares).sum(axis=1)])
+        members = np.flatnonzero(everywhere)
+        order = members[np.argsort(everywhere[members], kind="stable")]
+        levels, first = np.unique(everywhere[order], return_index=True)
+        for weight, alike in zip(levels.tolist(), np.split(order, first[1:]), strict=True):
+            copy.add(alike.tolist(), weight, "REPLACE")
+
+
+def _comes_along(name: str) -> bool:
+    return name == SEAM or not (name.startswith((".", "softground_")) or name in NOT_COPIED)
+
+
+def _copy_positions(mesh: bpy.types.Mesh, source: bpy.types.Mesh, surface: Surface, refinement: Refinement) -> None:
+    positions = _values(source.attributes["position"])
+    new = _between(positions, *refinement.vertex_sources(surface))
+    data = cast("Any", mesh.attributes["position"]).data
+    data.foreach_set("vector", np.concatenate([positions, new]).ravel())
+
+
+def _between(values: NDArray[Any], sources: Indices, weights: NDArray[np.float32]) -> NDArray[Any]:
+    """Values in between: interpolated where they are real numbers, else those of the source with the largest weight."""
+    if values.dtype != np.float32:
+        return values[np.take_along_axis(sources, weights.argmax(axis=1)[:, None], axis=1)[:, 0]]
+    mixed = np.einsum("nk,nk...->n...", weights.astype(np.float64), values[sources].astype(np.float64))
+    return mixed.astype(np.float32)
+
+
+def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
+    """Edges without a face, which no face would bring back."""
+    used = np.zeros(len(source.edges), dtype=bool)
+    used[_bulk(source.loops, "edge_index")] = True
+    loose = np.flatnonzero(~used)
+    if len(loose):
+        mesh.edges.add(len(loose))
+        mesh.edges.foreach_set("vertices", _bulk(source.edges, "vertices", 2)[loose].ravel().astype(np.int32))
+
+
+def _edge_sources(mesh: bpy.types.Mesh, source: bpy.types.Mesh, refinement: Refinement) -> Indices:
+    """The source's edge that each edge of the mesh is, or is a part of, (E,); -1 where it is a new one."""
+    if not any(attribute.domain == "EDGE" and _comes_along(attribute.name) for attribute in source.attributes):
+        return np.zeros(0, dtype=np.intp)
+    size = len(mesh.vertices)
+    given = _edge_keys(_bulk(source.edges, "vertices", 2), size)
+    whole = _find(given, _edge_keys(refinement.edge_of, size))  # none where it parts the diagonal of a face
+    known = np.concatenate([given, _edge_keys(refinement.edges, size)])
+    numbers = np.concatenate([np.arange(len(given)), whole])
+    place = _find(known, _edge_keys(_bulk(mesh.edges, "vertices", 2), size))
+    return np.where(place >= 0, numbers[place], -1)
+
+
+def _find(known: Indices, wanted: Indices) -> Indices:
+    """Place of each wanted value among the known ones, -1 where it is none of them."""
+    order = np.argsort(known)
+    place = order[np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)]
+    return np.where(known[place] == wanted, place, -1)
+
+
+def _edge_keys(edges: Indices, size: int) -> Indices:
+    return np.asarray(edges.min(axis=1) * size + edges.max(axis=1))
+
+
+def _copy_choices(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
+    """Which UV map and colours are active and rendered."""
+    for layer in source.uv_layers:
+        copy: Any = mesh.uv_layers.get(layer.name)
+        if copy is not None:
+            copy.active, copy.active_render = layer.active, layer.active_render
+    colours: Any = mesh.color_attributes
+    for choice in ("active_color_index", "render_color_index"):
+        index = getattr(source.color_attributes, choice)
+        if 0 <= index < len(source.color_attributes):
+            wanted = source.color_attributes[index].name
+            names = [attribute.name for attribute in colours]
+            if wanted in names:
+                setattr(colours, choice, names.index(wanted))
+
+
+def _runs(start: Indices, count: Indices) -> Indices:
+    """For starts (5, 9) and counts (2, 3): 5, 6, 9, 10, 11."""
+    return np.repeat(start - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
+
+
+def _bulk(collection: Any, name: str, width: int = 1) -> Indices:
+    values = np.empty(len(collection) * width, dtype=np.int32)
+    collection.foreach_get(name, values)
+    return values.astype(np.intp) if width == 1 else values.astype(np.intp).reshape(-1, width)
+
+
+def _values(attribute: Any) -> NDArray[Any]:
+    name, width, kind = LAYOUT[attribute.data_type]
+    values = np.empty(len(attribute.data) * width, dtype=kind)
+    attribute.data.foreach_get(name, values)
+    return values if width == 1 else values.reshape(-1, width)
+
+
+def _write(mesh: bpy.types.Mesh, attribute: Any, values: NDArray[Any]) -> None:
+    target: Any = mesh.attributes.get(attribute.name)
+    if target is None or target.domain != attribute.domain or target.data_type != attribute.data_type:
+        target = mesh.attributes.new(attribute.name, attribute.data_type, attribute.domain)
+    target.data.foreach_set(LAYOUT[attribute.data_type][0], np.ascontiguousarray(values).ravel())

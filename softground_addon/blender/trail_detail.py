@@ -1,0 +1,113 @@
+"""Detail along the trail: where the ground is coarse, a copy of it that is fine under the prints takes them.
+
+The user's ground is hidden and otherwise left alone; removing the copy shows it again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.pressed_ground import PressedGround
+from ..core.refinement import Region, refine
+from . import ground_mesh, playback, refined_mesh
+
+Array = NDArray[np.float64]
+
+DETAIL_OF = "softground_detail_of"
+"""Property of the copy: the ground that it stands in for."""
+WAS_HIDDEN = "softground_was_hidden"
+"""Property of the copy: whether the ground was hidden in viewports and renders before."""
+
+FLOOR = 2e-5
+"""Ground that moves less stays coarse [m]: a tenth of the playback's tolerance."""
+
+
+def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The copy that takes the prints in place of a ground."""
+    for candidate in bpy.data.objects:
+        if candidate.get(DETAIL_OF) == ground and candidate.library == ground.library:
+            return candidate
+    return None
+
+
+def pressed_object(ground: bpy.types.Object) -> bpy.types.Object:
+    """The object that carries the prints: the ground's detail where there is one, else the ground."""
+    return detail_of(ground) or ground
+
+
+def region_of(pressed: PressedGround) -> Region:
+    """The cells whose displayed height changes."""
+    columns, rows = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
+    for window in pressed.smooth.tile_windows():
+        row, column = np.nonzero(pressed.smooth.read(window).sum(axis=0) > FLOOR)
+        columns.append(column + window.column)
+        rows.append(row + window.row)
+    return Region(np.concatenate(columns), np.concatenate(rows), pressed.smooth.cell_size)
+
+
+def refine_ground(ground: bpy.types.Object, region: Region, spacing: float, unit_scale: float) -> bpy.types.Object:
+    """Make the copy that is fine where the region is, or give the one that is there a new mesh.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+        Its evaluated surface is what is refined; it is hidden.
+    region : Region
+    spacing : float
+        Distance between vertices in the region [m].
+    unit_scale : float
+        Metres per Blender unit.
+    """
+    with ground_mesh.undisturbed_copy(ground) as source:
+        surface = refined_mesh.surface_of(source, ground_mesh.to_world_of(ground, unit_scale))
+        refinement = refine(surface, region, spacing)
+        mesh = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement)
+        detail = detail_of(ground)
+        if detail is None:
+            detail = _stand_in(ground, mesh)
+        else:
+            _exchange_mesh(detail, mesh)
+        refined_mesh.copy_vertex_groups(ground, detail, source, surface, refinement)
+    return detail
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take the copy away and show the ground as it was shown; nothing happens where there is none."""
+    detail = detail_of(ground)
+    if detail is None:
+        return
+    ground.hide_viewport, ground.hide_render = (bool(value) for value in detail[WAS_HIDDEN])
+    playback.remove(detail)
+    mesh: Any = detail.data
+    bpy.data.objects.remove(detail)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+
+
+def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
+    """A copy of the ground with another mesh, in its place and collections."""
+    detail = ground.copy()
+    detail.name = f"{ground.name} Trail"
+    detail.modifiers.clear()
+    detail.data = mesh
+    detail[DETAIL_OF] = ground
+    detail[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
+    for collection in ground.users_collection:
+        collection.objects.link(detail)
+    ground.hide_viewport = ground.hide_render = True
+    return detail
+
+
+def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
+    """Give the copy a new mesh of the same name; what the user added to the object stays."""
+    playback.remove(detail)
+    old: Any = detail.data
+    detail.data = mesh
+    name = old.name
+    if not old.users:
+        bpy.data.meshes.remove(old)
+    mesh.name = name
