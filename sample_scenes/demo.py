@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--up", choices=("Y", "Z"), help="up axis of the motion file (default: the body's long axis)")
     parser.add_argument("--output", type=Path, default=Path("build/demo"), metavar="DIR")
     parser.add_argument("--cell-size", type=float, default=CELL_SIZE, metavar="M", help="size of the ground's cells")
-    parser.add_argument("--samples", type=int, default=16, metavar="N", help="render samples of the pictures")
+    parser.add_argument("--samples", type=int, default=12, metavar="N", help="render samples of the pictures")
     parser.add_argument("--no-pictures", action="store_true", help="bake and save only")
     return parser
 
@@ -236,10 +236,17 @@ def take_pictures(lanes: list[Lane], folder: Path, samples: int) -> list[Path]:
 
 
 def show_print(footprints: tuple[Footprint, ...]) -> Footprint:
-    """A whole print from the middle of the walk: the one of largest contact among the middle half."""
+    """A print to look at from close by: whole, from the middle of the walk, and clear of all others."""
     quarter = len(footprints) // 4
     middle = footprints[quarter : len(footprints) - quarter] or footprints
-    return max(middle, key=lambda step: step.area_m2)
+    largest = max(step.area_m2 for step in middle)
+    whole = [step for step in middle if step.area_m2 > 0.8 * largest]
+
+    def clearance(step: Footprint) -> float:
+        others = [np.linalg.norm(step.position - other.position) for other in footprints if other is not step]
+        return float(min(others, default=np.inf))
+
+    return max(whole, key=clearance)
 
 
 def _looking(heading: float, pitch: float) -> np.ndarray:

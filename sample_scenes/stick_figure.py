@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 _AROUND = 12  # vertices around a stick
 _CAP = 4  # rings over each rounded end
 _SLENDERNESS = 7.0  # length of a bone over its stick's radius
-_THICKEST = 0.045  # radius over the height of the rig
+_THICKEST = 0.034  # radius over the height of the rig
 
 
 def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collection) -> bpy.types.Object | None:
@@ -27,7 +27,7 @@ def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collectio
         length = np.linalg.norm(tail - head)
         if length < 1e-3 * height:
             continue
-        radius = min(length / _SLENDERNESS + 0.012 * height, _THICKEST * height)
+        radius = min(length / _SLENDERNESS + 0.014 * height, _THICKEST * height)
         stick, quads = _stick(head, tail, radius, 0.8 * radius)
         first = len(vertices) * len(stick)
         vertices.append(stick)
