@@ -14,7 +14,6 @@ from typing import Literal, cast
 
 import bpy
 import numpy as np
-from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core.errors import InputError
@@ -125,6 +124,12 @@ def is_baked(ground: bpy.types.Object) -> bool:
     return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
 
 
+def summary_of(ground: bpy.types.Object) -> dict[str, float]:
+    """What the bake that is on this ground came to, for display; empty if there is none."""
+    summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
+    return summary.to_dict() if summary else {}
+
+
 def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     """World positions of the mesh's vertices without any bake or modifier, (V, 3) [m].
 
@@ -164,33 +169,57 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
-    """Object space to world space in metres, (4, 4)."""
-    matrix = np.array(ground.matrix_world, dtype=np.float64)
+    """Object space to world space in metres, (4, 4), whether the ground is visible or not."""
+    if ground.visible_get():
+        matrix = np.array(ground.matrix_world, dtype=np.float64)
+    else:  # Blender keeps no world matrix of hidden objects
+        with _stand_in(ground) as evaluated:
+            matrix = np.array(evaluated.matrix_world, dtype=np.float64)
     matrix[:3] *= unit_scale
     return matrix
 
 
 @contextmanager
-def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
+def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
+    """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers."""
     scene = bpy.data.scenes.new("SoftGround Evaluation")
-    copy, mesh = ground.copy(), mesh_of(ground).copy()
+    copy = ground.copy()
     try:
-        copy.data = mesh
         copy.hide_viewport = False
-        rest = _rest_positions(mesh)
-        copy.shape_key_clear()
-        if played := playback.modifier_of(copy):
-            copy.modifiers.remove(played)
-        _write_positions(mesh, rest)
+        if mesh is None:
+            copy.modifiers.clear()
+        else:
+            copy.data = mesh
+            if played := playback.modifier_of(copy):
+                copy.modifiers.remove(played)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
         layer.update()
-        yield mesh_of(copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph)))
+        yield copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph))
     finally:
         bpy.data.objects.remove(copy)
-        bpy.data.meshes.remove(mesh)
         bpy.data.scenes.remove(scene)
+
+
+@contextmanager
+def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
+    mesh = mesh_of(ground).copy()
+    try:
+        rest = _rest_positions(mesh)
+        if mesh.shape_keys:
+            _drop_shape_keys(mesh)
+        _write_positions(mesh, rest)
+        with _stand_in(ground, mesh) as evaluated:
+            yield mesh_of(evaluated)
+    finally:
+        bpy.data.meshes.remove(mesh)
+
+
+def _drop_shape_keys(mesh: bpy.types.Mesh) -> None:
+    holder = bpy.data.objects.new("SoftGround Evaluation", mesh)
+    holder.shape_key_clear()
+    bpy.data.objects.remove(holder)
 
 
 @dataclass(frozen=True)
@@ -310,7 +339,8 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     """World up in the ground's own space and units, of the length of one metre, (3,)."""
-    return np.array(ground.matrix_world.to_3x3().inverted() @ Vector((0.0, 0.0, 1.0))) / unit_scale
+    up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
+    return up
 
 
 def restore(ground: bpy.types.Object) -> None:

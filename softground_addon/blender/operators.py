@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 from typing import TypeVar
 
 import bpy
-from bpy.props import StringProperty
 
-from ..core import presets
-from ..core.errors import SoftGroundError
-from . import bake_job, character_setup, ground_mesh, settings
+from ..core.errors import InputError, SoftGroundError
+from . import analysis, bake_job, character_setup, ground_mesh, settings
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -43,6 +42,9 @@ class SOFTGROUND_OT_add_character(bpy.types.Operator):
         character = character_setup.add_character(settings.scene_of(context), armature)
         names = ", ".join(sole.name for sole in character.soles)
         self.report({"INFO"}, f"Added '{character.name}' with {names}")
+        if not bpy.app.background:
+            with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+                analysis.read(settings.scene_of(context))
         return {"FINISHED"}
 
 
@@ -82,24 +84,6 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     return thing
 
 
-class SOFTGROUND_OT_load_preset(bpy.types.Operator):
-    """Set the ground's material to a preset"""
-
-    bl_idname = "softground.load_preset"
-    bl_label = "Load Ground Preset"
-    bl_options = {"REGISTER", "UNDO"}
-
-    name: StringProperty(name="Name", description="Name of a preset that comes with SoftGround")
-    filepath: StringProperty(name="File", description="Preset file, instead of a name", subtype="FILE_PATH")
-
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        path = bpy.path.abspath(self.filepath)
-        preset = presets.load(presets.Path(path)) if path else presets.find(self.name)
-        settings.apply_preset(settings.scene_of(context), preset)
-        return {"FINISHED"}
-
-
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     """Take the footprints off the ground: it is again what it was before the bake"""
 
@@ -124,6 +108,5 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
 CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_create_ground,
-    SOFTGROUND_OT_load_preset,
     SOFTGROUND_OT_clear_bake,
 )

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.motion import JOINTS
-from . import session, settings
+from . import analysis, ground_mesh, session, settings
 from .character_editing import active_character, active_sole
 from .translation import iface_
 
@@ -170,7 +170,7 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
         if options.ground is None:
             row = column.row()
             row.operator("softground.create_ground", icon="MESH_GRID")
-        column.prop(options, "cell_size")
+        column.prop(options, "cell_size_cm")
         estimate = _estimate(options)
         if estimate:
             _note(layout, estimate)
@@ -184,11 +184,27 @@ class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.column()
-        material = settings.scene_of(context).softground.material
+        scene = settings.scene_of(context)
+        material = scene.softground.material
+        row = layout.row(align=True)
+        row.menu("SOFTGROUND_MT_presets", text=material.preset or iface_("Presets"), translate=False)
+        row.operator("softground.save_preset", text="", icon="ADD")
+        row.operator("softground.remove_preset", text="", icon="REMOVE")
         column = layout.column()
-        column.prop(material, "youngs_modulus")
+        column.prop(material, "stiffness_mpa")
         column.prop(material, "poisson_ratio")
         column.prop(material, "characteristic_time")
+        depth = analysis.expected_depth(scene)
+        row = layout.row(align=True)
+        if depth is None:
+            row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+            return
+        split = row.split(factor=0.4)
+        split.alignment = "RIGHT"
+        split.label(text="Deepest Print")
+        row = split.row(align=True)
+        row.operator("softground.match_depth", text=f"{depth * 100:.1f} cm", icon="DRIVER_DISTANCE", translate=False)
+        row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
 
 
 class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
@@ -201,7 +217,7 @@ class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         column = self.column().column()
         material = settings.scene_of(context).softground.material
-        for field in ("layer_depth", "rim_reach", "blur_sigma"):
+        for field in ("layer_depth_cm", "rim_reach_cm", "blur_sigma_cm"):
             column.prop(material, field)
         column.prop(material, "surface")
 
@@ -228,6 +244,25 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         column.scale_y = 1.4
         column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         layout.operator("softground.clear_bake", icon="TRASH")
+        summary = ground_mesh.summary_of(options.ground) if options.ground else {}
+        if summary:
+            _result(layout, summary)
+
+
+def _result(layout: Any, summary: Any) -> None:
+    """What the bake that is on the ground came to."""
+    box = layout.box().column(align=True)
+    for label, value in (
+        ("Steps", f"{summary['steps']:.0f}"),
+        ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
+        ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
+        ("Time", f"{summary['seconds']:.1f} s"),
+    ):
+        row = box.split(factor=0.5)
+        row.alignment = "RIGHT"
+        row.label(text=label)
+        row.alignment = "LEFT"
+        row.label(text=value, translate=False)
 
 
 def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:

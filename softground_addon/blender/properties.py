@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -33,6 +35,18 @@ def _is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bo
 def _limits(field: str) -> dict[str, float]:
     low, high = MATERIAL_RANGES[field]
     return {"min": low, "max": high}
+
+
+def _in_unit(field: str, unit: float) -> dict[str, Any]:
+    """What shows a field in another unit, given in the field's own: the same number, kept once."""
+
+    def shown(group: Any) -> float:
+        return float(getattr(group, field)) / unit
+
+    def set_to(group: Any, value: float) -> None:
+        setattr(group, field, value * unit)
+
+    return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
 
 
 class SoftGroundJoint(bpy.types.PropertyGroup):
@@ -165,6 +179,44 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         **_limits("blur_sigma"),
     )
 
+    stiffness_mpa: FloatProperty(
+        name="Stiffness (MPa)",
+        description=(
+            "Young's modulus of the loose layer, in megapascals: prints are half as deep at twice the value. An "
+            "effective modulus for compaction, far below the elastic one from textbooks"
+        ),
+        min=1e-3,
+        soft_min=0.02,
+        soft_max=5.0,
+        precision=3,
+        step=1,
+        **_in_unit("youngs_modulus", 1e6),
+    )
+    layer_depth_cm: FloatProperty(
+        name="Layer Depth (cm)",
+        description="Thickness of the loose layer, in centimetres. No print is deeper",
+        min=0.1,
+        soft_max=100.0,
+        precision=1,
+        **_in_unit("layer_depth", 0.01),
+    )
+    rim_reach_cm: FloatProperty(
+        name="Rim Reach (cm)",
+        description="How far around the foot the displaced ground rises, in centimetres",
+        min=0.0,
+        soft_max=20.0,
+        precision=1,
+        **_in_unit("rim_reach", 0.01),
+    )
+    blur_sigma_cm: FloatProperty(
+        name="Smoothing (cm)",
+        description="Width of the blur that the shown ground gets, in centimetres. Forces and depths do not see it",
+        min=0.0,
+        soft_max=5.0,
+        precision=2,
+        **_in_unit("blur_sigma", 0.01),
+    )
+
 
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
@@ -184,6 +236,17 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_min=0.002,
         soft_max=0.05,
         precision=4,
+    )
+    cell_size_cm: FloatProperty(
+        name="Cell Size (cm)",
+        description="Size of the cells in which the ground is computed, in centimetres. Half the size takes four times "
+        "the memory; the depth of the prints does not depend on it",
+        min=0.01,
+        max=100.0,
+        soft_min=0.2,
+        soft_max=5.0,
+        precision=2,
+        **_in_unit("cell_size", 0.01),
     )
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import character_editing, cli, modal_bake, operators, panels, properties, session
+from . import analysis, character_editing, cli, modal_bake, operators, panels, preset_menu, properties, session
 
 CLASSES = (
     *session.CLASSES,
@@ -12,6 +12,7 @@ CLASSES = (
     *operators.CLASSES,
     *character_editing.CLASSES,
     *modal_bake.CLASSES,
+    *preset_menu.CLASSES,
     *panels.CLASSES,
 )
 
@@ -36,6 +37,7 @@ def unregister() -> None:
         bpy.utils.unregister_cli_command(_command)
         _command = None
     modal_bake.stop()
+    analysis.forget()
     del bpy.types.WindowManager.softground
     del bpy.types.Scene.softground
     for cls in reversed(CLASSES):

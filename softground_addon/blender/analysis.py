@@ -1,0 +1,166 @@
+"""What is known of a shot before it is baked: its loads on the ground and the depth to expect.
+
+A shot is read when the user asks for something that needs it, and kept while Blender runs, outside the file. It counts
+as known until what it was read from changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+
+from ..core.deformation import GroundMaterial
+from ..core.errors import InputError
+from ..core.prediction import StanceLoad, deepest, matching_modulus, stance_loads
+from ..core.simulation import CharacterLoads, simulate
+from . import bake_job, settings
+
+TRIALS = 4
+"""Bakes that a match may compute: two are enough unless feet slide."""
+CLOSE_ENOUGH = 0.005
+"""Relative error of a matched depth."""
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A shot that was read.
+
+    Attributes
+    ----------
+    source : hashable
+        What it was read from.
+    terms : hashable
+        What the loads depend on beside that.
+    shot : bake_job.Shot
+    loads : list of CharacterLoads
+    stances : list of StanceLoad
+    """
+
+    source: Hashable
+    terms: Hashable
+    shot: bake_job.Shot
+    loads: list[CharacterLoads]
+    stances: list[StanceLoad]
+
+
+_known: dict[int, Analysis] = {}
+"""By session uid of the scene; a cache only: everything in it can be read again."""
+
+_depths: dict[tuple[int, GroundMaterial], float] = {}
+"""Depths that were asked for lately, by identity of the analysis; emptied with it."""
+
+
+def forget() -> None:
+    """Read shots anew from now on."""
+    _known.clear()
+    _depths.clear()
+
+
+def known(scene: bpy.types.Scene) -> Analysis | None:
+    """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
+    analysis = _known.get(scene.session_uid)
+    if analysis is None or analysis.source != _source(scene):
+        return None
+    if analysis.terms != _terms(scene):
+        try:
+            analysis = _estimated(scene, analysis.shot)
+        except InputError:
+            return None
+        _keep(scene, analysis)
+    return analysis
+
+
+def read(scene: bpy.types.Scene) -> Analysis:
+    """The scene's analysis, read now if it is not known.
+
+    Raises
+    ------
+    InputError
+        If the shot could not be baked either; names what is wrong and the remedy.
+    """
+    analysis = known(scene)
+    if analysis is None:
+        analysis = _estimated(scene, bake_job.run(bake_job.read_shot(scene)))
+        _keep(scene, analysis)
+    return analysis
+
+
+def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> float | None:
+    """Depth of the deepest print to expect [m] in a material, or the scene's; None where the shot is not known."""
+    analysis = known(scene)
+    if analysis is None:
+        return None
+    key = (id(analysis), material or settings.material_of(scene))
+    if key not in _depths:
+        _depths[key] = deepest(analysis.stances, key[1])
+    return _depths[key]
+
+
+def match_depth(scene: bpy.types.Scene, depth: float) -> float:
+    """The modulus [Pa] that gives the deepest print a depth [m] in a bake of the scene.
+
+    Raises
+    ------
+    InputError
+        If there is none, or the shot cannot be read.
+    """
+    analysis = read(scene)
+    material = settings.material_of(scene)
+    aim = depth
+    for _ in range(TRIALS):
+        material = replace(material, youngs_modulus=matching_modulus(analysis.stances, material, aim))
+        reached = _simulated_depth(scene, analysis, material)
+        if abs(reached - depth) <= CLOSE_ENOUGH * depth:
+            break
+        aim *= depth / reached  # sliding feet print less deep than predicted
+    return material.youngs_modulus
+
+
+def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial) -> float:
+    results = simulate(analysis.loads, analysis.shot.terrain, material, settings.cell_size_of(scene))
+    return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
+
+
+def _estimated(scene: bpy.types.Scene, shot: bake_job.Shot) -> Analysis:
+    loads = bake_job.run(bake_job.estimate_shot(scene, shot))
+    stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene))
+    return Analysis(_source(scene), _terms(scene), shot, loads, stances)
+
+
+def _keep(scene: bpy.types.Scene, analysis: Analysis) -> None:
+    _known[scene.session_uid] = analysis
+    _depths.clear()
+
+
+def _source(scene: bpy.types.Scene) -> Hashable:
+    """What a shot is read from, as far as it is seen in the settings; edits of actions are told by a handler."""
+    options = scene.softground
+    render = scene.render
+    return (
+        (options.frame_start, options.frame_end, render.fps, render.fps_base, scene.unit_settings.scale_length),
+        options.ground and options.ground.session_uid,
+        tuple(
+            (
+                character.armature.session_uid,
+                tuple((joint.name, joint.bone, joint.end) for joint in character.joints),
+                tuple((s.name, s.side, s.bone, s.toe_bone, s.object and s.object.name) for s in character.soles),
+            )
+            for character in _characters(options)
+        ),
+    )
+
+
+def _terms(scene: bpy.types.Scene) -> Hashable:
+    options = scene.softground
+    tau = options.material.characteristic_time
+    return tuple(
+        (character.mass, character.force_model, tau if character.force_model == "IMPULSE" else None)
+        for character in _characters(options)
+    )
+
+
+def _characters(options: Any) -> list[Any]:
+    return [character for character in options.characters if character.armature]

@@ -1,0 +1,154 @@
+"""How deep a shot's prints will be, without pressing any cell.
+
+The ground gives way under each point of a sole as under a cell, as long as the sole does not slide (MODEL.md
+section 4). What the material does not change - clearance, area and force of each stance - is gathered once; another
+material then costs some milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contacts import runs
+from .deformation import GroundMaterial, compress, compression_rate, sink, touching_fraction
+from .errors import InputError
+from .heightfield import Terrain, TerrainTiles
+from .imprint import contact_window, point_contact, sole_points
+from .simulation import CharacterLoads
+
+Array = NDArray[np.float64]
+
+MATCH_TOLERANCE = 1e-3
+"""Relative error of a matched depth."""
+MOST_TRIALS = 60
+"""Halvings of the interval in which the modulus is searched: its logarithm is then known to rounding."""
+SOFTEST, STIFFEST = 1e3, 1e10
+"""Range in which a modulus is searched [Pa]."""
+
+
+@dataclass(frozen=True)
+class StanceLoad:
+    """One sole from touching down to leaving, as the ground feels it.
+
+    Attributes
+    ----------
+    character, sole : str
+    frames : (N,) float array
+        Scene frame of each step.
+    clearance : (N, Q) float array
+        Height of Q points of the underside above the ground, less that of the lowest [m].
+    area : (N, Q) float array
+        Area that each stands for [m²].
+    force : (N,) float array
+        Normal force [N].
+    tolerance : float
+        See `deformation.touching_fraction` [m].
+    step : float
+        Time step [s].
+    """
+
+    character: str
+    sole: str
+    frames: Array
+    clearance: Array
+    area: Array
+    force: Array
+    tolerance: float
+    step: float
+
+    def depth(self, material: GroundMaterial) -> float:
+        """Depth of its print [m]: exact for a foot that rolls, too large for one that slides."""
+        sinking = sink(
+            self.clearance, self.area, self.force, tolerance=self.tolerance, step=self.step, material=material
+        )
+        touching = touching_fraction(self.clearance, sinking.sinkage[:, None], self.tolerance)
+        compression = np.zeros(self.clearance.shape[1])
+        rate = compression_rate(self.step, material)
+        for step in np.flatnonzero(sinking.target):
+            compression = compress(compression, touching[step], sinking.target[step], rate)
+        return float(compression.max(initial=0.0))
+
+
+def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float) -> list[StanceLoad]:
+    """Every stance of the characters, in the order of their first contact.
+
+    Parameters
+    ----------
+    loads : sequence of CharacterLoads
+    terrain : Terrain
+        The undisturbed ground.
+    cell_size : float
+        Side of a cell [m]: the ground's height is looked up once per cell.
+    """
+    tiles: dict[int, TerrainTiles] = {}
+    stances = []
+    for character in loads:
+        motion, contacts = character.motion, character.contacts
+        for index, sole in enumerate(motion.soles):
+            points = sole_points(sole.sole, sole.transforms)
+            divisions = points.cell_divisions(cell_size)
+            tiles.setdefault(divisions, TerrainTiles(terrain, cell_size / divisions))
+            for first, end in zip(*runs(contacts.touching[:, index]), strict=True):
+                steps = slice(max(int(first), 1), int(end))  # the first step of all is a state, it presses nothing
+                poses, normals = sole.transforms[steps], contacts.normal[steps, index]
+                if not len(poses):
+                    continue
+                window = contact_window(points, poses, cell_size).refined(divisions)
+                contact = point_contact(points, poses, tiles[divisions].surface(window))
+                force = np.einsum("ni,ni->n", character.forces.forces[steps, index], normals)
+                stances.append(
+                    StanceLoad(
+                        motion.name,
+                        sole.sole.name,
+                        motion.frames[steps],
+                        contact.clearance,
+                        contact.area / normals[:, 2:],
+                        np.maximum(force, 0.0),
+                        points.tolerance,
+                        motion.time_step,
+                    )
+                )
+    return sorted(stances, key=lambda stance: float(stance.frames[0]))
+
+
+def deepest(stances: Sequence[StanceLoad], material: GroundMaterial) -> float:
+    """Depth of the deepest print [m], 0 if there is none."""
+    return max((stance.depth(material) for stance in stances), default=0.0)
+
+
+def matching_modulus(stances: Sequence[StanceLoad], material: GroundMaterial, depth: float) -> float:
+    """The modulus [Pa] at which the deepest print gets a depth, everything else being equal.
+
+    Parameters
+    ----------
+    stances : sequence of StanceLoad
+    material : GroundMaterial
+    depth : float
+        Wanted depth of the deepest print [m].
+
+    Raises
+    ------
+    InputError
+        If no modulus gives that depth.
+    """
+    low, high = SOFTEST, STIFFEST
+    if not deepest(stances, replace(material, youngs_modulus=high)) <= depth <= material.layer_depth:
+        raise InputError(
+            f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and the layer's, "
+            f"{material.layer_depth * 100:.3g} cm."
+        )
+    modulus = low
+    for _ in range(MOST_TRIALS):
+        modulus = float(np.sqrt(low * high))
+        reached = deepest(stances, replace(material, youngs_modulus=modulus))
+        if abs(reached - depth) <= MATCH_TOLERANCE * depth:
+            return modulus
+        low, high = (modulus, high) if reached > depth else (low, modulus)
+    raise InputError(
+        f"Prints of {depth * 100:.3g} cm cannot be reached with feet that rest so briefly on the ground: shorten the "
+        "ground's time, or choose a smaller depth."
+    )
