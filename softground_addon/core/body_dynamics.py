@@ -90,10 +90,10 @@ def body_dynamics(motion: CharacterMotion) -> BodyDynamics:
     pendulum = np.sqrt(gravity / motion.leg_length) / (2 * np.pi)
     highest = min(CUTOFF * pendulum, HIGHEST_CUTOFF / frame_step)
     cutoff = _suited_cutoff(points.centre[sampled], frame_step, highest)
-    _, moment, _ = smooth_path(_angular_momentum(points, step), step, cutoff, sampled=sampled)
-    centre, _, acceleration = smooth_path(points.centre, step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS)
-    force = acceleration / gravity + (0.0, 0.0, 1.0)
-    return BodyDynamics(centre, force, moment / gravity, points, cutoff)
+    path = np.concatenate([_angular_momentum(points, step), points.centre], axis=1)
+    smooth, rate, acceleration = smooth_path(path, step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS)
+    force = acceleration[:, 3:] / gravity + (0.0, 0.0, 1.0)
+    return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / gravity, points, cutoff)
 
 
 def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
@@ -163,4 +163,6 @@ def _angular_momentum(points: MassPoints, step: float) -> Array:
     if len(points.positions) < 2:
         return np.zeros((len(points.positions), 3))
     arm = points.positions - points.centre[:, None]
-    return points.fractions @ np.cross(arm, np.gradient(arm, step, axis=0))
+    x, y, z = np.moveaxis(arm, -1, 0)
+    u, v, w = np.moveaxis(np.gradient(arm, step, axis=0), -1, 0)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1).swapaxes(1, 2) @ points.fractions

@@ -27,7 +27,7 @@ def lowest_points(motion: CharacterMotion) -> Array:
     return np.stack(centres, axis=1)
 
 
-def centres_of_pressure(motion: CharacterMotion, share: Array, target: Array, trust: Array) -> Array:
+def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, target: Array, trust: Array) -> Array:
     """Where each sole presses when the loads' common point of action is known, (N, S, 3) [m].
 
     Each sole's centre moves along the sole from its `lowest_points` toward the place at which the loads' moment
@@ -37,6 +37,8 @@ def centres_of_pressure(motion: CharacterMotion, share: Array, target: Array, tr
     Parameters
     ----------
     motion : CharacterMotion
+    lowest : (N, S, 3) float array
+        Its `lowest_points` [m].
     share : (N, S) float array
         Each sole's share of the total force.
     target : (N, 2) float array
@@ -44,7 +46,7 @@ def centres_of_pressure(motion: CharacterMotion, share: Array, target: Array, tr
     trust : (N,) float array
         How far `target` is followed, 0 to 1.
     """
-    centres = lowest_points(motion)
+    centres = lowest.copy()
     missing = trust[:, None] * (target - (share[..., None] * centres[..., :2]).sum(axis=1))
     emphasis = share / np.maximum((share**2).sum(axis=1, keepdims=True), 1e-9)
     for index, sole in enumerate(motion.soles):

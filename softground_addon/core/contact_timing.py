@@ -47,6 +47,9 @@ IDLE_LOAD = 0.15
 QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
 """Phases at which a sine has a quarter and a half of its peak."""
 
+COARSE_STRIDE = 3
+"""Steps between the times that are tried first."""
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -82,12 +85,12 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
     touching = _supported(contacts, body.force[:, 2], motion.leg_length, round(SHORTEST_SUPPORT * unit))
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
-    pressure = lowest_points(motion)
+    lowest = lowest_points(motion)
     for change in transitions(touching, round(SEARCH * unit)):
         gap = body.force[change.leave : change.strike, 2]
         if len(gap) and gap.min() < FREE_FALL:
             continue  # flight: the feet are right, there is no double support
-        strike, leave = _fit_overlap(change, pressure, body, unit)
+        strike, leave = _fit_overlap(change, lowest, body, unit)
         touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
         touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
     for first, sole in _landings(touching):
@@ -95,7 +98,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         weight = LANDING_DEVIATION**2 / (LANDING_DEVIATION**2 + ONSET_DEVIATION**2)
         strike = round(first + weight * (onset - first))
         touching[min(strike, first) : max(strike, first), sole] = strike < first
-    load = whole_body_shares(motion, touching, body) * body.force[:, 2:]
+    load = whole_body_shares(motion, lowest, touching, body) * body.force[:, 2:]
     return dataclasses.replace(contacts, touching=_without_idle(touching, load))
 
 
@@ -117,15 +120,16 @@ def _supported(contacts: Contacts, force: Array, leg_length: float, shortest: in
     pushed = force > FREE_FALL
     same_height = SUPPORT_RANGE * leg_length
     for first, last in zip(*runs(pushed & ~touching.any(axis=1)), strict=True):
-        lowest = contacts.clearance[first:last].min(axis=0)
-        if last - first < shortest or lowest.min() > HIGHEST_SUPPORT * leg_length:
+        height = contacts.clearance[first:last].min(axis=0)
+        if last - first < shortest or height.min() > HIGHEST_SUPPORT * leg_length:
             continue
-        for sole in np.flatnonzero(lowest < lowest.min() + same_height):
-            near = (contacts.clearance[:, sole] < lowest[sole] + same_height) & (force > 0)
+        for sole in np.flatnonzero(height < height.min() + same_height):
             instant = first + int(contacts.clearance[first:last, sole].argmin())
-            for start, end in zip(*runs(near), strict=True):
-                if start <= instant < end:
-                    touching[start:end, sole] = True
+            away = np.flatnonzero((contacts.clearance[:, sole] > height[sole] + same_height) | (force <= 0))
+            place = np.searchsorted(away, instant)
+            start = away[place - 1] + 1 if place else 0
+            end = away[place] if place < len(away) else len(touching)
+            touching[start:end, sole] = True
     return touching
 
 
@@ -194,13 +198,13 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
     return found
 
 
-def _fit_overlap(change: Transition, pressure: Array, body: BodyDynamics, unit: float) -> tuple[int, int]:
+def _fit_overlap(change: Transition, lowest: Array, body: BodyDynamics, unit: float) -> tuple[int, int]:
     """Strike and leave whose cosine ramp fits the point of action best, near those of the transition."""
     search = max(round(SEARCH * unit), 1)
     first = max(min(change.strike, change.leave) - search, 0)
-    last = min(max(change.strike, change.leave) + search, len(pressure))
+    last = min(max(change.strike, change.leave) + search, len(lowest))
     window = slice(first, last)
-    back, front = pressure[window, change.trailing], pressure[window, change.leading]
+    back, front = lowest[window, change.trailing], lowest[window, change.leading]
     target = body.point_of_action((back[:, 2] + front[:, 2]) / 2, window)
     along = (front - back)[:, :2]
     length = (along**2).sum(axis=1)
@@ -209,16 +213,19 @@ def _fit_overlap(change: Transition, pressure: Array, body: BodyDynamics, unit: 
     # Where one sole bears all, the point of action wanders under that sole and tells nothing about the other.
     telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * SHARE_DEVIATION**2)
 
-    offset = np.arange(-search, search + 1)
-    strike, leave = change.strike + offset[:, None], change.leave + offset[None, :]
-    possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > first) & (leave < last)
-    pairs = np.stack([np.broadcast_to(edge, possible.shape)[possible] for edge in (strike, leave)])
-    if not pairs.size:
-        return change.strike, change.leave
     step = np.arange(first, last)
-    phase = np.clip((step - pairs[0][:, None]) / (pairs[1] - pairs[0])[:, None], 0.0, 1.0)
-    misfit = (0.5 - 0.5 * np.cos(np.pi * phase) - share) ** 2 @ telling
-    moved = (pairs - np.array([[change.strike], [change.leave]])) / unit
-    cost = misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=0)
-    best = cost.argmin()
-    return int(pairs[0, best]), int(pairs[1, best])
+    found = np.array([change.strike, change.leave])
+    best = found
+    for stride in (COARSE_STRIDE, 1):
+        reach = search // stride * stride if stride > 1 else COARSE_STRIDE - 1
+        offset = np.arange(-reach, reach + 1, stride)
+        pairs = best + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
+        strike, leave = pairs.T
+        pairs = pairs[(leave - strike >= SHORTEST_OVERLAP * unit) & (strike > first) & (leave < last)]
+        if not len(pairs):
+            break
+        phase = np.clip((step - pairs[:, :1]) / (pairs[:, 1:] - pairs[:, :1]), 0.0, 1.0)
+        misfit = (0.5 - 0.5 * np.cos(np.pi * phase) - share) ** 2 @ telling
+        moved = (pairs - found) / unit
+        best = pairs[np.argmin(misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=1))]
+    return int(best[0]), int(best[1])

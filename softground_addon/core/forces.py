@@ -102,9 +102,10 @@ def whole_body_forces(motion: CharacterMotion, contacts: Contacts, body: BodyDyn
     body = with_flight(motion, body or body_dynamics(motion), ~grounded)
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
-    share = whole_body_shares(motion, contacts.touching, body)
-    target = point_of_action(motion, contacts.touching, body)
-    pressure = centres_of_pressure(motion, share, target, np.clip(total[:, 2], 0.0, 1.0))
+    lowest = lowest_points(motion)
+    share = whole_body_shares(motion, lowest, contacts.touching, body)
+    target = point_of_action(lowest, contacts.touching, body)
+    pressure = centres_of_pressure(motion, lowest, share, target, np.clip(total[:, 2], 0.0, 1.0))
     forces = body_weight * share[..., None] * total[:, None]
     weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .body_dynamics import BodyDynamics
-from .centre_of_pressure import lowest_points
 from .contacts import runs
 from .motion import CharacterMotion
 
@@ -25,20 +24,23 @@ LONGEST_RAMP = 1.0
 """Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
 
 
-def whole_body_shares(motion: CharacterMotion, touching: Mask, body: BodyDynamics) -> Array:
-    """Each sole's share of the total force, from when it touches and from where the total force acts, (N, S)."""
+def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
+    """Each sole's share of the total force, from when it touches and from where the total force acts, (N, S).
+
+    `lowest` is the motion's `lowest_points`.
+    """
     return share_through_transitions(
-        lowest_points(motion)[..., :2],
-        point_of_action(motion, touching, body),
+        lowest[..., :2],
+        point_of_action(lowest, touching, body),
         touching,
         deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
         longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
     )
 
 
-def point_of_action(motion: CharacterMotion, touching: Mask, body: BodyDynamics) -> Array:
+def point_of_action(lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
     """Where the total force meets the level of the soles that touch, (N, 2) [m]."""
-    height = lowest_points(motion)[..., 2]
+    height = lowest[..., 2]
     return body.point_of_action((height * touching).sum(axis=1) / np.maximum(touching.sum(axis=1), 1))
 
 
