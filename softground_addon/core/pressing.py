@@ -70,6 +70,8 @@ class Imprints:
         Shares of the displaced volume.
     target : (N,) float array
         Compression that the stress leads to [m].
+    sinkage : (N,) float array
+        How far the ground had given way under the sole's lowest point when each step began [m].
     """
 
     first: int
@@ -78,6 +80,7 @@ class Imprints:
     contact: NDArray[np.bool_]
     rim: Array
     target: Array
+    sinkage: Array
 
     @property
     def end(self) -> int:
@@ -144,6 +147,12 @@ class Stance:
                 window = self._window(start, last, press)
             self._imprints = self._lay_out(start, last, window, press, timing.step)
         return self._imprints
+
+    def lay_out_anew(self, start: int) -> None:
+        """Forget the imprints from a step on, as they were laid out on other terms."""
+        if self._imprints is not None and self._imprints.first <= start < self._imprints.end:
+            self._sinkage = float(self._imprints.sinkage[start - self._imprints.first])
+        self._imprints = None
 
     @property
     def printed(self) -> bool:
@@ -212,7 +221,7 @@ class Stance:
         )
         contact = in_contact(coverage)
         rim = rim_weights(coverage, contact, press.rim_reach, cells.bears)
-        return Imprints(start, window, coverage, contact, rim, sinking.target)
+        return Imprints(start, window, coverage, contact, rim, sinking.target, sinking.sinkage)
 
 
 class Press:

@@ -139,6 +139,20 @@ class Simulation:
     def __init__(self, terrain: Terrain, material: GroundMaterial, ground: HeightField) -> None:
         self._press = Press(terrain, material, ground)
         self._open: dict[tuple[int, int], Stance] = {}
+        self._active: list[Stance] = []
+        self._step = 1
+
+    @property
+    def material(self) -> GroundMaterial:
+        """What the ground is made of; a new one acts on all that is pressed from then on."""
+        return self._press.material
+
+    @material.setter
+    def material(self, material: GroundMaterial) -> None:
+        if material != self._press.material:
+            self._press.material = material
+            for stance in self._active:
+                stance.lay_out_anew(self._step)
 
     def run(self, loads: Sequence[CharacterLoads], *, more_follows: bool = False) -> Iterator[FrameResult]:
         """Press a piece of the motion; see `simulate`.
@@ -152,7 +166,7 @@ class Simulation:
         """
         grid = _time_grid(loads)
         waiting, ended = self._stances(loads, grid)
-        active: list[Stance] = []
+        active = self._active = []
         start = 1
         for end in grid.shown + 1:
             while waiting and waiting[0].first < end:
@@ -164,6 +178,7 @@ class Simulation:
                 active.remove(stance)
                 if not (more_follows and stance in self._open.values()):
                     ended.append(stance)
+            self._step = int(end)
             yield FrameResult(
                 frame,
                 self._press.ground,
