@@ -21,14 +21,13 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import FlatTerrain, Terrain
-from ..core.histories import histories
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
 from ..core.terrain import MeshTerrain
-from . import ground_mesh, playback, settings
+from . import baked_ground, ground_mesh, settings
 from .character_setup import mapping_of
-from .ground_mesh import GroundPlan, GroundSurface, Indices
+from .ground_mesh import GroundPlan, GroundSurface
 from .materials import ensure_material
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character
@@ -47,6 +46,9 @@ LOW_PERCENTILE = 10.0
 
 COARSEST_SPACING = 0.25
 """Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""
+
+DETAIL_FROM = 4.0
+"""Spacing of ground vertices under the prints from which the ground is refined along the trail, in cells."""
 
 RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
@@ -169,10 +171,12 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         cell_size=cell_size,
         blur_sigma=material.blur_sigma,
     )
-    vertices = None
+    vertices = surface.vertices if surface else None
+    index = np.zeros(0, dtype=np.intp)
+    refine = False
     if ground and surface:
-        vertices = surface.vertices
-        index = _pressed_vertices(ground, surface, pressed, terrain, loads)
+        index = surface.pressed_vertices(pressed, terrain)
+        refine = _wants_detail(ground, _spacing(surface.vertices[index], pressed), options.detail, cell_size, loads)
     elif write:
         ground = create_ground(scene, plan)
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
@@ -181,13 +185,14 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     input_hash = report.hash_inputs(inputs, motions, vertices)
     playback_error: float | None = None
     if write and ground and vertices is not None:
-        place = vertices[index, :2].T
         stored = record.dump(footprints, {"inputs": inputs, "input_hash": input_hash})
-        ground_mesh.write(ground, index, pressed.sample(*place), stored, unit_scale)
-        over_time = histories(footprints, *place, blur_sigma=material.blur_sigma)
-        up = ground_mesh.up_of(ground, unit_scale)
-        playback.install(ground, index, over_time, up=up, frame_rate=motions[0].frame_rate)
-        playback_error = over_time.error
+        if refine:
+            place = baked_ground.on_detail(ground, pressed, terrain, cell_size, unit_scale)
+        else:
+            place = baked_ground.on_itself(ground, index, vertices)
+        playback_error = baked_ground.write(
+            place, footprints, pressed, stored, blur_sigma=material.blur_sigma, unit_scale=unit_scale
+        )
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
     result = report.build(
@@ -206,7 +211,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         forces=forces if options.keep_forces else None,
     )
     if write and ground:
-        ground_mesh.mesh_of(ground)[ground_mesh.SUMMARY] = _summary(result)
+        ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = _summary(result)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 
@@ -336,7 +341,9 @@ def _simulate(
         frames.append(result.frame)
         forces.append(result.forces)
         yield Progress("simulate", min(1.0, len(frames) * _steps_per_frame(loads) / count))
-    footprints.sort(key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole))
+    footprints.sort(
+        key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
+    )
     return footprints, _force_table(loads, frames, forces)
 
 
@@ -381,26 +388,28 @@ def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: b
         )
 
 
-def _pressed_vertices(
-    ground: bpy.types.Object,
-    surface: GroundSurface,
-    pressed: PressedGround,
-    terrain: Terrain,
-    loads: Sequence[CharacterLoads],
-) -> Indices:
-    """The vertices that the bake moves; InputError if they are too few to show a foot."""
-    index = surface.pressed_vertices(pressed, terrain)
-    length = min(_length(sole.sole.outline) for character in loads for sole in character.motion.soles)
-    compression = pressed.raw.sample(*surface.vertices[index, :2].T)[0]
+def _spacing(vertices: Array, pressed: PressedGround) -> float:
+    """Distance between the ground's vertices under the prints [m], infinite where there are none."""
+    compression = pressed.raw.sample(*vertices[:, :2].T)[0]
     cells = sum(int((tile[0] > 0).sum()) for tile in pressed.raw.tiles.values())
     under_prints = cells * pressed.raw.cell_size**2
-    spacing = np.sqrt(under_prints / max(1, int((compression > 0).sum())))
+    return float(np.sqrt(under_prints / max(1e-9, float((compression > 0).sum()))))
+
+
+def _wants_detail(
+    ground: bpy.types.Object, spacing: float, detail: str, cell_size: float, loads: Sequence[CharacterLoads]
+) -> bool:
+    """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
+    if detail == "ALWAYS" or (detail == "AUTO" and spacing > DETAIL_FROM * cell_size):
+        return True
+    length = min(_length(sole.sole.outline) for character in loads for sole in character.motion.soles)
     if spacing > COARSEST_SPACING * length:
         raise InputError(
-            f"Ground '{ground.name}' is too coarse: its vertices are about {spacing * 100:.0f} cm apart under soles of "
-            f"{length * 100:.0f} cm. Subdivide it, or remove it from the Ground panel and let Bake create one."
+            f"Ground '{ground.name}' is too coarse: its vertices are more than {COARSEST_SPACING * length * 100:.0f} "
+            f"cm apart under soles of {length * 100:.0f} cm. Set Detail to Automatic in the Ground panel, or Subdivide "
+            "the ground."
         )
-    return index
+    return False
 
 
 def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial) -> None:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import bpy
 
 from ..core.errors import InputError, SoftGroundError
-from . import analysis, bake_job, character_setup, ground_mesh, settings
+from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, settings
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -94,14 +94,14 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         ground = settings.scene_of(context).softground.ground
-        if ground is None or not ground_mesh.is_baked(ground):
+        if ground is None or not baked_ground.is_baked(ground):
             cls.poll_message_set("There is no bake on the ground")
             return False
         return True
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        ground_mesh.restore(settings.scene_of(context).softground.ground)
+        baked_ground.clear(settings.scene_of(context).softground.ground)
         return {"FINISHED"}
 
 

@@ -171,6 +171,7 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
             row = column.row()
             row.operator("softground.create_ground", icon="MESH_GRID")
         column.prop(options, "cell_size_cm")
+        column.prop(options, "detail")
         estimate = _estimate(options)
         if estimate:
             _note(layout, estimate)

@@ -248,6 +248,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         precision=2,
         **_in_unit("cell_size", 0.01),
     )
+    detail: EnumProperty(
+        name="Detail",
+        description="Whether a fine copy of the ground along the trail takes the prints, with the ground hidden",
+        items=[
+            ("AUTO", "Automatic", "Where the ground is too coarse to show the prints"),
+            ("ALWAYS", "Always", "Fine along the trail even where the ground itself could show the prints"),
+            ("NEVER", "Never", "Press the ground's own vertices"),
+        ],
+        default="AUTO",
+    )
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
     keep_forces: BoolProperty(

@@ -34,11 +34,6 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     return None
 
 
-def pressed_object(ground: bpy.types.Object) -> bpy.types.Object:
-    """The object that carries the prints: the ground's detail where there is one, else the ground."""
-    return detail_of(ground) or ground
-
-
 def region_of(pressed: PressedGround) -> Region:
     """The cells whose displayed height changes."""
     columns, rows = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]

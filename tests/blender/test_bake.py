@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, ground_mesh
+from softground_addon.blender import bake_job, baked_ground, ground_mesh
 from softground_addon.core import record
 from softground_addon.core.presets import FOLDER
 from tests.blender import fingerprints, shots
@@ -241,6 +241,7 @@ def empty_range(scene):
 
 
 def too_coarse(scene):
+    scene.softground.detail = "NEVER"
     scene.softground.ground = plane(scene, vertices=40)
 
 
@@ -333,3 +334,51 @@ def test_every_reference_motion_bakes_with_the_automatic_set_up(scene, name, mod
     report = bake(scene).report
     assert report["steps"]
     assert 500 < report["totals"]["peak_force_n"] < 6 * 77.5 * 9.81
+
+
+def test_a_plane_of_four_vertices_gets_detail_along_the_trail_and_comes_back(walk):
+    ground = walk.softground.ground = plane(walk, vertices=2)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    fine = baked_ground.carrier_of(ground)
+    assert walk.softground.ground == ground
+    assert (ground.hide_viewport, ground.hide_render, len(ground.data.vertices)) == (True, True, 4)
+    depth = (rest(fine) - heights(fine, ground_mesh.DISPLAY_KEY))[:, 2].max()
+    footprints, _ = baked_ground.load(ground)
+    assert depth == pytest.approx(max(print_.max_depth_m for print_ in footprints), rel=0.15)
+    first = heights(fine, ground_mesh.DISPLAY_KEY)
+    bpy.ops.softground.bake()
+    assert np.array_equal(heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY), first)
+    bpy.ops.softground.clear_bake()
+    after = fingerprints.of_file()
+    after["names"], before["names"] = ({**names, "materials": None} for names in (after["names"], before["names"]))
+    assert after == before
+
+
+def test_detail_survives_a_reload_and_a_bake_after_it(walk, tmp_path):
+    ground = walk.softground.ground = plane(walk, vertices=2)
+    ground.location = (0.3, -0.2, 0.0)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    first = heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    ground = bpy.context.scene.softground.ground
+    bpy.ops.softground.bake()
+    assert np.array_equal(heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY), first)
+
+
+def test_changing_the_choice_of_detail_moves_the_bake(walk):
+    ground = walk.softground.ground = plane(walk)
+    bpy.context.view_layer.update()
+    original = fingerprints.of_file()["meshes"]["Field"]
+    walk.softground.detail = "ALWAYS"
+    bpy.ops.softground.bake()
+    assert fingerprints.of_file()["meshes"]["Field"] == original
+    assert not ground_mesh.is_baked(ground)
+    walk.softground.detail = "NEVER"
+    bpy.ops.softground.bake()
+    assert ground_mesh.is_baked(ground)
+    assert not ground.hide_viewport
+    assert "Field Trail" not in bpy.data.objects
