@@ -7,13 +7,13 @@
 
 def register() -> None:
     """Register the add-on's classes, properties and command with Blender."""
-    from .blender import registration
+    from .blender.registration import register as register_everything
 
-    registration.register()
+    register_everything()
 
 
 def unregister() -> None:
     """Undo `register()`, in reverse order."""
-    from .blender import registration
+    from .blender.registration import unregister as unregister_everything
 
-    registration.unregister()
+    unregister_everything()

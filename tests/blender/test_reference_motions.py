@@ -1,4 +1,4 @@
-"""Motion-capture files as users bring them, baked with the automatic set-up: prints where the feet were, and only there."""
+"""Motion-capture files as users bring them, baked with the automatic set-up: prints where the feet were."""
 
 from itertools import pairwise
 
