@@ -22,3 +22,32 @@ def action_curves(action: bpy.types.Action, slot: Any = None) -> list[bpy.types.
         if slot is None or bag.slot_handle == slot.handle
         for curve in bag.fcurves
     ]
+
+
+def new_channels(action: bpy.types.Action, name: str) -> tuple[Any, Any]:
+    """A slot for an object of that name in an empty action, None before slots, and the collection of its curves."""
+    if not HAS_SLOTS:
+        return None, action.fcurves
+    slot = action.slots.new(id_type="OBJECT", name=name)
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return slot, strip.channelbag(slot, ensure=True).fcurves
+
+
+def new_curve(curves: Any, path: str, index: int, group: str) -> bpy.types.FCurve:
+    """A new curve in a collection from `new_channels`, in a named group where this Blender can make one."""
+    if not HAS_SLOTS:
+        return curves.new(path, index=index, action_group=group)
+    if bpy.app.version >= (5, 0, 0):
+        return curves.new(path, index=index, group_name=group)
+    return curves.new(path, index=index)
+
+
+def slot_of(owner: Any) -> Any:
+    """The slot that animation data or a strip uses; None before slots."""
+    return owner.action_slot if HAS_SLOTS else None
+
+
+def set_slot(owner: Any, slot: Any) -> None:
+    """Let animation data or a strip use a slot; nothing before slots."""
+    if HAS_SLOTS and slot is not None:
+        owner.action_slot = slot

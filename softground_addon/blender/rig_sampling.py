@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..core.errors import InputError
 from ..core.motion import CharacterMotion
 from .motion_assembly import Recording, assemble_motion
+from .nla_layer import without_layer
 from .rig_mapping import RigMapping, SoleSource, require_armature
 
 Sampling = Generator[int, None, CharacterMotion]
@@ -126,24 +127,24 @@ def _evaluate(
     bone_matrices = np.empty((len(frames), len(bones), 4, 4))
     thing_matrices = np.empty((len(frames), len(things), 4, 4))
     armature_matrices = np.empty((len(frames), 4, 4))
-    with _sampling_scene(scene, armature, bones, things) as name:
+    with sampling_scene(scene, armature, bones, things) as name:
         for done, frame in enumerate(frames):
             temporary = bpy.data.scenes.get(name)
             if temporary is None:
                 raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
-            with _handlers_silent():
+            with handlers_silent(), without_layer(object_named(armature)):
                 temporary.frame_set(int(frame))
-            depsgraph = temporary.view_layers[0].depsgraph
-            evaluated = _object_named(armature).evaluated_get(depsgraph)
-            armature_matrices[done] = evaluated.matrix_world
-            pose = evaluated.pose.bones
-            if done == 0:
-                places = [pose.find(bone) for bone in bones]
-                buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
-            pose.foreach_get("matrix", buffer.reshape(-1))
-            bone_matrices[done] = buffer[places]
+                depsgraph = temporary.view_layers[0].depsgraph
+                evaluated = object_named(armature).evaluated_get(depsgraph)
+                armature_matrices[done] = evaluated.matrix_world
+                pose = evaluated.pose.bones
+                if done == 0:
+                    places = [pose.find(bone) for bone in bones]
+                    buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
+                pose.foreach_get("matrix", buffer.reshape(-1))
+                bone_matrices[done] = buffer[places]
             for place, thing in enumerate(things):
-                thing_matrices[done, place] = _object_named(thing).evaluated_get(depsgraph).matrix_world
+                thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1
 
     metre = scene.unit_settings.scale_length
@@ -159,9 +160,7 @@ def _evaluate(
 
 
 @contextmanager
-def _sampling_scene(
-    scene: bpy.types.Scene, armature: str, bones: Sequence[str], things: Sequence[str]
-) -> Iterator[str]:
+def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], things: Sequence[str]) -> Iterator[str]:
     """Name of a scene in which only the given bones and objects are evaluated; gone afterwards, whatever happens.
 
     It holds a probe that depends on them instead of themselves: so they are evaluated even where the user hides them,
@@ -175,18 +174,18 @@ def _sampling_scene(
             setattr(temporary.render, setting, getattr(scene.render, setting))
         for thing, bone in (*((armature, bone) for bone in bones), *((thing, "") for thing in things)):
             dependence = probe.constraints.new("COPY_LOCATION")
-            dependence.target, dependence.subtarget = _object_named(thing), bone
+            dependence.target, dependence.subtarget = object_named(thing), bone
         temporary.collection.objects.link(probe)
         yield names[0]
     finally:
-        with _handlers_silent():
+        with handlers_silent():
             for blocks, name in zip((bpy.data.scenes, bpy.data.objects), names, strict=True):
                 left_over = blocks.get(name)
                 if left_over is not None:
                     blocks.remove(left_over)
 
 
-def _object_named(name: str) -> bpy.types.Object:
+def object_named(name: str) -> bpy.types.Object:
     """Object by its full name, which tells linked ones from local ones."""
     found = bpy.data.objects.get(name)
     if found is None or found.name_full != name:
@@ -197,7 +196,7 @@ def _object_named(name: str) -> bpy.types.Object:
 
 
 @contextmanager
-def _handlers_silent() -> Iterator[None]:
+def handlers_silent() -> Iterator[None]:
     """Frame and update handlers put aside, and put back as they were."""
     lists = [getattr(bpy.app.handlers, name) for name in _SILENT_HANDLERS]
     saved = [list(handlers) for handlers in lists]

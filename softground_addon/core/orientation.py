@@ -1,0 +1,69 @@
+"""Quaternions and Euler angles of rotations over time, as Blender stores them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def quaternions(matrices: Array) -> Array:
+    """Unit quaternions (F, 4), w first and not negative, of rotation matrices (F, 3, 3)."""
+    m = matrices
+    trace = np.trace(m, axis1=1, axis2=2)
+    diagonal = np.diagonal(m, axis1=1, axis2=2)
+    squares = np.concatenate([1 + trace[:, None], 1 + 2 * diagonal - trace[:, None]], axis=1)
+    products = np.empty((len(m), 4, 4))  # row c: four times component c times (w, x, y, z) (Shepperd 1978)
+    products[:, range(4), range(4)] = squares
+    skew = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
+    products[:, 0, 1:] = products[:, 1:, 0] = skew
+    symmetric = m + np.swapaxes(m, 1, 2)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        products[:, 1 + i, 1 + j] = products[:, 1 + j, 1 + i] = symmetric[:, i, j]
+    result = products[np.arange(len(m)), squares.argmax(axis=1)]
+    result /= np.linalg.norm(result, axis=1, keepdims=True)
+    return np.asarray(np.where(result[:, :1] < 0, -result, result))
+
+
+def rotation_matrices(quaternion: Array) -> Array:
+    """Rotation matrices (F, 3, 3) of quaternions (F, 4) of any length but 0, w first."""
+    w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def euler_angles(matrices: Array, order: str, near: Array) -> Array:
+    """Euler angles (F, 3) about x, y and z [rad] of rotation matrices (F, 3, 3), the nearest to given ones.
+
+    Parameters
+    ----------
+    matrices : (F, 3, 3) float array
+    order : str
+        Axes in the order in which they are applied, e.g. "XYZ".
+    near : (F, 3) float array
+        Angles to stay close to: every rotation has many sets of angles.
+    """
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
+    m = matrices
+    middle = np.arcsin(np.clip(-sign * m[:, k, i], -1.0, 1.0))
+    first = np.arctan2(sign * m[:, k, j], m[:, k, k])
+    last = np.arctan2(sign * m[:, j, i], m[:, i, i])
+    # Near gimbal lock only first -/+ last is known: keep the first as it was.
+    locked = np.abs(m[:, k, i]) > 1 - 1e-9
+    held = near[:, i]
+    turned = np.arctan2(-sign * m[:, i, j], m[:, j, j])
+    first = np.where(locked, held, first)
+    last = np.where(locked, turned + np.where(m[:, k, i] < 0, held, -held), last)
+    one, other = np.empty((len(m), 3)), np.empty((len(m), 3))
+    one[:, i], one[:, j], one[:, k] = first, middle, last
+    other[:, i], other[:, j], other[:, k] = first + np.pi, np.pi - middle, last + np.pi
+    candidates = np.stack([one, other])
+    candidates -= 2 * np.pi * np.rint((candidates - near) / (2 * np.pi))
+    nearer = np.abs(candidates - near).sum(axis=2).argmin(axis=0)
+    return np.asarray(candidates[nearer, np.arange(len(m))])
