@@ -25,7 +25,7 @@ SEARCH = 0.33
 """How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""
 TIMING_DEVIATION = 0.1
 """Standard deviation of the times found from heights and speeds, in the same unit (30 ms)."""
-SHARE_DEVIATION = 0.1
+SHARE_DEVIATION = 0.07
 """Standard deviation of the leading foot's share as the point of action tells it."""
 SHARE_MEMORY = 0.25
 """Time over which the error of that share is about the same, in the same unit (one period of the low-pass at 4/5)."""
