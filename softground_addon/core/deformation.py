@@ -22,11 +22,15 @@ RIM_REACH = 0.04
 """Reach of the rim around a contact [m] (the paper, section 5)."""
 BLUR_SIGMA = 0.005
 """Standard deviation of the display blur [m] (the paper, Table 1: snow)."""
+FIRM_RATIO = 10.0
+"""How many times stiffer the ground is below its firm depth, where there is one: enough to stop a sole, not a wall."""
 
 
 @dataclass(frozen=True)
 class GroundMaterial:
     """What the ground is made of.
+
+    The fields from `rim_bias` on go beyond the paper; at 0 they are off.
 
     Attributes
     ----------
@@ -42,6 +46,19 @@ class GroundMaterial:
         Reach of the rim around a contact [m].
     blur_sigma : float
         Standard deviation of the display blur [m].
+    rim_bias : float
+        How much more of the rim rises on the side that the sole moves toward, 0 to 1: shares 1 + b·cos(theta).
+    repose_angle : float
+        Steepest slope that loose ground keeps [rad]; what is steeper slides down.
+    shortest_time : float
+        Time in which the ground gives way under a fast landing [s]: tau = 2·dL/|v_n|, as if a sole that lands at the
+        speed v_n came evenly to rest over the depth dL, from this to the characteristic time.
+    hardening : float
+        How much stiffer compacted ground is against a further contact; see `compress`.
+    crust_stress : float
+        Stress at which the crust on untouched ground breaks [Pa]; below it, nothing gives.
+    firm_depth : float
+        Compression beyond which the ground is `FIRM_RATIO` times stiffer [m].
     """
 
     youngs_modulus: float
@@ -50,6 +67,12 @@ class GroundMaterial:
     layer_depth: float = LAYER_DEPTH
     rim_reach: float = RIM_REACH
     blur_sigma: float = BLUR_SIGMA
+    rim_bias: float = 0.0
+    repose_angle: float = 0.0
+    shortest_time: float = 0.0
+    hardening: float = 0.0
+    crust_stress: float = 0.0
+    firm_depth: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,14 +97,20 @@ class Sinking:
     reached: float
 
 
-def target_compression(stress: Array | float, material: GroundMaterial) -> Array:
+def target_compression(
+    stress: Array | float, material: GroundMaterial, *, stiffness: Array | float = 1.0, depth: Array | float = 1.0
+) -> Array:
     """Compression that a lasting stress leads to [m]: stress·L0/E, at most the layer's depth (Eq. 10).
+
+    Beyond the firm depth it grows `FIRM_RATIO` times more slowly.
 
     Parameters
     ----------
     stress : float array of any shape
         Normal stress [Pa]; over cells where the pressure varies under the sole.
     material : GroundMaterial
+    stiffness, depth : float or float array
+        Factors on the modulus and on the depth of the layer, and of what is firm below, where the ground varies.
 
     Examples
     --------
@@ -89,8 +118,16 @@ def target_compression(stress: Array | float, material: GroundMaterial) -> Array
     >>> round(float(target_compression(21.9e3, snow)), 5)
     0.02628
     """
-    strain = np.minimum(np.asarray(stress) / material.youngs_modulus, 1.0)
-    return np.asarray(strain * material.layer_depth)
+    strain = np.asarray(stress) / (material.youngs_modulus * stiffness)
+    return np.asarray(np.minimum(_over_firm(strain, material), 1.0) * (material.layer_depth * depth))
+
+
+def _over_firm(strain: Any, material: GroundMaterial) -> Any:
+    """The strain of the whole layer, from what it would be if the layer were loose all through."""
+    if not material.firm_depth:
+        return strain
+    loose = material.firm_depth / material.layer_depth
+    return np.minimum(strain, loose) + np.maximum(strain - loose, 0.0) / FIRM_RATIO
 
 
 def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> float:
@@ -101,9 +138,24 @@ def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> fl
     return float(target_compression(force / area, material))
 
 
-def compression_rate(step: float, material: GroundMaterial) -> float:
-    """Fraction of the target by which the ground gives way in a step of so many seconds (Eq. 11)."""
-    return step / material.characteristic_time
+def compression_rate(step: float, material: GroundMaterial, target: Any = 0.0, landing_speed: float = 0.0) -> Any:
+    """Fraction of the target by which the ground gives way in a step (Eq. 11).
+
+    Parameters
+    ----------
+    step : float
+        Duration of the step [s].
+    material : GroundMaterial
+    target : float or float array
+        Compression that the stress leads to [m].
+    landing_speed : float
+        Speed into the ground at which the sole landed [m/s]; with a `shortest_time`, it sets the pace.
+    """
+    if not (material.shortest_time and landing_speed):
+        return step / material.characteristic_time
+    shortest = min(material.shortest_time, material.characteristic_time)
+    time = np.minimum(np.maximum(2.0 * target / landing_speed, shortest), material.characteristic_time)
+    return step / time
 
 
 def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
@@ -136,10 +188,13 @@ def sink(
     step: float,
     material: GroundMaterial,
     sinkage: float = 0.0,
+    landing_speed: float = 0.0,
+    softness: Array | None = None,
 ) -> Sinking:
     """Follow a loaded sole into the ground.
 
-    The ground under the sole's lowest point gives way like any cell: it is the cell that is in contact all along.
+    The ground under the sole's lowest point gives way like any cell on untouched ground: it is the cell that is in
+    contact all along.
 
     Parameters
     ----------
@@ -156,6 +211,10 @@ def sink(
     material : GroundMaterial
     sinkage : float
         That reached before the first step [m].
+    landing_speed : float
+        See `compression_rate` [m/s].
+    softness : (N, Q) float array, optional
+        Compression of the ground under each point per that of the material, where the ground varies.
 
     Returns
     -------
@@ -165,21 +224,46 @@ def sink(
     touching_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
     rate = compression_rate(step, material)
     per_pascal = material.layer_depth / material.youngs_modulus
+    follows_landing = bool(material.shortest_time and landing_speed)
     reached[0] = sinkage
     for k in range(steps):
-        touching_area[k] = touching_fraction(clearance[k], sinkage, tolerance) @ area[k]
+        touching = touching_fraction(clearance[k], sinkage, tolerance)
+        touching_area[k] = touching @ area[k]
         if force[k] > 0 and touching_area[k] > 0:
-            target[k] = min(force[k] / touching_area[k] * per_pascal, material.layer_depth)
-            sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
+            stress = force[k] / touching_area[k]
+            fresh = stress * per_pascal
+            if material.firm_depth:
+                fresh = float(_over_firm(stress / material.youngs_modulus, material)) * material.layer_depth
+            if softness is not None:
+                fresh *= float(touching @ (area[k] * softness[k])) / touching_area[k]
+            target[k] = min(fresh, material.layer_depth)
+            if follows_landing:
+                rate = compression_rate(step, material, target[k], landing_speed)
+            if sinkage > 0 or stress >= material.crust_stress:
+                sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
         reached[k + 1] = sinkage
     return Sinking(touching_area, target, reached[:-1], float(sinkage))
 
 
-def compress(compression: Array, coverage: Fraction, target: Array | float, rate: float) -> Array:
+def compress(
+    compression: Array,
+    coverage: Fraction,
+    target: Array | float,
+    rate: float,
+    *,
+    holds: Mask | bool = False,
+    found: Array | None = None,
+    hardening: float = 0.0,
+) -> Array:
     """Compression of each cell after one more step [m] (Eq. 11).
 
     It grows by min(rate·target, target - compression) where that is positive. A cell that the contact covers in part
     is compressed in that part only; what is kept is the mean over the cell.
+
+    A contact that finds a cell compressed by c0 already compresses it further against a modulus that is
+    1 + hardening·c0/target times as large: of what the plain law adds beyond c0, it adds one part in so many. First
+    prints are as without hardening; ground that carries such a load already gives way no further. (Soils and snow
+    answer repeated loading far more stiffly than the first: Wong, Terramechanics and Off-Road Vehicle Engineering.)
 
     Parameters
     ----------
@@ -191,6 +275,12 @@ def compress(compression: Array, coverage: Fraction, target: Array | float, rate
         Compression that the stress leads to [m].
     rate : float
         From `compression_rate`.
+    holds : bool or bool array
+        Cells whose crust carries the stress, if it is whole; one that was ever compressed is broken.
+    found : (rows, columns) float array, optional
+        Compression of each cell before this contact [m].
+    hardening : float
+        See above.
 
     Returns
     -------
@@ -204,15 +294,25 @@ def compress(compression: Array, coverage: Fraction, target: Array | float, rate
     array([0.03, 0.04])
     """
     aim = np.multiply(coverage, target, dtype=np.float64)
-    further = compression + rate * aim
+    if holds is not False:
+        aim[holds & (compression == 0)] = 0.0
+    further = rate * aim
+    if found is not None and hardening:
+        stiffer = 1.0 + hardening * np.divide(found, aim, out=np.ones_like(aim), where=aim > found)
+        aim = found + (aim - found) / stiffer
+        further /= stiffer
+    further += compression
     np.minimum(further, aim, out=further)
     return np.maximum(further, compression, out=further)
 
 
-def rim_weights(coverage: Fraction, contact: Mask, reach: float, room: Mask | None = None) -> Array:
+def rim_weights(
+    coverage: Fraction, contact: Mask, reach: float, room: Mask | None = None, toward: Array | None = None
+) -> Array:
     """Shares of the cells that take up the volume a contact displaces, summing to 1 (Eq. 12-14).
 
-    All cells within reach of the contact take part alike, in so far as they are not in contact themselves.
+    All cells within reach of the contact take part alike, in so far as they are not in contact themselves; or those
+    ahead of a moving sole more than those behind it, in the shares 1 + b·cos(theta).
 
     Parameters
     ----------
@@ -224,6 +324,9 @@ def rim_weights(coverage: Fraction, contact: Mask, reach: float, room: Mask | No
         Reach of the rim in cells; at least the next cells take part.
     room : (rows, columns) bool array, optional
         Cells that are ground at all.
+    toward : (N, 2) float array, optional
+        Direction along x and y that the rim leans to, of length b, at most 1; theta is the angle to it, seen from the
+        middle of the contact.
 
     Returns
     -------
@@ -243,8 +346,22 @@ def rim_weights(coverage: Fraction, contact: Mask, reach: float, room: Mask | No
         free &= room
     weights = np.subtract(1.0, coverage, dtype=np.float64)
     weights *= free
+    if toward is not None:
+        weights *= _leaning(coverage, toward)
     total = weights.sum(axis=(1, 2), keepdims=True)
     return np.divide(weights, total, out=weights, where=total > 0)
+
+
+def _leaning(coverage: Fraction, toward: Array) -> Array:
+    """1 + b·cos(theta) of each cell, (N, rows, columns), seen from the middle of the contact."""
+    _, rows, columns = coverage.shape
+    total = np.maximum(coverage.sum(axis=(1, 2)), 1e-300)
+    x = np.arange(columns) - (coverage.sum(axis=1) @ np.arange(columns) / total)[:, None]
+    y = np.arange(rows) - (coverage.sum(axis=2) @ np.arange(rows) / total)[:, None]
+    along = toward[:, 0, None, None] * x[:, None, :] + toward[:, 1, None, None] * y[:, :, None]
+    distance = np.hypot(x[:, None, :], y[:, :, None])
+    leaning: Array = 1.0 + along / np.maximum(distance, 1e-9)
+    return leaning
 
 
 def in_contact(coverage: Fraction) -> Mask:
@@ -277,6 +394,9 @@ def dilate(mask: Mask, reach: float) -> Mask:
     return result
 
 
-def displaced_volume(compressed_volume: Array | float, material: GroundMaterial) -> Array:
-    """Volume that leaves under a contact and rises around it: 2·nu·compressed volume (Eq. 12-13, correction 3)."""
-    return np.asarray(2.0 * material.poisson_ratio * np.asarray(compressed_volume))
+def displaced_volume(compressed_volume: Array | float, material: GroundMaterial, factor: Array | float = 1.0) -> Array:
+    """Volume that leaves under a contact and rises around it: 2·nu·compressed volume (Eq. 12-13, correction 3).
+
+    A factor on it, where the ground varies, cannot make it more than what was compressed.
+    """
+    return np.asarray(np.minimum(2.0 * material.poisson_ratio * factor, 1.0) * np.asarray(compressed_volume))

@@ -156,6 +156,14 @@ class FootprintRecorder:
         self._changes: tuple[list[Any], list[Any]] = ([], [])
         self._contacts: list[NDArray[np.intp]] = []
 
+    @property
+    def window(self) -> Window:
+        """The cells of all changes so far."""
+        union = self._windows[0]
+        for window in self._windows[1:]:
+            union = union.union(window)
+        return union
+
     def add(self, frame: float, window: Window, change: NDArray[np.int64], touched: NDArray[np.bool_]) -> None:
         """Add the change of a window that was complete at a frame.
 
@@ -165,19 +173,20 @@ class FootprintRecorder:
             Scene frame, not before that of the last call.
         window : Window
         change : (2, rows, columns) int array
-            Growth of compression and rim [QUANTUM].
+            Change of compression and rim [QUANTUM]; the rim of ground that slides down falls.
         touched : (rows, columns) bool array
             Cells that were in contact.
         """
         self._frames.append(frame)
         self._windows.append(window)
         self._contacts.append(np.flatnonzero(touched))
-        rest = change - LARGEST_AMOUNT if change.max(initial=0) > LARGEST_AMOUNT else None
-        for channel, values in zip(self._changes, change.reshape(2, -1), strict=True):
+        storable = np.minimum(np.maximum(change, -LARGEST_AMOUNT), LARGEST_AMOUNT)
+        for channel, values in zip(self._changes, storable.reshape(2, -1), strict=True):
             cells = np.flatnonzero(values)
-            channel.append((cells, np.minimum(values[cells], LARGEST_AMOUNT).astype(np.int32)))
-        if rest is not None:
-            self.add(frame, window, np.maximum(rest, 0), touched)
+            channel.append((cells, values[cells].astype(np.int32)))
+        rest = change - storable
+        if rest.any():
+            self.add(frame, window, rest, touched)
 
     def footprint(self, **what: Any) -> Footprint:
         """The footprint so far.
@@ -187,9 +196,7 @@ class FootprintRecorder:
         **what
             All fields of `Footprint` that say who, when, where and how hard.
         """
-        union = self._windows[0]
-        for window in self._windows[1:]:
-            union = union.union(window)
+        union = self.window
         frames = np.array(self._frames)
         touched, counts = self._gather(self._contacts, union)
         when = np.repeat(frames, counts)

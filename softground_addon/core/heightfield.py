@@ -7,7 +7,7 @@ the touched ground and not its extent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -238,6 +238,32 @@ class Surface:
         return mask
 
 
+class SampledGrid(SparseGrid):
+    """A function of place at cell centres, looked up once per tile.
+
+    Parameters
+    ----------
+    sample : callable
+        Values (channels, ...) at world positions x and y [m] of any one shape.
+    cell_size : float
+        Side of a cell [m].
+    channels : int
+        Number of values per cell.
+    """
+
+    def __init__(self, sample: Callable[[Array, Array], Array], cell_size: float, *, channels: int) -> None:
+        super().__init__(cell_size, channels=channels)
+        self._sample = sample
+
+    def read(self, window: Window) -> Array:
+        """A copy of the values of a window, (channels, rows, columns)."""
+        for key, _, _ in _overlaps(window):
+            if key not in self.tiles:
+                tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
+                self.tiles[key] = self._sample(*np.meshgrid(*tile.centres(self.cell_size)))
+        return super().read(window)
+
+
 class TerrainTiles:
     """A terrain's heights and slopes at cell centres, looked up once per tile.
 
@@ -250,7 +276,7 @@ class TerrainTiles:
 
     def __init__(self, terrain: Terrain, cell_size: float) -> None:
         self.terrain = terrain
-        self._heights = SparseGrid(cell_size, channels=1, fill=np.nan)
+        self._heights = SampledGrid(lambda x, y: terrain.heights(x, y)[None], cell_size, channels=1)
 
     @property
     def cell_size(self) -> float:
@@ -259,11 +285,6 @@ class TerrainTiles:
 
     def heights(self, window: Window) -> Array:
         """Heights of a window, (rows, columns) [m], NaN where there is no ground."""
-        for key, _, _ in _overlaps(window):
-            if key not in self._heights.tiles:
-                tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
-                x, y = np.meshgrid(*tile.centres(self.cell_size))
-                self._heights.tiles[key] = self.terrain.heights(x, y)[None]
         values: Array = self._heights.read(window)[0]
         return values
 

@@ -202,6 +202,18 @@ def centroid(points: SolePoints, transforms: Array, pressing: Array) -> Array:
     return np.divide(total[:, :3], total[:, 3:], out=np.zeros((len(total), 3)), where=total[:, 3:] > 0)
 
 
+def places(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
+    """World x and y of a sole's points at each step, (N, Q) each [m]."""
+    along = []
+    for axis in (0, 1):
+        parts = [
+            transforms[:, number, axis, :3] @ patch.positions.T + transforms[:, number, axis, 3:]
+            for number, patch in enumerate(points.patches)
+        ]
+        along.append(np.concatenate(parts, axis=1))
+    return along[0], along[1]
+
+
 def contact_window(points: SolePoints, transforms: Array, cell_size: float) -> Window:
     """The cells that a sole may touch during these steps."""
     low, high = reach(points, transforms)

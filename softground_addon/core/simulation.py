@@ -20,7 +20,9 @@ from .forces import ContactForces, impulse_forces, whole_body_forces
 from .heightfield import HeightField, Terrain, Window
 from .imprint import sole_points
 from .motion import CharacterMotion, steps_per_frame
-from .pressing import Press, Stance, Timing
+from .pressing import Press, Stance, Steps, Timing
+from .pressure import Pressure
+from .variation import Variation
 
 Array = NDArray[np.float64]
 
@@ -37,7 +39,12 @@ class CharacterLoads:
 
 
 def estimate_loads(
-    motion: CharacterMotion, terrain: Terrain, *, force_model: ForceModel, material: GroundMaterial
+    motion: CharacterMotion,
+    terrain: Terrain,
+    *,
+    force_model: ForceModel,
+    material: GroundMaterial,
+    crisp_landings: bool = False,
 ) -> CharacterLoads:
     """Resample the motion to the simulation's time grid, find its contacts and estimate its forces.
 
@@ -50,6 +57,8 @@ def estimate_loads(
     force_model : 'WHOLE_BODY' or 'IMPULSE'
     material : GroundMaterial
         Its characteristic time shapes the impulse model; the whole-body model does not depend on it.
+    crisp_landings : bool
+        See `whole_body_forces`.
     """
     steps = steps_per_frame(motion.frame_rate)
     source, margin = continued(without_holds(motion))
@@ -60,7 +69,7 @@ def estimate_loads(
     else:
         body = body_dynamics(source)
         contacts = refine_contacts(source, contacts, body)
-        forces = whole_body_forces(source, contacts, body)
+        forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
     shown = slice(margin * steps, len(source.frames) - margin * steps)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))
 
@@ -94,7 +103,13 @@ class FrameResult:
 
 
 def simulate(
-    loads: Sequence[CharacterLoads], terrain: Terrain, material: GroundMaterial, cell_size: float
+    loads: Sequence[CharacterLoads],
+    terrain: Terrain,
+    material: GroundMaterial,
+    cell_size: float,
+    *,
+    pressure: Pressure = "UNIFORM",
+    variation: Variation | None = None,
 ) -> Iterator[FrameResult]:
     """Press footprints into the ground, frame by frame.
 
@@ -109,6 +124,10 @@ def simulate(
     material : GroundMaterial
     cell_size : float
         Side of a cell [m].
+    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
+        How the force on a sole spreads over its contact.
+    variation : Variation, optional
+        How the ground varies from place to place.
 
     Yields
     ------
@@ -121,7 +140,8 @@ def simulate(
     InputError
         If the cell size is not positive, or the characters do not share a time grid.
     """
-    yield from Simulation(terrain, material, HeightField(cell_size)).run(loads)
+    ground = HeightField(cell_size)
+    yield from Simulation(terrain, material, ground, pressure=pressure, variation=variation).run(loads)
 
 
 class Simulation:
@@ -134,10 +154,20 @@ class Simulation:
     material : GroundMaterial
     ground : HeightField
         Its state to begin with, empty or from `footprints.recompose`; it is worked on.
+    pressure, variation
+        See `simulate`.
     """
 
-    def __init__(self, terrain: Terrain, material: GroundMaterial, ground: HeightField) -> None:
-        self._press = Press(terrain, material, ground)
+    def __init__(
+        self,
+        terrain: Terrain,
+        material: GroundMaterial,
+        ground: HeightField,
+        *,
+        pressure: Pressure = "UNIFORM",
+        variation: Variation | None = None,
+    ) -> None:
+        self._press = Press(terrain, material, ground, pressure=pressure, variation=variation)
         self._open: dict[tuple[int, int], Stance] = {}
         self._active: list[Stance] = []
         self._step = 1
@@ -208,11 +238,15 @@ class Simulation:
                         stance = Stance(character.motion.name, motion.sole, points)
                     steps = slice(begin, end)
                     stance.extend(
-                        begin + offset,
-                        grid.frames[begin + offset : end + offset],
-                        motion.transforms[steps],
-                        character.forces.forces[steps, index],
-                        character.contacts.normal[steps, index],
+                        Steps(
+                            begin + offset,
+                            grid.frames[begin + offset : end + offset],
+                            motion.transforms[steps],
+                            motion.transforms[max(0, begin - 2) : begin],
+                            character.forces.forces[steps, index],
+                            character.contacts.normal[steps, index],
+                            character.forces.centre_of_pressure[steps, index],
+                        )
                     )
                     if end == len(character.motion.frames):
                         self._open[number, index] = stance

@@ -1,0 +1,61 @@
+"""How the ground varies from place to place: factors on stiffness, layer depth and rim, as painted on its surface."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .heightfield import SampledGrid, Window
+
+Array = NDArray[np.float64]
+
+CHANNELS = ("stiffness", "depth", "rim")
+"""What may vary, in the order of `Variation.factors`."""
+SOFTEST = 0.01
+"""Smallest factor on the stiffness: 0 would be no ground at all."""
+
+
+class Variation(Protocol):
+    """Factors on what the material says."""
+
+    def factors(self, x: Array, y: Array) -> Array:
+        """Factors at world positions [m], (3, ...) in the order of `CHANNELS`; 1 is as the material says."""
+        ...
+
+
+class Factors(NamedTuple):
+    """Factors in the cells of a window, each (rows, columns)."""
+
+    stiffness: Array
+    depth: Array
+    rim: Array
+
+    @property
+    def softness(self) -> Array:
+        """Compression per that of the material under the same stress."""
+        return self.depth / self.stiffness
+
+
+class VariationTiles:
+    """Factors at cell centres, looked up once per tile and kept within what is possible.
+
+    Parameters
+    ----------
+    variation : Variation
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, variation: Variation, cell_size: float) -> None:
+        self._variation = variation
+        self._grid = SampledGrid(self._sample, cell_size, channels=len(CHANNELS))
+
+    def factors(self, window: Window) -> Factors:
+        """Factors in the cells of a window."""
+        return Factors(*self._grid.read(window))
+
+    def _sample(self, x: Array, y: Array) -> Array:
+        stiffness, depth, rim = np.nan_to_num(self._variation.factors(x, y), nan=1.0)
+        return np.stack([np.maximum(stiffness, SOFTEST), np.maximum(depth, 0.0), np.maximum(rim, 0.0)])
