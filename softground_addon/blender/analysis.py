@@ -59,6 +59,11 @@ def forget() -> None:
     _depths.clear()
 
 
+def is_empty() -> bool:
+    """Whether no shot is known."""
+    return not _known
+
+
 def known(scene: bpy.types.Scene) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
     analysis = _known.get(scene.session_uid)

@@ -138,7 +138,7 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     InputError
         If some are no numbers.
     """
-    vertices = _transform(to_world_of(ground, unit_scale), _rest_positions(mesh_of(ground)))
+    vertices = _transform(to_world_of(ground, unit_scale), rest_positions(mesh_of(ground)))
     if not np.isfinite(vertices).all():
         raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
     return vertices
@@ -206,10 +206,10 @@ def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
     mesh = mesh_of(ground).copy()
     try:
-        rest = _rest_positions(mesh)
+        rest = rest_positions(mesh)
         if mesh.shape_keys:
             _drop_shape_keys(mesh)
-        _write_positions(mesh, rest)
+        write_positions(mesh, rest)
         with _stand_in(ground, mesh) as evaluated:
             yield mesh_of(evaluated)
     finally:
@@ -267,7 +267,7 @@ def create_grid(scene: bpy.types.Scene, plan: GroundPlan, cell_size: float, unit
 
     mesh = bpy.data.meshes.new("SoftGround")
     mesh.vertices.add(rows * columns)
-    _write_positions(mesh, positions.reshape(-1, 3))
+    write_positions(mesh, positions.reshape(-1, 3))
     faces = (rows - 1) * (columns - 1)
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     quads = corner[:, None] + np.array([0, 1, columns + 1, columns])
@@ -310,7 +310,7 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
         Metres per Blender unit.
     """
     mesh = mesh_of(ground)
-    rest = _rest_positions(mesh)
+    rest = rest_positions(mesh)
     if REST not in mesh.attributes:
         _add_attribute(mesh, REST, "FLOAT_VECTOR").data.foreach_set("vector", rest.ravel())
     up = up_of(ground, unit_scale)
@@ -334,7 +334,7 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
         attribute = mesh.attributes.get(name) or _add_attribute(mesh, name, "FLOAT")
         attribute.data.foreach_set("value", whole)
     mesh[RECORD] = record
-    _write_positions(mesh, raw)
+    write_positions(mesh, raw)
 
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
@@ -349,14 +349,14 @@ def restore(ground: bpy.types.Object) -> None:
         return
     playback.remove(ground)
     mesh = mesh_of(ground)
-    rest = _rest_positions(mesh)
+    rest = rest_positions(mesh)
     ground.shape_key_clear()
     for name in (REST, *SHADING_ATTRIBUTES):
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
     del mesh[RECORD]
     mesh.pop(SUMMARY, None)
-    _write_positions(mesh, rest)
+    write_positions(mesh, rest)
 
 
 def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> bpy.types.Attribute:
@@ -367,7 +367,7 @@ def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOA
     return mesh.attributes[attribute.name]
 
 
-def _rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Positions without the bake, (V, 3) in the object's own space and units."""
     attribute = mesh.attributes.get(REST)
     if attribute is None or len(attribute.data) != len(mesh.vertices):
@@ -383,7 +383,7 @@ def _positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     return positions.reshape(-1, 3)
 
 
-def _write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
+def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
     mesh.attributes["position"].data.foreach_set("vector", positions.ravel())
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1

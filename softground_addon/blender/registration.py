@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import analysis, character_editing, cli, modal_bake, operators, panels, preset_menu, properties, session
+from . import character_editing, cli, handlers, live, modal_bake, operators, panels, preset_menu, properties, session
 
 CLASSES = (
     *session.CLASSES,
@@ -12,6 +12,7 @@ CLASSES = (
     *operators.CLASSES,
     *character_editing.CLASSES,
     *modal_bake.CLASSES,
+    *live.CLASSES,
     *preset_menu.CLASSES,
     *panels.CLASSES,
 )
@@ -27,6 +28,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.softground = bpy.props.PointerProperty(name="SoftGround", type=properties.SoftGroundSettings)
     bpy.types.WindowManager.softground = bpy.props.PointerProperty(type=session.SoftGroundSession)
+    handlers.register()
     _command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
 
 
@@ -36,8 +38,7 @@ def unregister() -> None:
     if _command is not None:
         bpy.utils.unregister_cli_command(_command)
         _command = None
-    modal_bake.stop()
-    analysis.forget()
+    handlers.unregister()
     del bpy.types.WindowManager.softground
     del bpy.types.Scene.softground
     for cls in reversed(CLASSES):

@@ -1,0 +1,109 @@
+"""What Blender tells the add-on. Each handler returns at once unless something is armed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import analysis, live, modal_bake
+
+EDITED = ("ACTION", "ARMATURE", "KEY")
+"""Kinds of data whose edits change what a character does."""
+
+LEFT_OVER = "SoftGround Sampling"
+"""Scenes in which rigs are read; one may come back with an undo step or an autosave from within a bake."""
+
+
+@persistent
+def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
+    """Live mode shows the ground of the frame."""
+    if live.is_on():
+        live.follow(scene, depsgraph)
+
+
+@persistent
+def notice_edits(_scene: Any, depsgraph: Any = None) -> None:
+    """An edited animation makes what was read from it worthless."""
+    if not analysis.is_empty() and depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in EDITED):
+        analysis.forget()
+        if live.is_on() and not bpy.app.timers.is_registered(live.after_edit):
+            bpy.app.timers.register(live.after_edit, first_interval=0.0)
+
+
+@persistent
+def begin_render(*_: Any) -> None:
+    """Live mode stands still during renders."""
+    live.rendering(True)
+
+
+@persistent
+def end_render(*_: Any) -> None:
+    """Live mode may go on."""
+    live.rendering(False)
+
+
+@persistent
+def before_undo(*_: Any) -> None:
+    """A bake cannot go on in a scene that is replaced."""
+    modal_bake.stop()
+
+
+@persistent
+def after_undo(*_: Any) -> None:
+    """Live mode shows its ground on what the undo brought back."""
+    _remove_left_over_scenes()
+    analysis.forget()
+    live.after_undo()
+
+
+@persistent
+def before_load(*_: Any) -> None:
+    """What goes on ends with the file."""
+    modal_bake.stop()
+    live.discard()
+    analysis.forget()
+
+
+@persistent
+def after_load(*_: Any) -> None:
+    """An autosave from within a bake may hold its working scene."""
+    _remove_left_over_scenes()
+
+
+def _remove_left_over_scenes() -> None:
+    for scene in [scene for scene in bpy.data.scenes if scene.name.split(".")[0] == LEFT_OVER]:
+        bpy.data.scenes.remove(scene)
+
+
+_HANDLERS = (
+    ("frame_change_post", follow_frame),
+    ("depsgraph_update_post", notice_edits),
+    ("render_init", begin_render),
+    ("render_complete", end_render),
+    ("render_cancel", end_render),
+    ("undo_pre", before_undo),
+    ("redo_pre", before_undo),
+    ("undo_post", after_undo),
+    ("redo_post", after_undo),
+    ("load_pre", before_load),
+    ("load_post", after_load),
+)
+
+
+def register() -> None:
+    """Add the handlers."""
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """End what goes on and take the handlers away."""
+    before_load()
+    for name, handler in reversed(_HANDLERS):
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    if bpy.app.timers.is_registered(live.after_edit):
+        bpy.app.timers.unregister(live.after_edit)

@@ -1,0 +1,243 @@
+"""Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed.
+
+No modal operator is needed for it: a handler follows the frame, so that autosave, undo and every other tool go on
+working. While live mode is on, the ground carries what a bake would leave on it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty
+
+from ..core import record
+from ..core.errors import InputError
+from ..core.histories import histories
+from ..core.playhead import Playhead
+from ..core.pressed_ground import PressedGround
+from . import analysis, bake_job, ground_mesh, playback, session, settings
+from .live_ground import LiveGround
+from .operators import reports_errors
+from .translation import rpt_
+
+
+class LiveMode:
+    """A scene whose ground follows its timeline.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+
+    Raises
+    ------
+    InputError
+        If the scene could not be baked either.
+    """
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        options = scene.softground
+        known = analysis.read(scene)
+        if options.ground is None:
+            bake_job.create_ground(scene, known.shot.plan)
+            known = analysis.read(scene)
+        self.scene = scene.session_uid
+        self.rendering = False
+        self._ground = LiveGround(options.ground, known.shot, scene.unit_settings.scale_length)
+        self._begin(scene, known)
+
+    def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
+        self._analysis = known
+        cell_size = settings.cell_size_of(scene)
+        self._playhead = Playhead(known.loads, known.shot.terrain, settings.material_of(scene), cell_size)
+        self._frame_rate = known.shot.motions[0].frame_rate
+
+    def follow(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
+        ground = self._ground.object()
+        if ground is None:
+            return False
+        self._playhead.material = settings.material_of(scene)
+        windows = self._playhead.go_to(float(scene.frame_current))
+        if windows:
+            self._ground.show(ground, self._playhead.ground, windows, self._playhead.material.blur_sigma)
+        return True
+
+    def show_anew(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
+        ground = self._ground.object()
+        if ground is None:
+            return False
+        self._ground.take_from(ground)
+        self._playhead.go_to(float(scene.frame_current))
+        windows = self._playhead.ground.tile_windows()
+        self._ground.show(ground, self._playhead.ground, windows, self._playhead.material.blur_sigma)
+        return True
+
+    def read_anew(self, scene: bpy.types.Scene) -> bool:
+        """Start from the animation, mass and forces as they are now; False if that is not possible."""
+        try:
+            self._begin(scene, analysis.read(scene))
+        except InputError:
+            return False
+        return self.show_anew(scene)
+
+    def is_outdated(self, scene: bpy.types.Scene) -> bool:
+        """Whether the character has changed since it was read."""
+        return analysis.known(scene) is not self._analysis
+
+    def keep(self, scene: bpy.types.Scene) -> None:
+        """Leave the ground as it is shown, as the bake of the frames up to now."""
+        ground = self._ground.object()
+        if ground is None:
+            return
+        footprints = self._playhead.footprints()
+        unit_scale = scene.unit_settings.scale_length
+        sigma = self._playhead.material.blur_sigma
+        pressed = PressedGround.at(
+            footprints,
+            frame=self._playhead.frame,
+            frame_rate=self._frame_rate,
+            cell_size=self._playhead.ground.cell_size,
+            blur_sigma=sigma,
+        )
+        vertices = ground_mesh.rest_vertices(ground, unit_scale)
+        index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
+        place = vertices[index, :2].T
+        stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
+        ground_mesh.write(ground, index, pressed.sample(*place), stored, unit_scale)
+        over_time = histories(footprints, *place, blur_sigma=sigma)
+        up = ground_mesh.up_of(ground, unit_scale)
+        playback.install(ground, index, over_time, up=up, frame_rate=self._frame_rate)
+
+    def discard(self) -> None:
+        """Leave the ground as it was before."""
+        ground = self._ground.object()
+        if ground is not None:
+            ground_mesh.restore(ground)
+
+
+_mode: LiveMode | None = None
+"""Live mode if it is on: Blender's handlers are functions, so that what they follow lives here."""
+
+
+def is_on() -> bool:
+    """Whether live mode is on."""
+    return _mode is not None
+
+
+def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:
+    """Handle a change of the frame; never during a render."""
+    if _mode is None or _mode.rendering or scene.session_uid != _mode.scene:
+        return
+    if depsgraph is not None and depsgraph.mode == "RENDER":
+        return
+    if not _mode.follow(scene):
+        forget()
+
+
+def rendering(active: bool) -> None:
+    """Handle the begin or the end of a render."""
+    if _mode is not None:
+        _mode.rendering = active
+
+
+def after_undo() -> None:
+    """Handle an undo or redo: the mesh is another one now, live mode goes on if it still is live mode's."""
+    scene = _scene()
+    if _mode is not None and (scene is None or not _mode.show_anew(scene)):
+        forget()
+
+
+def after_edit() -> float | None:
+    """Read the character anew where it was edited; for a timer, as nothing may be evaluated in a handler."""
+    scene = _scene()
+    if _mode is not None and scene is not None and _mode.is_outdated(scene) and not _mode.read_anew(scene):
+        forget()
+    return None
+
+
+def forget() -> None:
+    """End live mode as it stands, because its scene or its ground went away."""
+    global _mode  # noqa: PLW0603
+    _mode = None
+    session.current().is_live = False
+    session.redraw()
+
+
+def discard() -> None:
+    """End live mode and take its prints off the ground, as the file or the add-on is about to go."""
+    if _mode is not None:
+        _mode.discard()
+        forget()
+
+
+def _scene() -> bpy.types.Scene | None:
+    uid = _mode.scene if _mode else None
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
+class SOFTGROUND_OT_live(bpy.types.Operator):
+    """Let the ground give way while the timeline plays, or end that"""
+
+    bl_idname = "softground.live"
+    bl_label = "Live Footprints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    keep: BoolProperty(
+        name="Keep",
+        description="When it ends: leave the prints on the ground as a bake, instead of taking them off",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether live mode can start or end; otherwise the button says what is missing."""
+        if is_on():
+            return True
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
+        """What the button does at the moment."""
+        if not is_on():
+            return rpt_("Press prints while the timeline plays; sliders act at once on what follows")
+        if properties.keep:
+            return rpt_("End live mode and leave the prints on the ground, as a bake up to the frame that is shown")
+        return rpt_("End live mode and leave the ground as it was before")
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        global _mode  # noqa: PLW0603
+        scene = _scene() or settings.scene_of(context)
+        if _mode is None:
+            _mode = LiveMode(scene)
+            session.current().is_live = True
+            _mode.follow(scene)
+        elif self.keep:
+            _mode.keep(scene)
+            forget()
+        else:
+            discard()
+        session.redraw()
+        return {"FINISHED"}
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """What keeps live mode from starting, or an empty text."""
+    options = settings.scene_of(context).softground
+    if session.current().is_baking:
+        return "A bake is running"
+    if not any(character.armature for character in options.characters):
+        return "Add a character first: select its armature and press Add Character"
+    if options.ground and ground_mesh.is_baked(options.ground):
+        return "There is a bake on the ground: clear it first"
+    return ""
+
+
+CLASSES = (SOFTGROUND_OT_live,)

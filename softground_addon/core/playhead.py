@@ -1,0 +1,160 @@
+"""A simulation that follows a playhead: forward by pressing, backward by taking back, with materials that change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import count as numbers
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .deformation import GroundMaterial
+from .footprints import Footprint
+from .heightfield import HeightField, Terrain, Window
+from .simulation import CharacterLoads, FrameResult, Simulation
+
+Array = NDArray[np.float64]
+Series = TypeVar("Series", bound=Any)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What one frame did to the ground.
+
+    Attributes
+    ----------
+    frame : float
+        Scene frame.
+    material : GroundMaterial
+        What it was pressed with.
+    windows : tuple of Window
+    before, after : tuple of (2, rows, columns) float arrays
+        State of each window [m], with the windows taken one after the other.
+    """
+
+    frame: float
+    material: GroundMaterial
+    windows: tuple[Window, ...] = ()
+    before: tuple[Array, ...] = ()
+    after: tuple[Array, ...] = ()
+
+
+class Playhead:
+    """The ground at the frame that a timeline shows.
+
+    Each frame is pressed once, with the material of the moment, and remembered: going back and forth over it gives
+    the same ground, bit for bit. When the material changes, what lies ahead is pressed anew when it is reached.
+
+    Parameters
+    ----------
+    loads : sequence of CharacterLoads
+    terrain : Terrain
+        The undisturbed ground.
+    material : GroundMaterial
+    cell_size : float
+        Side of a cell [m].
+
+    Attributes
+    ----------
+    material : GroundMaterial
+        What frames are pressed with from now on.
+    ground : HeightField
+        At the frame that is shown; only to be read.
+    """
+
+    def __init__(
+        self, loads: Sequence[CharacterLoads], terrain: Terrain, material: GroundMaterial, cell_size: float
+    ) -> None:
+        self.material = material
+        self.ground = HeightField(cell_size)
+        self._loads, self._terrain = tuple(loads), terrain
+        self._changes: list[_Change] = []
+        self._results = self._press(self._loads)
+        self._changes.append(_Change(next(self._results).frame, material))
+        self._shown = 0
+
+    @property
+    def frame(self) -> float:
+        """Scene frame that the ground shows."""
+        return self._changes[self._shown].frame
+
+    def go_to(self, frame: float) -> list[Window]:
+        """Show the ground at a scene frame, or at the shot's nearest one; returns where it may have changed."""
+        windows: list[Window] = []
+        while self._shown and self.frame > frame:
+            change = self._changes[self._shown]
+            for window, state in zip(reversed(change.windows), reversed(change.before), strict=True):
+                self.ground.write(window, state)
+            self._shown -= 1
+            windows += change.windows
+        while self.frame + 1.0 <= frame and self._advance():
+            windows += self._changes[self._shown].windows
+        return windows
+
+    def footprints(self) -> list[Footprint]:
+        """The record of the ground that is shown, with the contacts that are under way as they are by now."""
+        until_now = [_until(self.frame, character) for character in self._loads]
+        found = [footprint for result in self._press(until_now) for footprint in result.footprints]
+        return sorted(found, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
+
+    def _advance(self) -> bool:
+        """Go on to the shot's next frame; False if there is none."""
+        ahead = self._changes[self._shown + 1 :]
+        if any(change.material != self.material for change in ahead):
+            del self._changes[self._shown + 1 :]
+            self._results = self._press(self._loads)
+            for _ in self._changes:
+                next(self._results)
+            ahead = []
+        if ahead:
+            for window, state in zip(ahead[0].windows, ahead[0].after, strict=True):
+                self.ground.write(window, state)
+        else:
+            result = next(self._results, None)
+            if result is None:
+                return False
+            self._changes.append(self._taken_over(result))
+        self._shown += 1
+        return True
+
+    def _taken_over(self, result: FrameResult) -> _Change:
+        """Bring the ground that is shown to the frame that was just pressed."""
+        before, after = [], []
+        for window in result.changed:
+            before.append(self.ground.read(window))
+            after.append(result.ground.read(window))
+            self.ground.write(window, after[-1])
+        return _Change(result.frame, self.material, result.changed, tuple(before), tuple(after))
+
+    def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
+        """Press from the first frame on: frames that are known with the material they had, new ones with the newest."""
+        simulation = Simulation(self._terrain, self.material, HeightField(self.ground.cell_size))
+        results = simulation.run(loads)
+        for number in numbers():
+            known = number < len(self._changes)
+            simulation.material = self._changes[number].material if known else self.material
+            result = next(results, None)
+            if result is None:
+                return
+            yield result
+
+
+def _until(frame: float, character: CharacterLoads) -> CharacterLoads:
+    """The loads up to a scene frame."""
+    motion = character.motion
+    count = int(np.searchsorted(motion.frames, frame, side="right"))
+    soles = tuple(replace(sole, transforms=sole.transforms[:count]) for sole in motion.soles)
+    joints = {name: path[:count] for name, path in motion.joints.items()}
+    return CharacterLoads(
+        replace(motion, frames=motion.frames[:count], soles=soles, joints=joints),
+        _first(character.contacts, count),
+        _first(character.forces, count),
+    )
+
+
+def _first(series: Series, steps: int) -> Series:
+    """The first steps of every array over time (N, ...) that a dataclass holds; what holds for all time is (S,)."""
+    values = {field.name: getattr(series, field.name) for field in fields(series)}
+    return replace(series, **{name: value[:steps] for name, value in values.items() if value.ndim > 1})

@@ -1,0 +1,184 @@
+"""Live mode: what the timeline shows, whatever way the playhead takes, and nothing left behind."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import ground_mesh, handlers, live
+from tests.blender import fingerprints
+from tests.blender.shots import walker
+
+
+@pytest.fixture
+def shot(scene):
+    walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.create_ground()
+    return scene
+
+
+@pytest.fixture
+def live_shot(shot):
+    shot.frame_set(1)
+    assert bpy.ops.softground.live() == {"FINISHED"}
+    yield shot
+    live.discard()
+
+
+def heights(scene):
+    """World heights of the evaluated ground."""
+    ground = scene.softground.ground
+    mesh = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", positions)
+    return positions.reshape(-1, 3)[:, 2].copy()
+
+
+def test_scrubbing_back_and_forth_shows_every_frame_as_it_was(live_shot):
+    shown = {}
+    for frame in range(1, 49):
+        live_shot.frame_set(frame)
+        shown[frame] = heights(live_shot)
+    assert not shown[1].any()
+    assert shown[48].min() < -0.01
+    for frame in (30, 12, 47, 1, 33, 13, 48, 2):
+        live_shot.frame_set(frame)
+        assert (heights(live_shot) == shown[frame]).all()
+
+
+def test_jumping_ahead_presses_the_frames_between(live_shot):
+    live_shot.frame_set(48)
+    jumped = heights(live_shot)
+    bpy.ops.softground.live()
+    live_shot.frame_set(1)
+    bpy.ops.softground.live()
+    for frame in range(1, 49):
+        live_shot.frame_set(frame)
+    assert (heights(live_shot) == jumped).all()
+
+
+def test_the_last_frame_is_that_of_a_bake(live_shot):
+    live_shot.frame_set(48)
+    shown = heights(live_shot)
+    bpy.ops.softground.live()
+    bpy.ops.softground.bake()
+    key = live_shot.softground.ground.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY]
+    baked = np.empty(len(shown) * 3, dtype=np.float32)
+    key.points.foreach_get("co", baked)
+    assert baked.reshape(-1, 3)[:, 2] == pytest.approx(shown, abs=1e-6)
+
+
+def test_discarding_leaves_the_file_as_it_was(shot):
+    shot.frame_set(1)
+    before = fingerprints.of_file()
+    bpy.ops.softground.live()
+    shot.frame_set(40)
+    assert fingerprints.of_file()["meshes"] != before["meshes"]
+    bpy.ops.softground.live()
+    shot.frame_set(1)
+    assert fingerprints.of_file() == before
+
+
+def test_keeping_leaves_a_bake_of_the_frames_so_far(live_shot):
+    live_shot.frame_set(30)
+    shown = heights(live_shot)
+    bpy.ops.softground.live(keep=True)
+    assert not live.is_on()
+    assert ground_mesh.is_baked(live_shot.softground.ground)
+    bpy.context.view_layer.update()
+    assert heights(live_shot) == pytest.approx(shown, abs=3e-4)
+    bpy.ops.softground.clear_bake()
+    assert not heights(live_shot).any()
+
+
+def test_a_softer_ground_acts_on_what_follows_only(live_shot):
+    live_shot.frame_set(30)
+    before = heights(live_shot)
+    live_shot.frame_set(48)
+    stiff = heights(live_shot)
+    live_shot.frame_set(30)
+    live_shot.softground.material.youngs_modulus /= 4
+    live_shot.frame_set(30)
+    assert (heights(live_shot) == before).all()
+    live_shot.frame_set(48)
+    assert heights(live_shot).min() < 1.5 * stiff.min()
+    live_shot.frame_set(30)
+    assert (heights(live_shot) == before).all()
+
+
+def test_a_heavier_character_presses_deeper_once_it_was_read_again(live_shot):
+    live_shot.frame_set(48)
+    before = heights(live_shot).min()
+    live_shot.softground.characters[0].mass *= 2
+    live.after_edit()
+    bpy.context.view_layer.update()
+    assert heights(live_shot).min() < 1.5 * before
+
+
+@pytest.mark.parametrize("gone", ["ground", "armature"])
+def test_deleting_the_ground_or_the_rig_midway_ends_in_peace(live_shot, gone):
+    live_shot.frame_set(20)
+    options = live_shot.softground
+    bpy.data.objects.remove(options.ground if gone == "ground" else options.characters[0].armature)
+    live_shot.frame_set(21)
+    live_shot.frame_set(10)
+    if gone == "ground":
+        assert not live.is_on()
+
+
+def test_renaming_and_duplicating_the_ground_change_nothing(live_shot):
+    live_shot.frame_set(20)
+    ground = live_shot.softground.ground
+    copy = ground.copy()
+    copy.data = ground.data.copy()
+    live_shot.collection.objects.link(copy)
+    ground.name, copy.name = "Renamed", ground.name
+    before = fingerprints.of_mesh(copy.data)
+    live_shot.frame_set(48)
+    assert heights(live_shot).min() < -0.01
+    assert fingerprints.of_mesh(copy.data) == before
+
+
+def test_another_scene_s_frames_do_not_press(live_shot):
+    live_shot.frame_set(5)
+    before = heights(live_shot)
+    other = bpy.data.scenes.new("Other")
+    other.frame_set(40)
+    assert (heights(live_shot) == before).all()
+
+
+def test_nothing_is_written_while_a_render_runs(live_shot):
+    live_shot.frame_set(5)
+    before = fingerprints.of_mesh(live_shot.softground.ground.data)
+    handlers.begin_render()
+    live_shot.frame_set(40)
+    assert fingerprints.of_mesh(live_shot.softground.ground.data) == before
+    handlers.end_render()
+    live_shot.frame_set(41)
+    assert fingerprints.of_mesh(live_shot.softground.ground.data) != before
+
+
+def test_a_new_file_ends_live_mode(live_shot):
+    live_shot.frame_set(20)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not live.is_on()
+    assert not bpy.context.window_manager.softground.is_live
+
+
+def test_a_file_saved_in_live_mode_can_be_cleared_after_it_is_opened_again(live_shot, tmp_path):
+    live_shot.frame_set(48)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
+    assert not live.is_on()
+    scene = bpy.context.scene
+    assert heights(scene).min() < -0.01
+    bpy.ops.softground.clear_bake()
+    bpy.context.view_layer.update()
+    assert not heights(scene).any()
+
+
+def test_live_mode_waits_until_a_bake_is_cleared(shot):
+    bpy.ops.softground.bake()
+    assert not bpy.ops.softground.live.poll()
+    bpy.ops.softground.clear_bake()
+    assert bpy.ops.softground.live.poll()
