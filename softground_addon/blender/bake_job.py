@@ -25,10 +25,11 @@ from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
 from ..core.terrain import MeshTerrain
-from . import baked_ground, ground_mesh, settings
+from . import baked_ground, ground_mesh, response_job, settings
 from .character_setup import mapping_of
 from .ground_mesh import GroundPlan, GroundSurface
 from .materials import ensure_material
+from .nla_layer import LayerCurve
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character
 
@@ -158,12 +159,12 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     ground: bpy.types.Object | None = options.ground
     sampled = time.perf_counter()
 
-    loads = yield from estimate_shot(scene, shot)
-    footprints, forces = yield from _simulate(loads, terrain, material, cell_size)
-    check_volumes(footprints, material)
+    loads, footprints, forces, answers = yield from _press(scene, shot)
     simulated = time.perf_counter()
 
     yield Progress("write", 0.0)
+    layers = (yield from _layers(scene, characters, answers)) if write else []
+    write_ground = write and options.output != "RESPONSE"
     pressed = PressedGround.at(
         footprints,
         frame=float(options.frame_end),
@@ -174,17 +175,17 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     vertices = surface.vertices if surface else None
     index = np.zeros(0, dtype=np.intp)
     refine = False
-    if ground and surface:
+    if ground and surface and write_ground:
         index = surface.pressed_vertices(pressed, terrain)
         refine = _wants_detail(ground, _spacing(surface.vertices[index], pressed), options.detail, cell_size, loads)
-    elif write:
+    elif write_ground:
         ground = create_ground(scene, plan)
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
     inputs = _inputs(scene, characters, material)
     input_hash = report.hash_inputs(inputs, motions, vertices)
     playback_error: float | None = None
-    if write and ground and vertices is not None:
+    if write_ground and ground and vertices is not None:
         stored = record.dump(footprints, {"inputs": inputs, "input_hash": input_hash})
         if refine:
             place = baked_ground.on_detail(ground, pressed, terrain, cell_size, unit_scale)
@@ -193,6 +194,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         playback_error = baked_ground.write(
             place, footprints, pressed, stored, blur_sigma=material.blur_sigma, unit_scale=unit_scale
         )
+    if write and options.output != "PRINTS":
+        response_job.put_layers(scene, characters, layers)
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
     result = report.build(
@@ -207,13 +210,51 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=playback_error,
-        warnings=_warnings(footprints),
+        warnings=_warnings(footprints) + response_job.warnings(answers),
         forces=forces if options.keep_forces else None,
+        gaps_mm=response_job.gap_table(answers),
+        worst_gaps=response_job.worst_gaps(answers),
     )
-    if write and ground:
+    if write_ground and ground:
         ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = _summary(result)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
+
+
+def _press(
+    scene: bpy.types.Scene, shot: Shot
+) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object], list[response_job.Answer]]]:
+    """Loads, footprints and forces of a shot, and how its characters answer.
+
+    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them.
+    """
+    characters = [character for character in scene.softground.characters if character.armature]
+    material, cell_size = settings.material_of(scene), settings.cell_size_of(scene)
+    asked = response_job.options_of(scene)
+    if asked:
+        response_job.check_characters(characters)
+    standing = response_job.standing_on(shot.motions, shot.terrain, asked)
+    loads = yield from estimate_shot(scene, replace(shot, motions=standing))
+    footprints, forces = yield from _simulate(loads, shot.terrain, material, cell_size)
+    leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
+    if leaning:
+        loads = yield from estimate_shot(scene, replace(shot, motions=leaning))
+        footprints, forces = yield from _simulate(loads, shot.terrain, material, cell_size)
+    check_volumes(footprints, material)
+    return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)
+
+
+def _layers(
+    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[response_job.Answer]
+) -> Job[list[list[LayerCurve]]]:
+    """The keys of each character's layer."""
+    job = response_job.layers_of(scene, characters, answers)
+    while True:
+        try:
+            yield Progress("write", next(job))
+        except StopIteration as finished:
+            layers: list[list[LayerCurve]] = finished.value
+            return layers
 
 
 def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
@@ -477,6 +518,7 @@ def _inputs(
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,
+        "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
     }
 
 

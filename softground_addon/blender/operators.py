@@ -10,7 +10,7 @@ from typing import TypeVar
 import bpy
 
 from ..core.errors import InputError, SoftGroundError
-from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, settings
+from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, response_job, settings
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -85,7 +85,7 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
-    """Take the footprints off the ground: it is again what it was before the bake"""
+    """Take the footprints off the ground and the response off the characters: all is as before the bake"""
 
     bl_idname = "softground.clear_bake"
     bl_label = "Clear Bake"
@@ -93,15 +93,20 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        ground = settings.scene_of(context).softground.ground
-        if ground is None or not baked_ground.is_baked(ground):
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        if (ground is None or not baked_ground.is_baked(ground)) and not response_job.has_layers(scene):
             cls.poll_message_set("There is no bake on the ground")
             return False
         return True
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        baked_ground.clear(settings.scene_of(context).softground.ground)
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        if ground is not None and baked_ground.is_baked(ground):
+            baked_ground.clear(ground)
+        response_job.remove_layers(scene)
         return {"FINISHED"}
 
 

@@ -16,6 +16,7 @@ from bpy.props import (
 )
 
 from ..core.presets import MATERIAL_RANGES, SURFACES
+from . import nla_layer, settings
 
 DEFAULT_MASS = 77.5
 """Body mass of the paper's character [kg]."""
@@ -47,6 +48,11 @@ def _in_unit(field: str, unit: float) -> dict[str, Any]:
         setattr(group, field, value * unit)
 
     return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
+
+
+def _show_response(character: SoftGroundCharacter, _context: bpy.types.Context) -> None:
+    if character.armature:
+        nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
 
 
 class SoftGroundJoint(bpy.types.PropertyGroup):
@@ -112,6 +118,16 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
             ),
         ],
         default="WHOLE_BODY",
+    )
+    response_strength: FloatProperty(
+        name="Response",
+        description="How much of the baked response shows: 0 is the animation as it was made, 1 the response as baked. "
+        "Needs no new bake",
+        default=1.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+        update=_show_response,
     )
     joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)
@@ -218,6 +234,80 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
 
 
+class SoftGroundTilt(bpy.types.PropertyGroup):
+    """How bodies lean on sloping and yielding ground; see `core.tilt`."""
+
+    use: BoolProperty(
+        name="Tilt",
+        description="Let the body lean into slopes and sway over the ground that gives way, as a layer of keys above "
+        "the animation",
+        default=False,
+    )
+    frequency: FloatProperty(
+        name="Frequency (Hz)",
+        description="How fast the body swings back to balance, in swings per second",
+        default=0.6,
+        min=0.02,
+        max=5.0,
+        soft_min=0.2,
+        soft_max=2.0,
+        precision=2,
+    )
+    damping: FloatProperty(
+        name="Damping",
+        description="1 comes to rest without swinging past, less swings on, more is sluggish",
+        default=0.85,
+        min=0.0,
+        max=5.0,
+        soft_min=0.1,
+        soft_max=1.5,
+        precision=2,
+    )
+    strength: FloatProperty(
+        name="Strength",
+        description="How much of a slope the body leans by: 1 by as much as the ground rises",
+        default=0.5,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    lateral: FloatProperty(
+        name="Sideways",
+        description="How much of that it also leans on slopes across its way",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+
+
+class SoftGroundGrounding(bpy.types.PropertyGroup):
+    """How feet, legs and hips follow the pressed ground; see `core.grounding`."""
+
+    use: BoolProperty(
+        name="Grounding",
+        description="Let the feet sink with the ground they press and stand on its slopes, with hips and knees to "
+        "match, as a layer of keys above the animation",
+        default=False,
+    )
+    align: FloatProperty(
+        name="Align Feet",
+        description="How much of the ground's slope the feet take on, within what an ankle can bend",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    lock: FloatProperty(
+        name="Lock Slides",
+        description="How much of the animation's sliding is taken out of feet that stand",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
@@ -258,6 +348,18 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         ],
         default="AUTO",
     )
+    output: EnumProperty(
+        name="Bake",
+        description="What a bake makes",
+        items=[
+            ("BOTH", "Prints and Response", "Footprints in the ground, and the characters' response where it is on"),
+            ("PRINTS", "Prints Only", "Footprints in the ground; the characters stay as they are animated"),
+            ("RESPONSE", "Response Only", "The characters' response; the ground stays as it is"),
+        ],
+        default="BOTH",
+    )
+    tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
+    grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
     keep_forces: BoolProperty(
@@ -267,4 +369,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = (SoftGroundJoint, SoftGroundSole, SoftGroundCharacter, SoftGroundMaterial, SoftGroundSettings)
+CLASSES = (
+    SoftGroundJoint,
+    SoftGroundSole,
+    SoftGroundCharacter,
+    SoftGroundMaterial,
+    SoftGroundTilt,
+    SoftGroundGrounding,
+    SoftGroundSettings,
+)

@@ -25,6 +25,8 @@ def build(
     playback_error_m: float | None = None,
     warnings: Sequence[str] = (),
     forces: Mapping[str, object] | None = None,
+    gaps_mm: Mapping[str, object] | None = None,
+    worst_gaps: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -46,6 +48,10 @@ def build(
         What the user should know.
     forces : mapping, optional
         Force per frame and sole [N], on request.
+    gaps_mm : mapping, optional
+        Distance of the standing soles from the ground before and after grounding, by character.
+    worst_gaps : sequence of mapping
+        The frames and soles where it is largest after grounding.
     """
     steps: list[dict[str, Any]] = [
         {
@@ -80,6 +86,9 @@ def build(
     }
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3
+    if gaps_mm is not None:
+        report["gaps_mm"] = dict(gaps_mm)
+        report["worst_gaps"] = [dict(gap) for gap in worst_gaps]
     if forces is not None:
         report["forces"] = dict(forces)
     return report

@@ -1,0 +1,221 @@
+"""The characters' side of a bake: what the settings ask for, the response to the pressed ground, and its layer."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.footprints import Footprint
+from ..core.grounding import Response, responding
+from ..core.heightfield import Terrain
+from ..core.motion import CharacterMotion
+from ..core.response import (
+    Gaps,
+    GroundingOptions,
+    TiltOptions,
+    at_scene_frames,
+    gaps,
+    respond,
+    stood_on,
+)
+from ..core.simulation import CharacterLoads
+from ..core.tilt import TiltGains
+from . import nla_layer, settings
+from .character_keys import response_curves
+from .character_setup import mapping_of
+from .properties import SoftGroundCharacter
+
+NOTICEABLE_LEAN = np.radians(0.25)
+"""A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
+
+
+@dataclass(frozen=True)
+class ResponseOptions:
+    """What the settings ask of the characters; None where something is off."""
+
+    tilt: TiltOptions | None
+    grounding: GroundingOptions | None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One character's response and what it did for its feet.
+
+    Attributes
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    response : Response
+    before, after : Gaps
+    """
+
+    motion: CharacterMotion
+    response: Response
+    before: Gaps
+    after: Gaps
+
+
+def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
+    """What the scene's settings ask of the characters, None if nothing."""
+    options = scene.softground
+    if options.output == "PRINTS" or not (options.tilt.use or options.grounding.use):
+        return None
+    tilt = grounding = None
+    if options.tilt.use:
+        gains = TiltGains(settings.typed(options.tilt.frequency), settings.typed(options.tilt.damping))
+        tilt = TiltOptions(gains, settings.typed(options.tilt.strength), settings.typed(options.tilt.lateral))
+    if options.grounding.use:
+        grounding = GroundingOptions(settings.typed(options.grounding.align), settings.typed(options.grounding.lock))
+    return ResponseOptions(tilt, grounding)
+
+
+def check_characters(characters: Iterable[SoftGroundCharacter]) -> None:
+    """Raise InputError, naming the remedy, where a character can take no layer."""
+    for character in characters:
+        nla_layer.check_layerable(character.armature)
+
+
+def standing_on(
+    motions: Sequence[CharacterMotion], terrain: Terrain, options: ResponseOptions | None
+) -> tuple[CharacterMotion, ...]:
+    """The motions as they will walk on the terrain, which is where they press it."""
+    if options is None or options.grounding is None:
+        return tuple(motions)
+    return tuple(stood_on(motion, terrain) for motion in motions)
+
+
+def leaning(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    options: ResponseOptions | None,
+) -> tuple[CharacterMotion, ...] | None:
+    """The motions with the lean that the pressed ground gives them, for the forces to see; None where it is nothing."""
+    if options is None or options.tilt is None:
+        return None
+    moved, most = [], 0.0
+    for of_character, motion in zip(loads, motions, strict=True):
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
+        moved.append(responding(motion, response))
+        most = max(most, float(np.abs(response.lean).max()))
+    return tuple(moved) if most > NOTICEABLE_LEAN else None
+
+
+def answers_of(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    options: ResponseOptions | None,
+) -> list[Answer]:
+    """Each character's response to the pressed ground, on top of its source."""
+    answers: list[Answer] = []
+    if options is None:
+        return answers
+    for of_character, motion in zip(loads, motions, strict=True):
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
+        before = gaps(motion, touching, terrain, footprints)
+        after = gaps(responding(motion, response), touching, terrain, footprints)
+        answers.append(Answer(motion, response, before, after))
+    return answers
+
+
+def layers_of(
+    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[Answer]
+) -> Generator[float, None, list[list[nla_layer.LayerCurve]]]:
+    """The keys of each character's layer; yields the part that is done."""
+    layers = []
+    for number, (character, answer) in enumerate(zip(characters, answers, strict=False)):
+        job = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
+        while True:
+            try:
+                read = next(job)
+            except StopIteration as finished:
+                layers.append(finished.value)
+                break
+            yield (number + read / len(answer.motion.frames)) / len(answers)
+    return layers
+
+
+def put_layers(
+    scene: bpy.types.Scene,
+    characters: Sequence[SoftGroundCharacter],
+    layers: Sequence[Sequence[nla_layer.LayerCurve]],
+) -> None:
+    """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
+    span = scene.softground.frame_start, scene.softground.frame_end
+    for number, character in enumerate(characters):
+        if number < len(layers) and layers[number]:
+            nla_layer.add_layer(character.armature, layers[number], span)
+            nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
+        else:
+            nla_layer.remove_layer(character.armature)
+
+
+def remove_layers(scene: bpy.types.Scene) -> bool:
+    """Take the layers off all characters; whether there was one."""
+    layered = [c.armature for c in scene.softground.characters if c.armature and nla_layer.has_layer(c.armature)]
+    for armature in layered:
+        nla_layer.remove_layer(armature)
+    for layer in scene.view_layers:
+        layer.update()
+    return bool(layered)
+
+
+def has_layers(scene: bpy.types.Scene) -> bool:
+    """Whether any character has a layer."""
+    return any(c.armature and nla_layer.has_layer(c.armature) for c in scene.softground.characters)
+
+
+def gap_table(answers: Sequence[Answer]) -> dict[str, object] | None:
+    """Penetration and float of the standing soles before and after [mm], for the report; None without a response."""
+    if not answers:
+        return None
+    return {
+        when: {answer.motion.name: _statistics(getattr(answer, when)) for answer in answers}
+        for when in ("before", "after")
+    }
+
+
+def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:
+    millimetres = of_soles.heights * 1e3
+    return {
+        name: {
+            "max": round(float(size.max(initial=0.0)), 3),
+            "p95": round(float(np.percentile(size, 95)) if len(size) else 0.0, 3),
+        }
+        for name, size in (("penetration", np.maximum(-millimetres, 0.0)), ("float", np.maximum(millimetres, 0.0)))
+    }
+
+
+WORST_GAPS = 10
+"""Frames that the report lists as the worst."""
+
+
+def worst_gaps(answers: Sequence[Answer]) -> list[dict[str, object]]:
+    """The largest gaps that are left, largest first, one for each character, sole and frame."""
+    gaps_left = [
+        (abs(height), answer.motion.name, answer.motion.soles[sole].sole.name, frame, height)
+        for answer in answers
+        for frame, sole, height in zip(answer.after.frames, answer.after.soles, answer.after.heights, strict=True)
+    ]
+    return [
+        {"character": name, "contact": sole, "frame": round(float(frame), 3), "gap_mm": round(float(height) * 1e3, 3)}
+        for _, name, sole, frame, height in sorted(gaps_left, reverse=True)[:WORST_GAPS]
+    ]
+
+
+def warnings(answers: Sequence[Answer]) -> list[str]:
+    """What the user should know about the responses."""
+    return [
+        f"'{answer.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its joints in "
+        "the Character panel."
+        for answer in answers
+        if not answer.response.legs
+    ]
