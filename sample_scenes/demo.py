@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--up", choices=("Y", "Z"), help="up axis of the motion file (default: the body's long axis)")
     parser.add_argument("--output", type=Path, default=Path("build/demo"), metavar="DIR")
     parser.add_argument("--cell-size", type=float, default=CELL_SIZE, metavar="M", help="size of the ground's cells")
-    parser.add_argument("--samples", type=int, default=12, metavar="N", help="render samples of the pictures")
+    parser.add_argument("--samples", type=int, default=20, metavar="N", help="render samples of the pictures")
     parser.add_argument("--no-pictures", action="store_true", help="bake and save only")
     return parser
 
@@ -228,7 +228,7 @@ def take_pictures(lanes: list[Lane], folder: Path, samples: int) -> list[Path]:
         reach = np.sqrt(step.area_m2) * 2.0  # length of the foot, about
         scale = stage.add_scale(step.position + 0.62 * reach * aside, step.heading, scene.collection)
         target = step.position + 0.10 * reach * aside
-        stage.aim(camera, target + reach * (-1.9 * ahead + 0.45 * aside + (0, 0, 2.0)), target)
+        stage.aim(camera, target + reach * (-2.15 * ahead + 0.45 * aside + np.array((0.0, 0.0, 1.75))), target)
         pictures.append(folder / f"{lane.slug}.png")
         stage.render(scene, camera, pictures[-1], _CLOSE_UP, samples)
         bpy.data.objects.remove(scale)

@@ -20,8 +20,10 @@ SUN_ELEVATION = radians(12.0)
 """Low, so that prints of a centimetre cast shadows."""
 
 _SUN_STRENGTH = 6.5  # W/m², against a sky of
-_SKY_STRENGTH = 0.28
+_SKY_STRENGTH = 0.36
 _SKIES = ("NISHITA", "MULTIPLE_SCATTERING", "SINGLE_SCATTERING", "HOSEK_WILKIE")  # the first that this Blender has
+
+_FRAMING_MARGIN = 1.05  # how much larger than what it shows a picture is
 
 SCALE_LENGTH = 0.20
 """Length of the scale beside a print, in fields of a centimetre [m]."""
@@ -158,6 +160,7 @@ def frame_points(camera: bpy.types.Object, points: Array, toward: ArrayLike) -> 
     """Put a camera where it sees all points (N, 3), looking along `toward`."""
     middle = points.mean(axis=0)
     direction = np.asarray(toward, float) / np.linalg.norm(toward)
+    points = middle + _FRAMING_MARGIN * (points - middle)
     aim(camera, middle - direction, middle)
     bpy.context.view_layer.update()
     eye, _ = camera.camera_fit_coords(bpy.context.evaluated_depsgraph_get(), points.ravel().tolist())

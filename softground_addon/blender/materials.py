@@ -187,7 +187,7 @@ def _snow(graph: Graph, ground: Ground) -> Look:
             "Subsurface Weight": 0.5,
             "Subsurface Radius": (0.7, 0.9, 1.0),
             "Subsurface Scale": 0.010,
-            "Coat Weight": graph.ramp(random, 0.92, 0.93) * 0.8,
+            "Coat Weight": graph.ramp(random, 0.92, 0.93) * graph.blend(ground.pressed, 0.8, 0.0),
             "Coat Roughness": 0.15,
             "Coat Normal": graph.out(facet),
         },
@@ -212,19 +212,19 @@ def _mud(graph: Graph, ground: Ground) -> Look:
     """Dark, smooth and sticky; wet in patches, wettest in the prints, where water films over it."""
     lumps = graph.noise(ground.place, 0.06, 2.0, 0.45)
     bits = graph.noise(ground.place, 0.009, 2.0, 0.5)
-    relief = lumps * graph.blend(ground.pressed, 0.012, 0.006) + bits * graph.blend(ground.pressed, 0.0016, 0.0009)
-    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.38, 0.66, 0.12, 0.55)
+    relief = lumps * graph.blend(ground.pressed, 0.007, 0.004) + bits * graph.blend(ground.pressed, 0.0014, 0.0008)
+    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.20, 0.75)
     wet = graph.math("MAXIMUM", ground.pressed, damp)
-    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.070, 0.042, 0.024), (0.120, 0.078, 0.048))
+    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.078, 0.046, 0.026), (0.130, 0.082, 0.050))
     colour = graph.mix(wet, colour, (0.034, 0.018, 0.009))
     return Look(
         relief,
         {
             "Base Color": colour,
-            "Roughness": graph.blend(wet, 0.60, 0.30),
+            "Roughness": graph.blend(wet, 0.62, 0.26),
             "Specular IOR Level": 0.5,
-            "Coat Weight": ground.pressed * 0.35,
-            "Coat Roughness": 0.14,
+            "Coat Weight": ground.pressed * 0.6,
+            "Coat Roughness": 0.07,
             "Coat IOR": 1.33,
         },
     )
