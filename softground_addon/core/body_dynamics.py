@@ -33,7 +33,7 @@ TRUE_FALL = 0.2
 """A flight whose fall differs from gravity by less shows the error of the body's mass, not another time scale."""
 RATES_OF_FALL = (0.5, 3.0)
 """Slowest and fastest fall that is taken for a flight, in gravities."""
-STEADY_ENDS = 0.04
+STEADY_ENDS = 0.01
 """How much a force of 1 body weight is expected at both ends of the action, where half of the evidence is missing."""
 
 

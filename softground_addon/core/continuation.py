@@ -1,4 +1,4 @@
-"""Motions made fit for derivatives: stepped keys bridged, loops continued beyond their ends.
+"""Motions made fit for derivatives: stepped keys bridged, loops and gaits continued beyond their ends.
 
 Only the estimate of contacts and forces uses these; the ground is pressed by the motion as it is shown.
 """
@@ -21,12 +21,12 @@ SAME_POSE = 1e-5
 """Poses that differ by less are the same, in leg lengths."""
 LONGEST_HOLD = 0.25
 """A pose that stays longer is a rest and not a stepped key [s]: keys on threes at 12 frames a second."""
-LOOP_POSE = 0.01
-"""How well the last pose of a loop matches its first, in leg lengths."""
-LOOP_VELOCITY = 0.1
-"""How well its velocity does, in sqrt(gravity·leg length)."""
-CONTINUATION = 3.0
-"""How far a loop is continued beyond each end, in sqrt(leg length/gravity) (1 s for an adult)."""
+LIKE_POSE = 0.05
+"""Poses are alike when joints and soles are this near on average, in leg lengths (5 cm for an adult)."""
+VELOCITY_WEIGHT = 0.3
+"""A difference of velocity counts as one of position after this time, in sqrt(leg length/gravity) (0.1 s)."""
+CONTINUATION = 1.0
+"""How far a motion is continued beyond each end, in the same unit (0.3 s)."""
 
 
 def without_holds(motion: CharacterMotion) -> CharacterMotion:
@@ -41,57 +41,63 @@ def without_holds(motion: CharacterMotion) -> CharacterMotion:
     return _mapped(motion, lambda samples: _hermite(samples[known], known.astype(float), len(held)))
 
 
-def continued(motion: CharacterMotion) -> tuple[CharacterMotion, int]:
-    """A loop with parts of the cycles before and after it; any other motion as it is.
+def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
+    """A motion that goes on for a moment beyond both of its ends, where it has been in the same pose before.
+
+    After the last pose comes what followed the pose most like it, before the first one what preceded its like: exact
+    for loops, near for a few strides of a gait and for standing still. Where no pose is like it, the motion ends.
 
     Returns
     -------
     motion : CharacterMotion
-    margin : int
-        Frames added at each end.
+    given : slice
+        Which of its frames are those of the given motion.
     """
     count = len(motion.frames)
-    if not is_loop(motion):
-        return motion, 0
-    seconds = CONTINUATION * np.sqrt(motion.leg_length / motion.gravity)
-    margin = min(count - 1, round(seconds / motion.time_step))
-    progress = _progress(motion)
-    order = np.arange(-margin, count + margin)
-    cycle, within = np.divmod(order, count - 1)
-    cycle[-margin - 1], within[-margin - 1] = 0, count - 1  # the last frame itself, exactly as given
+    margin = max(1, round(CONTINUATION * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step))
+    if count < 2 * margin:
+        return motion, slice(0, count)
+    before = _most_like(motion, 0, np.arange(margin, count))
+    after = _most_like(motion, count - 1, np.arange(count - margin))
 
     def extended(samples: Array) -> Array:
-        longer = samples[within].copy()
-        if samples.ndim == 4:  # poses (F, P, 4, 4)
-            longer[..., :3, 3] += cycle[:, None, None] * progress
-        else:
-            longer += cycle[:, None] * progress
-        return longer
+        pieces = [samples]
+        if before is not None:
+            pieces.insert(0, samples[before - margin : before] + _offset(samples, 0, before))
+        if after is not None:
+            pieces.append(samples[after + 1 : after + 1 + margin] + _offset(samples, count - 1, after))
+        return np.concatenate(pieces)
 
-    frame = motion.frames[1] - motion.frames[0]
     longer = _mapped(motion, extended)
-    return dataclasses.replace(longer, frames=motion.frames[0] + frame * order), margin
+    first = 0 if before is None else margin
+    frame = motion.frames[1] - motion.frames[0]
+    total = len(next(iter(longer.soles)).transforms)
+    frames = motion.frames[0] + frame * (np.arange(total) - first)
+    return dataclasses.replace(longer, frames=frames), slice(first, first + count)
 
 
-def is_loop(motion: CharacterMotion) -> bool:
-    """Whether the last frame is the first one again, moved on by the distance of a cycle."""
-    if len(motion.frames) < 4:
-        return False
-    points = np.concatenate(
-        [path[:, None] for path in motion.joints.values()] + [sole.landmark_positions() for sole in motion.soles],
-        axis=1,
+def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) -> int | None:
+    """The one of `others` whose pose and velocity are most like those at an end of the motion, if any are alike."""
+    points = np.stack(
+        [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)], axis=1
     )
-    gap = points[-1] - points[0] - _progress(motion)
-    start, end = points[1] - points[0], points[-1] - points[-2]
-    speed = np.sqrt(motion.gravity * motion.leg_length)
-    same_pose = np.linalg.norm(gap, axis=-1).max() < LOOP_POSE * motion.leg_length
-    return bool(same_pose and np.linalg.norm(start - end, axis=-1).max() < LOOP_VELOCITY * speed * motion.time_step)
+    points = points - points.mean(axis=1, keepdims=True) * (1.0, 1.0, 0.0)
+    step = np.diff(points, axis=0) / motion.time_step
+    # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
+    velocity = np.concatenate([step, step[-1:]]) if frame == 0 else np.concatenate([step[:1], step])
+    weight = VELOCITY_WEIGHT * np.sqrt(motion.leg_length / motion.gravity)
+    difference = (points[others] - points[frame]) ** 2 + (weight * (velocity[others] - velocity[frame])) ** 2
+    distance = np.sqrt(difference.sum(axis=-1).mean(axis=-1))
+    best = int(distance.argmin())
+    return int(others[best]) if distance[best] < LIKE_POSE * motion.leg_length else None
 
 
-def _progress(motion: CharacterMotion) -> Array:
-    """How far the motion carries the body from its first to its last frame, (3,) [m]."""
-    path = motion.joints.get("hips", motion.soles[0].transforms[:, 0, :3, 3])
-    return path[-1] - path[0]
+def _offset(samples: Array, frame: int, other: int) -> Array:
+    """What is to be added to the samples near `other` so that they go on from `frame`; poses only move, not turn."""
+    offset = samples[frame] - samples[other]
+    if samples.ndim == 4:  # poses (F, P, 4, 4)
+        offset[..., :3, :3] = 0.0
+    return offset
 
 
 def _held(motion: CharacterMotion) -> Mask:

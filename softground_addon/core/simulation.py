@@ -61,7 +61,7 @@ def estimate_loads(
         See `whole_body_forces`.
     """
     steps = steps_per_frame(motion.frame_rate)
-    source, margin = continued(without_holds(motion))
+    source, given = continued(without_holds(motion))
     source = source.resampled(steps)
     contacts = detect_contacts(source, terrain)
     if force_model == "IMPULSE":
@@ -70,7 +70,7 @@ def estimate_loads(
         body = body_dynamics(source)
         contacts = refine_contacts(source, contacts, body)
         forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
-    shown = slice(margin * steps, len(source.frames) - margin * steps)
+    shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))
 
 

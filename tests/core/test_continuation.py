@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softground_addon.core.continuation import continued, is_loop, without_holds
+from softground_addon.core.continuation import continued, without_holds
 from tests.core.character import character, flat_sole
 
 RATE = 24.0
@@ -38,30 +38,46 @@ def test_a_rest_is_no_hold():
     assert without_holds(still) is still
 
 
-def test_a_whole_cycle_is_a_loop_and_a_part_of_one_is_not():
-    assert is_loop(walker(25))
-    assert is_loop(walker(49))
-    assert not is_loop(walker(31))
-
-
 @pytest.mark.parametrize("speed", [0.0, 1.3])
-def test_a_continued_loop_is_the_longer_walk(speed):
-    loop, margin = continued(walker(25, speed=speed))
-    assert margin > 0
-    longer = walker(25 + 48, speed=speed)
-    begin = 24 - margin
-    expected = longer.joints["hips"][begin : begin + 25 + 2 * margin] - (speed * 24 / RATE, 0, 0)
-    assert loop.joints["hips"] == pytest.approx(expected, abs=1e-9)
-    assert loop.frames[margin] == 1.0
-    assert np.diff(loop.frames) == pytest.approx(1.0)
+@pytest.mark.parametrize("frames", [25, 49, 61])
+def test_a_loop_and_a_gait_go_on_as_the_longer_walk(frames, speed):
+    """One cycle, two, and two and a half of a gait of 24 frames."""
+    longer, given = continued(walker(frames, speed=speed))
+    assert given.stop - given.start == frames
+    start, after = given.start, len(longer.frames) - given.stop
+    assert start > 0
+    assert after > 0
+    walk = walker(frames + 48, speed=speed)
+    expected = walk.joints["hips"][24 - start : 24 + frames + after] - (speed * 24 / RATE, 0, 0)
+    assert longer.joints["hips"] == pytest.approx(expected, abs=1e-9)
+    assert longer.frames[given][0] == 1.0
+    assert np.diff(longer.frames) == pytest.approx(1.0)
 
 
-def test_the_given_frames_of_a_loop_stay_exactly_as_given():
-    given = walker(25)
-    loop, margin = continued(given)
-    assert np.array_equal(loop.joints["hips"][margin:-margin], given.joints["hips"])
+def test_the_given_frames_stay_as_given():
+    motion = walker(49)
+    longer, given = continued(motion)
+    assert np.array_equal(longer.joints["hips"][given], motion.joints["hips"])
+    assert longer.soles[0].transforms[given] == pytest.approx(motion.soles[0].transforms)
 
 
-def test_what_does_not_loop_is_not_continued():
-    motion = walker(31)
-    assert continued(motion) == (motion, 0)
+def test_standing_still_goes_on():
+    still = character([flat_sole(np.zeros((48, 3)))], hips=(0, 0, 0.9), rate=RATE)
+    longer, given = continued(still)
+    assert given.start > 0
+    assert len(longer.frames) > given.stop
+    assert np.all(longer.joints["hips"] == (0, 0, 0.9))
+
+
+def test_what_never_returns_to_a_pose_is_not_continued():
+    rising = np.stack([0 * np.arange(48.0), 0 * np.arange(48.0), 0.3 + 0.02 * np.arange(48.0)], axis=1)
+    motion = character([flat_sole(np.zeros((48, 3)))], hips=rising, rate=RATE)
+    longer, given = continued(motion)
+    assert given == slice(0, 48)
+    assert np.array_equal(longer.joints["hips"], rising)
+
+
+def test_very_short_motions_are_left_alone():
+    for frames in (1, 2, 5):
+        motion = walker(frames)
+        assert continued(motion) == (motion, slice(0, frames))
