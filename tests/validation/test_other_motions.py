@@ -1,4 +1,7 @@
-"""Shuffles, jumps and dances: steps counted by eye on plots of foot heights and speeds, forces that a body could bear.
+"""Shuffles, jumps and dances: steps checked by eye, forces that a body could bear.
+
+The counts were read from plots of foot heights and speeds with the detected contacts shaded in them: they guard against
+change, and are no independent count. Those of gait/ agree with the force plates.
 
 Needs Blender's module and the reference data beside the repository; skips without them.
 """
@@ -32,7 +35,7 @@ SOURCES = {
     "gait/walk_subject01": {"rate": 60.0},
     "gait/run_rajagopal": {"rate": 100.0},
 }
-STEPS = {  # left, right, counted by eye; a foot that stands in the first frame counts
+STEPS = {  # left, right; a foot that stands in the first frame counts
     "bvh/zombie": (15, 16),
     "bvh/jumping": (3, 3),  # standing, the landing, and a small step of each foot after it
     "bvh/jumping_jacks": (7, 7),
