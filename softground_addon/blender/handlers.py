@@ -7,10 +7,13 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import analysis, live, modal_bake
+from . import analysis, live, modal_bake, overlay, session
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does."""
+
+SETTLED = 0.3
+"""Time after an edit at which the overlay is worked out anew [s]."""
 
 LEFT_OVER = "SoftGround Sampling"
 """Scenes in which rigs are read; one may come back with an undo step or an autosave from within a bake."""
@@ -30,6 +33,8 @@ def notice_edits(_scene: Any, depsgraph: Any = None) -> None:
         analysis.forget()
         if live.is_on() and not bpy.app.timers.is_registered(live.after_edit):
             bpy.app.timers.register(live.after_edit, first_interval=0.0)
+        if session.current().show_overlay and not bpy.app.timers.is_registered(overlay.read_again):
+            bpy.app.timers.register(overlay.read_again, first_interval=SETTLED)
 
 
 @persistent

@@ -11,9 +11,11 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.props import BoolProperty
+from numpy.typing import NDArray
 
 from ..core import record
 from ..core.errors import InputError
+from ..core.heightfield import Window
 from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
@@ -21,6 +23,8 @@ from . import analysis, bake_job, ground_mesh, playback, session, settings
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .translation import rpt_
+
+Array = NDArray[np.float64]
 
 
 class LiveMode:
@@ -87,6 +91,10 @@ class LiveMode:
         """Whether the character has changed since it was read."""
         return analysis.known(scene) is not self._analysis
 
+    def changes(self) -> tuple[list[tuple[Window, Array]], float]:
+        """What the shown frame changed in each window [m], and the size of the cells [m]."""
+        return self._playhead.last_change(), self._playhead.ground.cell_size
+
     def keep(self, scene: bpy.types.Scene) -> None:
         """Leave the ground as it is shown, as the bake of the frames up to now."""
         ground = self._ground.object()
@@ -135,6 +143,13 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
         return
     if not _mode.follow(scene):
         forget()
+
+
+def changes_of(scene: bpy.types.Scene) -> tuple[list[tuple[Window, Array]], float] | None:
+    """What the shown frame changed in each window, and the size of the cells [m]; None if live mode is not on there."""
+    if _mode is None or _mode.scene != scene.session_uid:
+        return None
+    return _mode.changes()
 
 
 def rendering(active: bool) -> None:

@@ -129,19 +129,20 @@ def _grouped(tiles: NDArray[np.int64]) -> dict[tuple[int, int], Indices]:
     """Numbers of the places in each tile."""
     order = np.lexsort(tiles.T)
     ordered = tiles[order]
-    starts = np.flatnonzero(np.r_[True, (np.diff(ordered, axis=0) != 0).any(axis=1)]) if len(order) else []
-    parts = np.split(order, starts[1:]) if len(order) else []
-    return {(int(i), int(j)): part for (i, j), part in zip(ordered[starts], parts, strict=True)}
+    borders = np.flatnonzero((np.diff(ordered, axis=0) != 0).any(axis=1)) + 1
+    parts = [part for part in np.split(order, borders) if len(part)]
+    return {(int(tiles[part[0], 0]), int(tiles[part[0], 1])): part for part in parts}
 
 
 def _without_repeats(windows: Sequence[Window]) -> list[Window]:
     """The windows, with those that overlap joined into one."""
     joined: list[Window] = []
     for window in windows:
-        while other := next((other for other in joined if other.intersects(window)), None):
+        united = window
+        while other := next((other for other in joined if other.intersects(united)), None):
             joined.remove(other)
-            window = window.union(other)
-        joined.append(window)
+            united = united.union(other)
+        joined.append(united)
     return joined
 
 

@@ -244,10 +244,43 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         column = layout.column()
         column.scale_y = 1.4
         column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
+        _live_buttons(layout, state)
         layout.operator("softground.clear_bake", icon="TRASH")
         summary = ground_mesh.summary_of(options.ground) if options.ground else {}
         if summary:
             _result(layout, summary)
+
+
+def _live_buttons(layout: Any, state: Any) -> None:
+    """One button to start live mode; two to end it, with and without the prints."""
+    if not state.is_live:
+        layout.operator("softground.live", icon="PLAY")
+        return
+    row = layout.row(align=True)
+    row.alert = True
+    row.operator("softground.live", text="Discard", icon="X").keep = False
+    row.alert = False
+    row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
+
+
+class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
+    """What to see in the viewport"""
+
+    bl_label = "Overlay"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, _context: bpy.types.Context) -> None:
+        shown = session.current().show_overlay
+        icon = "HIDE_OFF" if shown else "HIDE_ON"
+        self.layout.operator("softground.overlay", text="", icon=icon, depress=shown, emboss=False)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.column()
+        state = session.current()
+        layout.active = state.show_overlay
+        column = layout.column(align=True, heading="Show")
+        for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
+            column.prop(state, part)
 
 
 def _result(layout: Any, summary: Any) -> None:
@@ -294,4 +327,5 @@ CLASSES = (
     SOFTGROUND_PT_material,
     SOFTGROUND_PT_material_details,
     SOFTGROUND_PT_bake,
+    SOFTGROUND_PT_overlay,
 )

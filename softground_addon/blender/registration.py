@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import bpy
 
-from . import character_editing, cli, handlers, live, modal_bake, operators, panels, preset_menu, properties, session
+from . import (
+    character_editing,
+    cli,
+    handlers,
+    live,
+    modal_bake,
+    operators,
+    overlay,
+    panels,
+    preset_menu,
+    properties,
+    session,
+)
 
 CLASSES = (
     *session.CLASSES,
@@ -13,6 +25,7 @@ CLASSES = (
     *character_editing.CLASSES,
     *modal_bake.CLASSES,
     *live.CLASSES,
+    *overlay.CLASSES,
     *preset_menu.CLASSES,
     *panels.CLASSES,
 )
@@ -29,6 +42,7 @@ def register() -> None:
     bpy.types.Scene.softground = bpy.props.PointerProperty(name="SoftGround", type=properties.SoftGroundSettings)
     bpy.types.WindowManager.softground = bpy.props.PointerProperty(type=session.SoftGroundSession)
     handlers.register()
+    overlay.register()
     _command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
 
 
@@ -38,6 +52,7 @@ def unregister() -> None:
     if _command is not None:
         bpy.utils.unregister_cli_command(_command)
         _command = None
+    overlay.unregister()
     handlers.unregister()
     del bpy.types.WindowManager.softground
     del bpy.types.Scene.softground

@@ -18,6 +18,22 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     cancel_requested: BoolProperty(name="Cancel Requested", description="The bake is to end at its next step")
     progress: FloatProperty(name="Progress", description="Finished part of the bake", min=0.0, max=1.0)
     status: StringProperty(name="Status", description="What the bake is doing, and the time it still needs")
+    show_overlay: BoolProperty(name="Overlay", description="Show what the add-on knows in the viewport")
+    show_footfalls: BoolProperty(
+        name="Footfalls", description="Where the soles will stand, numbered in their order", default=True
+    )
+    show_soles: BoolProperty(name="Soles", description="Outlines of the soles at the current frame", default=True)
+    show_forces: BoolProperty(
+        name="Forces",
+        description="Forces on the soles at the current frame: weight (green), momentum (yellow) and total (red)",
+        default=True,
+    )
+    show_cells: BoolProperty(
+        name="Cells",
+        description="Cells that are in contact (red) and that rise around it (blue) at the current frame, from live "
+        "mode or the bake",
+        default=True,
+    )
     is_live: BoolProperty(name="Live", description="The ground gives way while the timeline plays")
 
 

@@ -93,6 +93,14 @@ class Playhead:
             windows += self._changes[self._shown].windows
         return windows
 
+    def last_change(self) -> list[tuple[Window, Array]]:
+        """Windows that the shown frame changed, each with its change of compression and rim [m]."""
+        change = self._changes[self._shown]
+        return [
+            (window, after - before)
+            for window, before, after in zip(change.windows, change.before, change.after, strict=True)
+        ]
+
     def footprints(self) -> list[Footprint]:
         """The record of the ground that is shown, with the contacts that are under way as they are by now."""
         until_now = [_until(self.frame, character) for character in self._loads]
