@@ -61,10 +61,17 @@ def main(arguments: list[str]) -> int:
     if options.motion and not options.motion.is_file():
         print(f"demo: there is no file '{options.motion}'.", file=sys.stderr)
         return 2
+    if not options.scale > 0:
+        print(f"demo: the scale is {options.scale:g}; it must be greater than 0.", file=sys.stderr)
+        return 2
     started = time.perf_counter()
-    options.output.mkdir(parents=True, exist_ok=True)
     with addon():
-        lanes = build(options.motion, options.scale, options.up, options.cell_size)
+        try:
+            lanes = build(options.motion, options.scale, options.up, options.cell_size)
+        except RuntimeError as error:  # how an operator reports what is wrong with its input
+            print(f"demo: {str(error).strip()}", file=sys.stderr)
+            return 2
+        options.output.mkdir(parents=True, exist_ok=True)
         print_table(lanes)
         blend = options.output / "demo.blend"
         dress(lanes, with_sticks=options.motion is not None)
@@ -188,10 +195,11 @@ def print_table(lanes: list[Lane]) -> None:
 
 
 def dress(lanes: list[Lane], *, with_sticks: bool) -> None:
-    """Light, floor and trays around the grounds, and bodies for rigs without one; at the end of the walk."""
+    """Light, floor, trays and camera for the grounds, and bodies for rigs without one; at the end of the walk."""
     scene = bpy.context.scene
     scene.frame_set(scene.softground.frame_end)
     stage.set_up_rendering(scene)
+    scene.render.resolution_x, scene.render.resolution_y = _OVERVIEW  # a camera is fitted to the picture's shape
     stage.add_sun(scene, travel_direction(lanes[0]) - radians(75))
     for lane in lanes:
         stage.add_tray(lane.ground, scene.collection)
@@ -199,6 +207,9 @@ def dress(lanes: list[Lane], *, with_sticks: bool) -> None:
             add_stick_figure(lane.armature, scene.collection)
     low, _ = stage.bounds([lane.ground for lane in lanes])
     stage.add_floor(low[2] - 0.1, scene.collection)
+    camera = stage.add_camera(scene, "Overview", lens=50.0)
+    stage.frame_points(camera, _points_to_show(lanes), _looking(travel_direction(lanes[0]) + radians(50), radians(-22)))
+    scene.camera = camera
 
 
 def travel_direction(lane: Lane) -> float:
@@ -215,9 +226,7 @@ def take_pictures(lanes: list[Lane], folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     bodies = [child for lane in lanes for child in lane.armature.children]
     pictures = [folder / "overview.png"]
-    camera = stage.add_camera(scene, "Overview", lens=50.0)
-    stage.frame_points(camera, _points_to_show(lanes), _looking(travel_direction(lanes[0]) + radians(50), radians(-22)))
-    stage.render(scene, camera, pictures[0], _OVERVIEW, samples)
+    stage.render(scene, scene.camera, pictures[0], _OVERVIEW, samples)
     for body in bodies:
         body.hide_render = True  # their long shadows would fall on the prints
     camera = stage.add_camera(scene, "Close-up", lens=50.0)

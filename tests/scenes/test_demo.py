@@ -103,6 +103,20 @@ def test_a_missing_motion_file_is_named_and_nothing_is_written(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_motion_file_without_feet_is_refused_in_words(tmp_path):
+    stick = tmp_path / "stick.bvh"
+    stick.write_text(
+        "HIERARCHY\nROOT Stick\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        "End Site\n{\nOFFSET 0 100 0\n}\n}\nMOTION\nFrames: 3\nFrame Time: 0.04\n0 0 0\n1 0 0\n2 0 0\n"
+    )
+    done = run_demo(tmp_path / "out", "--motion", str(stick))
+    assert done.returncode == 2
+    assert done.stderr.startswith("demo: ")
+    assert "feet" in done.stderr.lower() or "foot" in done.stderr.lower()
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "scale"), [("gait/walk_subject01.bvh", "0.01"), ("bvh/zombie.bvh", "0.04"), ("bvh/jumping.bvh", "0.04")]
