@@ -1,26 +1,36 @@
-"""The command line: `softground bake`, the same inside `blender --command` and with the bpy module."""
+"""The command line: `softground bake` and `batch`, the same inside `blender --command` and with the bpy module."""
 
 from __future__ import annotations
 
+import _thread
 import argparse
+import contextlib
 import json
+import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ..core import files, presets, report
+from ..core import files, presets, receipts, report
 from ..core.errors import BakeError, InputError, SoftGroundError
-from . import bake_job, settings
+from ..core.manifest import BatchShot
+from . import bake_job, batch, settings
 from .character_setup import set_up_automatically
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 Show = Callable[[bake_job.Progress], None]
+
+PARENT_POLL = 0.5
+"""Time between two looks at whether the parent process is there [s]."""
+
+_INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 def run_in_blender(arguments: Sequence[str]) -> int:
@@ -41,10 +51,13 @@ def run_standalone(arguments: Sequence[str]) -> int:
 
 
 def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
-    previous = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    previous = {number: signal.signal(number, _interrupt) for number in _INTERRUPTS}
     try:
         options = parser.parse_args(list(arguments))
-        _bake(options)
+        if options.command == "batch":
+            return _batch_code(batch.bake_batch(options))
+        with _ending_with(options.parent):
+            _bake(options)
     except SystemExit as leaving:  # argparse has printed its message
         return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
     except BakeError as error:
@@ -63,7 +76,20 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
 
 
 def _interrupt(_number: int, _frame: object) -> None:
+    for number in _INTERRUPTS:
+        signal.signal(number, signal.SIG_IGN)  # once is enough: what follows is the cleaning up
     raise KeyboardInterrupt
+
+
+def _batch_code(outcomes: Sequence[batch.Outcome]) -> int:
+    """The exit code of a batch: that of its worst shot."""
+    statuses = {outcome.status for outcome in outcomes}
+    if "interrupted" in statuses:
+        print("softground: interrupted; the same command goes on where it stopped.", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if statuses & {"crashed", "failed"}:
+        return EXIT_FAILED_CHECK
+    return EXIT_BAD_INPUT if "refused" in statuses else EXIT_DONE
 
 
 def _parser(*, standalone: bool) -> argparse.ArgumentParser:
@@ -89,7 +115,12 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
         "--progress", choices=("plain", "json", "openjd", "none"), default="plain", help="how to show progress"
     )
     bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
+    bake.add_argument(
+        "--receipt", type=Path, metavar="FILE.json", help="write the checksums of what was read and written"
+    )
+    bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
     bake.set_defaults(blend=None)
+    batch.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
     return parser
 
 
@@ -112,6 +143,7 @@ def _bake(options: argparse.Namespace) -> None:
         raise InputError("Nothing would be kept: give --save FILE.blend, --in-place, --report FILE.json or --dry-run.")
     if options.blend is not None:
         _open(options.blend)
+    read = receipts.checksums(_files_read(options)) if options.receipt else {}
     scene = settings.scene_of(bpy.context)
     target = _save_target(options)
     set_up_automatically(scene)
@@ -125,12 +157,67 @@ def _bake(options: argparse.Namespace) -> None:
         settings.assign(scene.softground, path, value)
     show = _PROGRESS[options.progress]
     result = bake_job.run(bake_job.bake(scene, write=not options.dry_run), show)
-    if options.report:
-        files.write_text(options.report, report.dump(result.report))
-    if target and not options.dry_run:
-        save(target)
+    _write_results(options, target, result.report, read)
+    if options.progress == "json":
+        said = {"stage": "done", "fraction": 1.0, "overall": 1.0, "totals": result.report["totals"]}
+        print(json.dumps(said), flush=True)
     if options.progress in ("plain", "openjd"):
         print(report.summary(result.report), flush=True)
+
+
+@contextlib.contextmanager
+def _ending_with(parent: int) -> Iterator[None]:
+    """Interrupt the block when the parent process of that id has ended; 0 is none. Does nothing on Windows."""
+    over = threading.Event()
+
+    def watch() -> None:
+        while not over.wait(PARENT_POLL):
+            if os.getppid() != parent:
+                _thread.interrupt_main()
+                return
+
+    watcher = threading.Thread(target=watch)
+    if parent and os.name == "posix":
+        watcher.start()
+    try:
+        yield
+    finally:
+        over.set()  # a thread that is left behind would hang Blender's exit
+        if watcher.ident:
+            watcher.join()
+
+
+def _files_read(options: argparse.Namespace) -> list[Path]:
+    """The opened file, what it links, and the preset file."""
+    linked = [(item.filepath, item.library) for item in (*bpy.data.libraries, *bpy.data.cache_files)]
+    paths = [bpy.path.abspath(path, library=library) for path, library in linked]
+    if options.preset and options.preset.lower().endswith(".json"):
+        paths.append(options.preset)
+    return [Path(os.path.realpath(path)) for path in (bpy.data.filepath, *paths) if path]
+
+
+def _write_results(
+    options: argparse.Namespace, target: Path | None, content: dict[str, Any], read: dict[str, str]
+) -> None:
+    """Write shot and report whole under other names, then the receipt, and give them their names at the very end."""
+    with contextlib.ExitStack() as results:
+        wrote: dict[Path, Path] = {}
+        if target and not options.dry_run:
+            wrote[target] = results.enter_context(files.replacing(target))
+            _save_copy(wrote[target])
+        if options.report:
+            path = Path(os.path.realpath(options.report))
+            wrote[path] = results.enter_context(files.replacing(path))
+            wrote[path].write_text(report.dump(content), encoding="utf-8")
+        if options.receipt:
+            receipts.write(
+                options.receipt,
+                made_by=batch.made_by(),
+                options=_batch_shot(options, target).options,
+                read=read,
+                wrote={str(path): receipts.checksum(partial) for path, partial in wrote.items()},
+                totals=content["totals"],
+            )
 
 
 def _open(path: Path) -> None:
@@ -158,19 +245,33 @@ def _save_target(options: argparse.Namespace) -> Path | None:
     return options.save.resolve() if options.save else None
 
 
-def save(path: Path) -> None:
-    """Save the open file under `path`, whole or not at all, compressed if the opened file was.
+def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
+    """This bake as a manifest would say it."""
+    return BatchShot(
+        name="",
+        file=Path(bpy.data.filepath),
+        preset=options.preset or "",
+        frames=options.frames,
+        cell_size=options.cell_size,
+        settings=tuple(options.overrides),
+        save=None if options.in_place else target,
+        in_place=options.in_place,
+        report=Path(os.path.realpath(options.report)) if options.report else None,
+    )
+
+
+def _save_copy(path: Path) -> None:
+    """Save the open file under `path`, compressed if the opened file was.
 
     Raises
     ------
     InputError
-        If it could not be written; a file of that name is then as it was.
+        If it could not be written.
     """
-    with files.replacing(path) as partial:
-        try:
-            bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, compress=_is_compressed(bpy.data.filepath))
-        except RuntimeError as error:
-            raise InputError(f"'{path}' could not be saved: {str(error).strip()}") from None
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=_is_compressed(bpy.data.filepath))
+    except RuntimeError as error:
+        raise InputError(f"The baked shot could not be saved: {str(error).strip()}") from None
 
 
 def _is_compressed(path: str) -> bool:
@@ -194,7 +295,8 @@ class _Plain:
 
 
 def _json(progress: bake_job.Progress) -> None:
-    print(json.dumps({"stage": progress.stage, "fraction": round(progress.fraction, 4)}), flush=True)
+    fraction, overall = round(progress.fraction, 4), round(progress.overall, 4)
+    print(json.dumps({"stage": progress.stage, "fraction": fraction, "overall": overall}), flush=True)
 
 
 def _openjd(progress: bake_job.Progress) -> None:

@@ -182,8 +182,9 @@ def test_progress_comes_in_the_asked_style(shot, capfd, style):
         assert lines == []
     elif style == "json":
         seen = [json.loads(line) for line in lines]
-        assert [*dict.fromkeys(step["stage"] for step in seen)] == ["sample", "simulate", "write"]
-        assert seen[-1]["fraction"] == 1.0
+        assert [*dict.fromkeys(step["stage"] for step in seen)] == ["sample", "simulate", "write", "done"]
+        assert seen[-1]["overall"] == 1.0
+        assert seen[-1]["totals"]["steps"] >= 1
     elif style == "openjd":
         values = [float(line.split()[1]) for line in lines if line.startswith("openjd_progress: ")]
         assert values == sorted(values)

@@ -1,0 +1,97 @@
+"""What a bake has read and written, with checksums: how a later batch knows that a shot is done.
+
+The receipt of a bake is written when its results are whole under other names and before they take their own. So
+wherever a bake is killed, either the files on disk are those that the receipt names and the shot is done, or they are
+not and it is baked again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import files
+
+SCHEMA_VERSION = 1
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file's content."""
+    with path.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
+
+
+def checksums(paths: Iterable[Path]) -> dict[str, str]:
+    """SHA-256 of each of these files that can be read; "" for the others."""
+    sums = {}
+    for path in paths:
+        try:
+            sums[str(path)] = checksum(path)
+        except OSError:
+            sums[str(path)] = ""
+    return sums
+
+
+def write(
+    path: Path,
+    *,
+    made_by: str,
+    options: Sequence[str],
+    read: Mapping[str, str],
+    wrote: Mapping[str, str],
+    totals: Mapping[str, object],
+) -> None:
+    """Write the receipt of a bake.
+
+    Parameters
+    ----------
+    path : Path
+        Where it goes.
+    made_by : str
+        Versions of the programs that baked.
+    options : sequence of str
+        The bake as options of the command line.
+    read, wrote : mapping of path to SHA-256
+        The shot and what it links; the results.
+    totals : mapping
+        The bake in a few numbers.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    receipt = {
+        "schema_version": SCHEMA_VERSION,
+        "made_by": made_by,
+        "options": list(options),
+        "read": dict(read),
+        "wrote": dict(wrote),
+        "totals": dict(totals),
+    }
+    files.write_text(path, json.dumps(receipt, indent=2) + "\n")
+
+
+def totals_if_done(
+    path: Path, *, made_by: str, options: Sequence[str], source: Path, outputs: Iterable[Path]
+) -> dict[str, Any] | None:
+    """The totals of a bake whose results on disk are those of this very bake, by its receipt.
+
+    None if there is no receipt or it cannot be read, if the programs or the options are others, if the shot or a file
+    that it links has changed, or if a result is missing or is not what the bake wrote.
+    """
+    try:
+        receipt = json.loads(path.read_text(encoding="utf-8"))
+        if (receipt["schema_version"], receipt["made_by"]) != (SCHEMA_VERSION, made_by):
+            return None
+        read, wrote = dict(receipt["read"]), dict(receipt["wrote"])
+        if receipt["options"] != list(options) or str(source) not in read or set(wrote) != {str(p) for p in outputs}:
+            return None
+        kept = {name: digest for name, digest in read.items() if name not in wrote}  # a shot baked in place has changed
+        expected = kept | wrote
+        return dict(receipt["totals"]) if checksums(map(Path, expected)) == expected else None
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
