@@ -1,4 +1,4 @@
-"""A body for any rig that has none, such as an imported motion file: one rounded stick along each bone."""
+"""A body for any rig that has none, such as an imported motion file: a rounded stick along each bone."""
 
 from __future__ import annotations
 
@@ -16,14 +16,12 @@ _THICKEST = 0.034  # radius over the height of the rig
 
 def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collection) -> bpy.types.Object | None:
     """A mesh of sticks that follows the rig, each stick with the weight of its own bone only; None without bones."""
-    rest = armature.data
-    heads = np.array([bone.head_local for bone in rest.bones])
-    tails = np.array([bone.tail_local for bone in rest.bones])
-    if not len(heads):
+    lines = _lines(armature.data)
+    if not lines:
         return None
-    height = np.ptp(np.concatenate([heads, tails]), axis=0).max()
+    height = np.ptp(np.concatenate([line for _, *line in lines]), axis=0).max()
     vertices, faces, groups = [], [], []
-    for bone, head, tail in zip(rest.bones, heads, tails, strict=True):
+    for bone, head, tail in lines:
         length = np.linalg.norm(tail - head)
         if length < 1e-3 * height:
             continue
@@ -32,7 +30,7 @@ def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collectio
         first = len(vertices) * len(stick)
         vertices.append(stick)
         faces += (quads + first).tolist()
-        groups.append((bone.name, first, first + len(stick)))
+        groups.append((bone, range(first, first + len(stick))))
 
     mesh = bpy.data.meshes.new(f"{armature.name} Figure")
     mesh.from_pydata(np.concatenate(vertices).tolist(), [], faces)
@@ -40,11 +38,25 @@ def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collectio
     mesh.materials.append(_material())
     figure = bpy.data.objects.new(mesh.name, mesh)
     collection.objects.link(figure)
-    for name, first, last in groups:
-        figure.vertex_groups.new(name=name).add(range(first, last), 1.0, "REPLACE")
+    for bone in armature.data.bones:
+        figure.vertex_groups.new(name=bone.name)
+    for bone, stick in groups:
+        figure.vertex_groups[bone].add(stick, 1.0, "REPLACE")
     figure.parent = armature
     figure.modifiers.new("Armature", "ARMATURE").object = armature
     return figure
+
+
+def _lines(rest: bpy.types.Armature) -> list[tuple[str, Array, Array]]:
+    """What to draw, each with the bone that carries it: the bones, and what joins them where they do not touch."""
+    lines = []
+    for bone in rest.bones:
+        head, tail = np.array(bone.head_local), np.array(bone.tail_local)
+        lines.append((bone.name, head, tail))
+        if bone.parent:
+            ends = [np.array(bone.parent.head_local), np.array(bone.parent.tail_local)]
+            lines.append((bone.parent.name, min(ends, key=lambda end: float(np.linalg.norm(end - head))), head))
+    return lines
 
 
 def _stick(head: Array, tail: Array, head_radius: float, tail_radius: float) -> tuple[Array, NDArray[np.intp]]:
