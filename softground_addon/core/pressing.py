@@ -473,6 +473,7 @@ class Press:
             angle=self.material.repose_angle,
             cell_size=self.cell_size,
             fixed=fixed,
+            corner=(surface.window.row, surface.window.column),
             sweeps=sweeps,
         )
 

@@ -50,8 +50,8 @@ class PressureSlope:
         along_y = 1.0 + self.slope[:, 1:] * (y - self.middle[:, 1:])
         relative = along_x.astype(np.float32)[:, None, :] + along_y.astype(np.float32)[:, :, None]
         np.maximum(relative, 0.0, out=relative)
-        contact = np.einsum("nij->n", coverage)
-        pressed = np.einsum("nij,nij->n", relative, coverage)
+        contact = np.einsum("nij->n", coverage, dtype=np.float64)
+        pressed = np.einsum("nij,nij->n", relative, coverage, dtype=np.float64)
         scale = np.divide(contact, pressed, out=np.ones_like(pressed), where=pressed > 0)
         relative *= scale[:, None, None]
         return relative

@@ -23,18 +23,24 @@ AT_REST = 0.01
 """A slope is at rest when it is too steep by no more than this part of the angle's tangent."""
 
 
-def _pairs() -> tuple[tuple[tuple[slice, slice], tuple[slice, slice], float], ...]:
-    """Pairs of neighbours in eight disjoint sets: slices of the one and the other cell, how many cells apart."""
+Pair = tuple[tuple[slice, slice], tuple[slice, slice], float]
+"""Slices of the one and the other cells of many pairs, and how many cells apart they are."""
+
+
+def _pairs(row: int, column: int) -> tuple[Pair, ...]:
+    """Pairs of neighbours in eight disjoint sets, the same in the plane wherever a window starts."""
     whole, ahead, behind = slice(None), slice(1, None), slice(None, -1)
-    pairs = []
-    for first in (0, 1):
-        one, other = slice(first, -1, 2), slice(first + 1, None, 2)
-        pairs += [((whole, one), (whole, other), 1.0), ((one, whole), (other, whole), 1.0)]
-        pairs += [((one, behind), (other, ahead), sqrt(2.0)), ((one, ahead), (other, behind), sqrt(2.0))]
+    pairs: list[Pair] = []
+    for number in (0, 1):
+        (row_one, row_other), (column_one, column_other) = (
+            (slice(first, -1, 2), slice(first + 1, None, 2)) for first in ((number + row) % 2, (number + column) % 2)
+        )
+        pairs += [((whole, column_one), (whole, column_other), 1.0), ((row_one, whole), (row_other, whole), 1.0)]
+        pairs += [
+            ((row_one, behind), (row_other, ahead), sqrt(2.0)),
+            ((row_one, ahead), (row_other, behind), sqrt(2.0)),
+        ]
     return tuple(pairs)
-
-
-_PAIRS = _pairs()
 
 
 def slide_reach(rim: Array, compression: Array, angle: float, cell_size: float) -> int:
@@ -51,6 +57,7 @@ def slid(
     angle: float,
     cell_size: float,
     fixed: Mask,
+    corner: tuple[int, int] = (0, 0),
     sweeps: int = SWEEPS_TO_REST,
 ) -> Array:
     """The rim after what is steeper than the angle of repose has slid down.
@@ -69,6 +76,8 @@ def slid(
         Side of a cell [m].
     fixed : (rows, columns) bool array
         Cells that nothing leaves or enters: under a sole, off the ground.
+    corner : tuple of int
+        Row and column of the first cell in the plane, so that the same cells pair up whatever the window.
     sweeps : int
         Most sweeps; fewer where the ground comes to rest earlier.
 
@@ -81,7 +90,7 @@ def slid(
     base = ground - compression
     steepest = tan(angle) * cell_size
     pairs = []
-    for one, other, distance in _PAIRS:
+    for one, other, distance in _pairs(*corner):
         rest = np.maximum(np.abs(ground[one] - ground[other]), steepest * distance)
         rest[fixed[one] | fixed[other]] = np.inf
         pairs.append((one, other, base[one] - base[other], rest))

@@ -208,6 +208,8 @@ class Simulation:
                 active.remove(stance)
                 if not (more_follows and stance in self._open.values()):
                     ended.append(stance)
+            for stance in ended:
+                changed += self._press.settle(stance, frame)
             self._step = int(end)
             yield FrameResult(
                 frame,
