@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ class MeshTerrain:
         Where each bin's triangles start in `members`.
     members : (M,) int array
         Triangles by bin.
+    values : (T, 3, C) float array
+        What is said of the triangles' corners, if anything.
     """
 
     corners: Array
@@ -46,9 +49,12 @@ class MeshTerrain:
     shape: Indices
     first: Indices
     members: Indices
+    values: Array
 
     @classmethod
-    def from_mesh(cls, vertices: Array, triangles: Indices, bounds: Array | None = None) -> MeshTerrain:
+    def from_mesh(
+        cls, vertices: Array, triangles: Indices, bounds: Array | None = None, values: Array | None = None
+    ) -> MeshTerrain:
         """Bin the triangles of a mesh.
 
         Parameters
@@ -59,6 +65,8 @@ class MeshTerrain:
             Corners of each triangle, counter-clockwise from outside.
         bounds : (2, 2) float array, optional
             Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
+        values : (V, C) float array, optional
+            What is said of the vertices, to be interpolated between them.
 
         Raises
         ------
@@ -72,7 +80,8 @@ class MeshTerrain:
         corners = vertices[triangles].astype(np.float64)
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
-        corners = corners[normal[:, 2] > UPWARD * np.maximum(length, 1e-300)]
+        upward = normal[:, 2] > UPWARD * np.maximum(length, 1e-300)
+        corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(
                 "The ground has no face that looks upward under the character's path: move it under the feet, or "
@@ -92,25 +101,36 @@ class MeshTerrain:
         bin_index = bin_y * shape[0] + bin_x
         order = np.argsort(bin_index, kind="stable")
         first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
-        return cls(corners, origin, size, shape, first, triangle[order])
+        of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
+        return cls(corners, origin, size, shape, first, triangle[order], of_corners)
 
     def heights(self, x: Array, y: Array) -> Array:
         """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
-        point, z = self._surfaces(np.ravel(x), np.ravel(y))
+        hits = self._surfaces(np.ravel(x), np.ravel(y))
         highest = np.full(np.size(x), -np.inf)
-        np.maximum.at(highest, point, z)
+        np.maximum.at(highest, hits.point, hits.z)
         return np.where(np.isinf(highest), np.nan, highest).reshape(np.shape(x))
+
+    def interpolated(self, x: Array, y: Array) -> Array:
+        """The values of the highest upward-facing surface at each place, (C, ...); NaN where there is none."""
+        hits = self._surfaces(np.ravel(x), np.ravel(y))
+        order = np.argsort(hits.z, kind="stable")  # the highest is written last
+        a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
+        u, v = hits.u[order, None], hits.v[order, None]
+        values = np.full((np.size(x), self.values.shape[2]), np.nan)
+        values[hits.point[order]] = a + u * (b - a) + v * (c - a)
+        return values.T.reshape(-1, *np.shape(x))
 
     def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Whether no second upward-facing surface lies below the highest one, for each place."""
-        point, z = self._surfaces(np.ravel(x), np.ravel(y))
+        hits = self._surfaces(np.ravel(x), np.ravel(y))
         top = self.heights(np.ravel(x), np.ravel(y))
         single = np.ones(np.size(x), dtype=bool)
-        single[point[z < top[point] - SAME_LAYER]] = False
+        single[hits.point[hits.z < top[hits.point] - SAME_LAYER]] = False
         return single.reshape(np.shape(x))
 
-    def _surfaces(self, x: Array, y: Array) -> tuple[Indices, Array]:
-        """Every (point, height) pair where a triangle lies over or under a point."""
+    def _surfaces(self, x: Array, y: Array) -> _Hits:
+        """Every pair of a point and a triangle that lies over or under it."""
         place = np.stack([x, y], axis=-1)
         at_bin = np.floor((place - self.origin) / self.bin_size)
         inside = np.flatnonzero(((at_bin >= 0) & (at_bin < self.shape)).all(axis=1))
@@ -127,7 +147,17 @@ class MeshTerrain:
         v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
         on_edge = 1e-9  # points on a shared edge belong to both triangles; without slack they could fall between
         hit = (u >= -on_edge) & (v >= -on_edge) & (u + v <= 1 + on_edge)
-        return point[hit], (a[:, 2] + u * ab[:, 2] + v * ac[:, 2])[hit]
+        return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a[:, 2] + u * ab[:, 2] + v * ac[:, 2])[hit])
+
+
+class _Hits(NamedTuple):
+    """Points and the triangles over or under them: place on the triangle a + u·(b - a) + v·(c - a), and its height."""
+
+    point: Indices
+    triangle: Indices
+    u: Array
+    v: Array
+    z: Array
 
 
 def _expand(counts: Indices) -> tuple[Indices, Indices]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .heightfield import SampledGrid, Window
+from .terrain import MeshTerrain
 
 Array = NDArray[np.float64]
 
@@ -23,6 +25,23 @@ class Variation(Protocol):
     def factors(self, x: Array, y: Array) -> Array:
         """Factors at world positions [m], (3, ...) in the order of `CHANNELS`; 1 is as the material says."""
         ...
+
+
+@dataclass(frozen=True)
+class PaintedSurface:
+    """Factors as painted on the vertices of a mesh, interpolated over its triangles.
+
+    Attributes
+    ----------
+    surface : MeshTerrain
+        With the factors as its values, in the order of `CHANNELS`.
+    """
+
+    surface: MeshTerrain
+
+    def factors(self, x: Array, y: Array) -> Array:
+        """Factors at world positions [m], (3, ...); NaN off the surface."""
+        return self.surface.interpolated(x, y)
 
 
 class Factors(NamedTuple):

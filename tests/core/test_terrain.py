@@ -65,3 +65,28 @@ def test_a_ground_that_faces_down_is_refused_with_the_remedy():
     vertices, triangles = slab(0.0)
     with pytest.raises(InputError, match="recalculate its normals"):
         MeshTerrain.from_mesh(vertices, triangles[:2, ::-1])
+
+
+def test_values_of_vertices_are_interpolated_as_scipy_does():
+    random = np.random.default_rng(5)
+    vertices = random.uniform(-1, 1, (200, 3)) * [1, 1, 0.1]
+    values = random.uniform(0, 3, (200, 2))
+    delaunay = Delaunay(vertices[:, :2])
+    triangles = counter_clockwise(vertices, delaunay.simplices.astype(np.intp))
+    terrain = MeshTerrain.from_mesh(vertices, triangles, values=values)
+    x, y = random.uniform(-1.2, 1.2, (2, 20, 20))
+    expected = np.moveaxis(LinearNDInterpolator(delaunay, values)(x, y), -1, 0)
+    found = terrain.interpolated(x, y)
+    on_ground = np.isfinite(terrain.heights(x, y))
+    assert found.shape == (2, 20, 20)
+    assert np.allclose(found[:, on_ground], expected[:, on_ground])
+    assert np.isnan(found[:, ~on_ground]).all()
+
+
+def test_where_surfaces_lie_one_above_the_other_the_values_are_those_of_the_highest():
+    (v1, t1), (v2, t2) = slab(0.0), slab(3.0)
+    values = np.repeat([[1.0], [2.0]], 8, axis=0)
+    for order in (1, -1):
+        triangles = np.concatenate([t1, t2 + len(v1)][::order])
+        terrain = MeshTerrain.from_mesh(np.concatenate([v1, v2 * [0.5, 1, 1]]), triangles, values=values)
+        assert np.array_equal(terrain.interpolated(np.array([0.5, 1.5]), np.array([1.0, 1.0])), [[2.0, 1.0]])
