@@ -109,10 +109,28 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     stored = mesh.get(ground_mesh.RECORD)
     if stored is None:
         raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
-    if not isinstance(stored, bytes):
+    try:
+        content = bytes(memoryview(stored))
+    except TypeError:
         raise InputError(
             f"The stored record of the footprints on '{ground.name}' was replaced by something else: clear the bake "
             "and bake again."
-        )
-    footprints, about = record.load(stored)
+        ) from None
+    footprints, about = record.load(content)
     return footprints, dict(about)
+
+
+def blur_sigma_of(about: dict[str, Any]) -> float:
+    """Standard deviation of the display blur that a bake was made with [m].
+
+    Raises
+    ------
+    InputError
+        If the record does not say.
+    """
+    try:
+        return float(about["inputs"]["material"]["blur_sigma"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            "The stored record of the footprints lacks its material: clear the bake and bake again."
+        ) from None

@@ -333,7 +333,9 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
         whole[index] = values
         attribute = mesh.attributes.get(name) or _add_attribute(mesh, name, "FLOAT")
         attribute.data.foreach_set("value", whole)
-    mesh[RECORD] = record
+    # Numbers, not bytes: Blender's Alembic exporter ends the program on bytes that hold a zero.
+    mesh.pop(RECORD, None)  # an array that is there would keep its length
+    mesh[RECORD] = np.frombuffer(record + bytes(-len(record) % 4), dtype=np.int32)
     write_positions(mesh, raw)
 
 
@@ -341,6 +343,17 @@ def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     """World up in the ground's own space and units, of the length of one metre, (3,)."""
     up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
     return up
+
+
+def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
+    """Positions of the finished ground as it is shown, (V, 3) in the object's own space and units."""
+    mesh = mesh_of(ground)
+    key = mesh.shape_keys.key_blocks.get(DISPLAY_KEY) if mesh.shape_keys else None
+    if key is None:
+        return _positions(mesh)
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    key.points.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
 
 
 def restore(ground: bpy.types.Object) -> None:

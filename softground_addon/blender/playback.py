@@ -77,8 +77,23 @@ def remove(ground: bpy.types.Object) -> None:
             bpy.data.node_groups.remove(group)
     mesh = cast("bpy.types.Mesh", ground.data)
     for name in [attribute.name for attribute in mesh.attributes]:
-        if name in (nodes.VISITED, nodes.PRESSURE) or name.rpartition("_")[0] in _PREFIXES:
+        if is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
+
+
+def is_playback_attribute(name: str) -> bool:
+    """Whether an attribute of this name belongs to the playback."""
+    return name in (nodes.VISITED, nodes.PRESSURE) or name.rpartition("_")[0] in _PREFIXES
+
+
+def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
+    """Vertices that the playback moves, (K,)."""
+    attribute: Any = mesh.attributes.get(numbered(nodes.MOVES, 0))
+    if attribute is None:
+        return np.zeros(0, dtype=np.intp)
+    moves = np.empty(len(attribute.data), dtype=bool)
+    attribute.data.foreach_get("value", moves)
+    return np.flatnonzero(moves)
 
 
 def _write_ramps(mesh: bpy.types.Mesh, index: Indices, histories: Histories) -> int:

@@ -19,7 +19,7 @@ def replacing(path: Path) -> Iterator[Path]:
     InputError
         If the folder is missing or cannot be written, or the disk is full. `path` is then as it was.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
     try:
         yield partial
         with partial.open("rb") as written:

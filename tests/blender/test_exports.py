@@ -1,0 +1,211 @@
+"""The bake in other programs' formats: written from the record, read back, compared with it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, playback
+from softground_addon.core import point_cache
+from softground_addon.core.errors import InputError
+from softground_addon.core.pressed_ground import PressedGround
+from softground_addon.core.ramps import TOLERANCE
+from tests.blender import shots
+from tests.blender.test_bake import plane
+
+FRAMES = (10, 40)
+
+
+@pytest.fixture
+def ground(scene):
+    """A baked plane of four vertices, with detail along the trail."""
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    ground = scene.softground.ground = plane(scene, vertices=2)
+    layer = ground.data.uv_layers.new(name="UVMap")
+    corners = np.array([ground.data.vertices[loop.vertex_index].co[:2] for loop in ground.data.loops])
+    layer.uv.foreach_set("vector", (corners / 7.0 + 0.5).astype(np.float32).ravel())
+    scene.softground.frame_end = 72
+    bpy.context.view_layer.update()
+    bake_job.run(bake_job.bake(scene))
+    return ground
+
+
+def recorded(ground, frame, x, y):
+    """Displayed height, compression and rim at places, from the record."""
+    footprints, about = baked_ground.load(ground)
+    whole = PressedGround.at(
+        footprints, frame=frame, frame_rate=24.0, cell_size=0.01, blur_sigma=baked_ground.blur_sigma_of(about)
+    )
+    return whole.sample(x, y)
+
+
+def positions(mesh):
+    values = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", values)
+    return values.reshape(-1, 3)
+
+
+def played(thing, frame):
+    bpy.context.scene.frame_set(frame)
+    shown = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    matrix = np.array(shown.matrix_world)
+    return positions(shown.data) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def assert_stands_as_recorded(ground, frame, world, tolerance=TOLERANCE):
+    sample = recorded(ground, frame, world[:, 0].astype(float), world[:, 1].astype(float))
+    assert sample.display.min() < -0.01
+    assert np.abs(world[:, 2] - sample.display).max() <= tolerance + 2e-6
+
+
+def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
+    path = tmp_path / "ground.pc2"
+    exports.export_point_cache(scene, ground, path, *FRAMES)
+    start, samples = point_cache.read(path)
+    assert (start, len(samples)) == (FRAMES[0], FRAMES[1] - FRAMES[0] + 1)
+    for frame in (10, 25, 40):
+        assert_stands_as_recorded(ground, frame, samples[frame - FRAMES[0]])
+
+
+def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, ground, tmp_path):
+    path = tmp_path / "ground.pc2"
+    exports.export_point_cache(scene, ground, path, *FRAMES)
+    carrier = baked_ground.carrier_of(ground)
+    native = {frame: played(carrier, frame) for frame in (25, 40)}
+    exports.use_point_cache(ground, path, FRAMES[0])
+    assert not playback.modifier_of(carrier).show_viewport
+    for frame in (25, 40):
+        np.testing.assert_allclose(played(carrier, frame), native[frame], atol=2e-6)
+
+
+def import_and_select(operator, path, **options):
+    before = set(bpy.data.objects)
+    operator(filepath=str(path), **options)
+    return next(thing for thing in set(bpy.data.objects) - before if thing.type == "MESH")
+
+
+def test_alembic_holds_the_moving_ground(scene, ground, tmp_path):
+    path = tmp_path / "ground.abc"
+    exports.export_alembic(scene, ground, path, *FRAMES)
+    copy = import_and_select(bpy.ops.wm.alembic_import, path, as_background_job=False)
+    for frame in (12, 25, 40):
+        assert_stands_as_recorded(ground, frame, played(copy, frame))
+
+
+def test_usd_holds_the_moving_ground_and_its_shading(scene, ground, tmp_path):
+    path = tmp_path / "ground.usdc"
+    exports.export_usd(scene, ground, path, *FRAMES)
+    copy = import_and_select(bpy.ops.wm.usd_import, path)
+    for frame in (12, 25, 40):
+        assert_stands_as_recorded(ground, frame, played(copy, frame))
+    assert "softground_compression" in copy.data.attributes
+
+
+@pytest.mark.parametrize("export", [exports.export_alembic, exports.export_usd])
+def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_path, export):
+    scene.frame_set(7)
+    bpy.context.view_layer.objects.active = scene.objects["Walker"]
+    scene.objects["Walker"].select_set(True)
+    frames = (scene.frame_start, scene.frame_end)
+    export(scene, ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
+    assert [thing.name for thing in bpy.context.selected_objects] == ["Walker"]
+    assert bpy.context.view_layer.objects.active.name == "Walker"
+    assert (scene.frame_start, scene.frame_end, scene.frame_current) == (*frames, 7)
+
+
+def read_image(path):
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"
+    values = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
+    image.pixels.foreach_get(values)
+    assert image.is_float
+    return values.reshape(image.size[1], image.size[0], 4)
+
+
+def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):
+    resolution = 512
+    paths = exports.export_images(scene, ground, tmp_path, 24, 25, resolution=resolution)
+    assert sorted(path.name for path in paths) == [
+        f"Field_{name}_{frame:04d}.exr" for name in ("displacement", "mask") for frame in (24, 25)
+    ]
+    centre = ((np.arange(resolution) + 0.5) / resolution - 0.5) * 7.0
+    x, y = (values.ravel() for values in np.meshgrid(centre, centre))
+    for frame in (24, 25):
+        sample = recorded(ground, frame, x, y)
+        shape = (resolution, resolution)
+        height = read_image(tmp_path / f"Field_displacement_{frame:04d}.exr")
+        assert np.abs(height[..., 0] - sample.display.reshape(shape)).max() <= TOLERANCE + 2e-6
+        mask = read_image(tmp_path / f"Field_mask_{frame:04d}.exr")
+        assert np.abs(mask[..., 0] - sample.compression.reshape(shape)).max() <= 1e-3
+        assert np.abs(mask[..., 1] - sample.rim.reshape(shape)).max() <= 1e-3 + TOLERANCE
+        np.testing.assert_allclose(mask[..., 2], sample.age.reshape(shape), atol=1e-5)
+
+
+def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground):
+    carrier = baked_ground.carrier_of(ground)
+    still = exports.final_mesh(scene, ground)
+    assert not still.modifiers
+    assert still.data.shape_keys is None
+    assert not list(still.data.keys())
+    assert {name for name in still.data.attributes.keys() if name.startswith("softground")} == {  # noqa: SIM118
+        "softground_compression",
+        "softground_rim",
+        "softground_age",
+    }
+    assert_stands_as_recorded(ground, 1e9, played(still, 1), tolerance=0.0)
+    assert ground_mesh.is_baked(carrier)
+
+
+def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
+    ground = plane(scene)
+    for export in (
+        lambda: exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2),
+        lambda: exports.export_alembic(scene, ground, tmp_path / "x.abc", 1, 2),
+        lambda: exports.export_usd(scene, ground, tmp_path / "x.usdc", 1, 2),
+        lambda: exports.export_images(scene, ground, tmp_path, 1, 2),
+        lambda: exports.final_mesh(scene, ground),
+    ):
+        with pytest.raises(InputError, match=r"no bake on ground 'Field'.*Bake Footprints"):
+            export()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("spoil", ["cut", "text", "bits"])
+def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, tmp_path, spoil):
+    mesh = ground_mesh.mesh_of(baked_ground.carrier_of(ground))
+    stored = bytes(mesh[ground_mesh.RECORD])
+    del mesh[ground_mesh.RECORD]
+    mesh[ground_mesh.RECORD] = {
+        "cut": np.frombuffer(stored[: len(stored) // 8 * 4], dtype=np.int32),
+        "text": "hello",
+        "bits": np.frombuffer(stored[:200] + bytes(64) + stored[264:], dtype=np.int32),
+    }[spoil]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scene = bpy.context.scene
+    ground = scene.softground.ground
+    assert played(baked_ground.carrier_of(ground), 60)[:, 2].min() < -0.01
+    with pytest.raises(InputError, match=r"damaged|replaced"):
+        exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2)
+    bpy.ops.softground.clear_bake()
+    assert not ground.hide_viewport
+
+
+def test_a_shorter_bake_leaves_nothing_of_the_longer_record(scene, ground):
+    longer, _ = baked_ground.load(ground)
+    scene.softground.frame_end = 30
+    bake_job.run(bake_job.bake(scene))
+    shorter, _ = baked_ground.load(ground)
+    assert 0 < len(shorter) < len(longer)
+    assert max(print_.end_frame for print_ in shorter) <= 30
+
+
+def test_a_point_cache_that_is_cut_short_is_refused(tmp_path):
+    path = tmp_path / "cut.pc2"
+    point_cache.write(path, [np.zeros((4, 3))] * 3, start_frame=1, points=4, count=3)
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(InputError, match="cut short"):
+        point_cache.read(path)
+    (tmp_path / "no.pc2").write_bytes(b"nothing")
+    with pytest.raises(InputError, match="no PC2"):
+        point_cache.read(tmp_path / "no.pc2")
