@@ -87,7 +87,7 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
             "as_background_job": False,
             "export_custom_properties": False,
         }
-        _run(bpy.ops.wm.alembic_export, partial, path, check_existing=False, **options)
+        _run(bpy.ops.wm.alembic_export, partial, path, **options)
 
 
 def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
