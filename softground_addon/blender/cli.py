@@ -7,7 +7,6 @@ import argparse
 import contextlib
 import json
 import os
-import re
 import signal
 import sys
 import threading
@@ -19,7 +18,7 @@ import bpy
 
 from ..core import files, presets, receipts, report
 from ..core.errors import BakeError, InputError, SoftGroundError
-from ..core.manifest import BatchShot
+from ..core.manifest import BatchShot, frame_range
 from . import bake_job, batch, settings
 from .character_setup import set_up_automatically
 
@@ -125,10 +124,10 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
 
 
 def _frame_range(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
-    if not match:
-        raise argparse.ArgumentTypeError(f"'{text}' is no frame range like 1-250")
-    return int(match[1]), int(match[2])
+    try:
+        return frame_range(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _override(text: str) -> tuple[str, str]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -176,6 +177,14 @@ def chosen(shots: tuple[BatchShot, ...], wanted: list[str]) -> tuple[BatchShot, 
         known = ", ".join(shot.name for shot in shots[:20]) + (" ..." if len(shots) > 20 else "")
         raise InputError(f"There is no shot '{unknown[0]}'. There are {len(shots)}: {known}.")
     return tuple(shots[number] for number in sorted({numbers[name] for name in wanted}))
+
+
+def frame_range(text: str) -> tuple[int, int]:
+    """First and last frame from a text such as 1-250; ValueError for any other."""
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
+    if not match:
+        raise ValueError(f"'{text}' is no frame range like 1-250")
+    return int(match[1]), int(match[2])
 
 
 def is_file(path: Path) -> bool:
