@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .contacts import runs
 from .motion import Sole, SoleMotion, SolePatch
-from .rigid import displacement, rotation
+from .rigid import carried, displacement, rotation
 from .slopes import fitted_slope, smoothed, upper_envelope
 
 Array = NDArray[np.float64]
@@ -26,6 +26,9 @@ POINTS_ALONG = 9
 """Points along a sole at which the ground is read."""
 ALIGN_TIME = 0.05
 """Standard deviation of the smoothing of a foot's turn over time [s], for an adult."""
+STEEPEST_LIFT = 2.5
+"""A standing foot is let down no faster than this [m/s], for an adult: one that slides over the edge of an old print
+does not fall into it."""
 CLEAR_TIME = 0.10
 """Half the time over which a swinging foot is lifted over what is in its way [s], for an adult."""
 
@@ -108,6 +111,7 @@ def place_sole(
     time_scale: float = 1.0,
     align: float = 1.0,
     lock: float = 0.0,
+    heel_rise: Array | None = None,
 ) -> Placement:
     """Put a sole on the ground.
 
@@ -131,6 +135,8 @@ def place_sole(
         How much of the slope the foot takes on, 0 to 1.
     lock : float
         How much of the source's sliding during a contact is taken out, 0 to 1.
+    heel_rise : (F,) float array, optional
+        Angle by which the foot rolls further over its toes [rad].
 
     Returns
     -------
@@ -148,14 +154,25 @@ def place_sole(
         align
         * _alignment(motion, points + slide[:, None], touching, ground, undisturbed, frames, ALIGN_TIME * per_second)
     )
-    turned = np.einsum("fij,fqj->fqi", turn, points - centre[:, None]) + (centre + slide)[:, None]
+    carry = displacement(turn, centre, centre + slide)
+    if heel_rise is not None:
+        across = (turn @ motion.transforms[:, 0, :3, 1, None])[..., 0]
+        toes = carried(carry, points[:, _foremost(motion, points)])
+        carry = displacement(rotation(heel_rise[:, None] * across), toes, toes) @ carry
+    turned = carried(carry[:, None], points)
     needed = -lowest_clearance(turned, ground, frames)
-    lift = _between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching)
+    steepest = STEEPEST_LIFT * time_scale / frame_rate
+    lift = _between_contacts(_let_down(np.where(np.isfinite(needed), needed, 0.0), touching, steepest), touching)
     lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * per_second)))
-    moved = slide + lift[:, None] * (0.0, 0.0, 1.0)
+    carry[:, 2, 3] += lift
     on_top = -lowest_clearance(turned, undisturbed, frames)
     sinkage = np.maximum(np.where(touching & np.isfinite(on_top), on_top - needed, 0.0), 0.0)
-    return Placement(displacement(turn, centre, centre + moved), lift, sinkage)
+    return Placement(carry, lift, sinkage)
+
+
+def _foremost(motion: SoleMotion, points: Array) -> int:
+    """Which of the points (F, Q, 3) lies farthest toward the toes."""
+    return int(((points[0] - motion.transforms[0, 0, :3, 3]) @ motion.transforms[0, 0, :3, 0]).argmax())
 
 
 def slide_offset(points: Array, touching: Mask) -> Array:
@@ -221,6 +238,18 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
         if to_terrain[first:end].min() < to_level[first:end].min():
             posed[first:end] = terrain[first:end]
     return posed
+
+
+def _let_down(values: Array, touching: Mask, steepest: float) -> Array:
+    """Values (F,) that are nowhere lower and, within a contact, fall and rise by no more than `steepest` per sample."""
+    result = values.copy()
+    for first, end in zip(*runs(touching), strict=True):
+        slope = steepest * np.arange(end - first)
+        part = values[first:end]
+        after = np.maximum.accumulate(part + slope) - slope
+        before = np.maximum.accumulate(part[::-1] + slope)[::-1] - slope[::-1]
+        result[first:end] = np.maximum(after, before)
+    return result
 
 
 def _between_contacts(values: Array, touching: Mask) -> Array:

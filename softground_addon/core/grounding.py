@@ -28,8 +28,16 @@ HIPS_TIME = 0.10
 """Standard deviation of the smoothing of the hips' height over time [s], for an adult."""
 LOAD_TIME = 0.05
 """Standard deviation of the passing of weight from foot to foot [s], for an adult."""
+HEEL_TIME = 0.06
+"""Time before and after in which a heel rises to what the leg can reach [s], for an adult."""
+NEAR_ENOUGH = 0.002
+"""What a leg may be short of without rolling over the toes, in leg lengths."""
 REACH_TIME = 0.15
 """Time before and after in which the hips come down to what the legs can reach [s], for an adult."""
+HEEL_RISE = np.radians(35.0)
+"""A foot rolls over its toes by at most so much further than in the source before the hips come down [rad]."""
+BEHIND = 0.15
+"""A foot this far behind its hip rolls over its toes as far as it needs, one below or before it not, in leg lengths."""
 COMFORTABLE_REACH = 0.985
 """A leg may stretch so far, over its length, or as far as in the source where that is more."""
 
@@ -168,15 +176,7 @@ def settle(
         How much deeper the hips go by choice [m].
     """
     count = len(motion.frames)
-    hips = hips_of(motion)
-    height = hips_follow(motion, dict(placements.values()), touching)
-    if crouch is not None:
-        height = height - crouch
-    turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(count)], axis=-1))
-    pivot = hips - (0.0, 0.0, motion.leg_length)
-    tilted = displacement(turn, pivot, pivot)
-    raised = np.zeros((count, 3))
-    raised[:, 2] = height
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
     legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
     ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
     short = np.zeros(count)
@@ -194,6 +194,55 @@ def settle(
         foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
         responses[side] = LegResponse(solved.thigh, solved.shank, foot)
     return Response(motion.frames, body, responses, lean, np.zeros(count))
+
+
+def heel_rises(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    *,
+    crouch: Array | None = None,
+) -> dict[str, Array]:
+    """How far each foot that trails rolls over its toes to stay in reach (F,) [rad], by side; see `settle`."""
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
+    trial = np.linspace(0.0, HEEL_RISE, 8)
+    width = round(HEEL_TIME * motion.frame_rate * time_scale(motion))
+    rises = {}
+    for side, (sole, placement) in placements.items():
+        leg = leg_of(motion, side, sole)
+        hip, ankle = carried(tilted, leg.hip) + raised, carried(placement.carry, leg.ankle)
+        foot = placement.carry[:, :3, :3] @ motion.soles[sole].transforms[:, 0, :3, :3]
+        toes = carried(placement.carry, motion.soles[sole].landmark_positions()[:, -1])
+        short = np.stack(
+            [
+                _out_of_reach(leg, hip, carried(displacement(rotation(angle * foot[..., 1]), toes, toes), ankle))
+                for angle in trial
+            ]
+        )
+        enough = short <= NEAR_ENOUGH * motion.leg_length
+        angle = trial[np.where(enough.any(axis=0), enough.argmax(axis=0), short.argmin(axis=0))]
+        level = foot[:, :2, 0] / np.maximum(np.linalg.norm(foot[:, :2, 0], axis=1, keepdims=True), 1e-9)
+        behind = np.sum((hip - ankle)[:, :2] * level, axis=1) / (BEHIND * motion.leg_length)
+        rises[side] = smoothed(upper_envelope(angle * np.clip(behind, 0.0, 1.0), width), width / 2)
+    return rises
+
+
+def _hips_moved(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    crouch: Array | None,
+) -> tuple[Array, Array]:
+    """The body's tilt about the ground below the hips (F, 4, 4), and how far the hips move after it (F, 3) [m]."""
+    raised = np.zeros((len(motion.frames), 3))
+    raised[:, 2] = hips_follow(motion, dict(placements.values()), touching)
+    if crouch is not None:
+        raised[:, 2] -= crouch
+    turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(len(lean))], axis=-1))
+    pivot = hips_of(motion) - (0.0, 0.0, motion.leg_length)
+    return displacement(turn, pivot, pivot), raised
 
 
 def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:

@@ -12,7 +12,7 @@ from .contacts import detect_contacts
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
 from .footprints import Footprint
 from .ground_history import GroundHistory
-from .grounding import Response, hips_of, leg_soles, responding, settle, time_scale
+from .grounding import Response, heel_rises, hips_of, leg_soles, responding, settle, time_scale
 from .heightfield import FlatTerrain, Terrain
 from .motion import CharacterMotion
 from .slopes import fitted_slope, smoothed
@@ -105,26 +105,31 @@ def respond(
     history = GroundHistory(terrain, footprints)
     undisturbed = GroundHistory(terrain)
     feet = leg_soles(motion)
-    placements = {}
-    for side, sole in feet.items():
-        if grounding is None:
-            placement = _unmoved(len(motion.frames))
-        else:
-            placement = place_sole(
-                motion.soles[sole],
-                touching[:, sole],
-                history,
-                undisturbed,
-                motion.frames,
-                frame_rate=motion.frame_rate,
-                time_scale=time_scale(motion),
-                align=grounding.align,
-                lock=grounding.lock,
-            )
-        placements[side] = (sole, placement)
     leaning = np.zeros((len(motion.frames), 2))
     if tilt is not None:
         leaning = tilt.strength * _lean(motion, touching, history, tilt)
+    if grounding is None:
+        placements = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
+        return settle(motion, placements, touching, leaning)
+
+    def placed(side: str, heel_rise: Array | None) -> tuple[int, Placement]:
+        sole = feet[side]
+        return sole, place_sole(
+            motion.soles[sole],
+            touching[:, sole],
+            history,
+            undisturbed,
+            motion.frames,
+            frame_rate=motion.frame_rate,
+            time_scale=time_scale(motion),
+            align=grounding.align,
+            lock=grounding.lock,
+            heel_rise=heel_rise,
+        )
+
+    placements = {side: placed(side, None) for side in feet}
+    rises = heel_rises(motion, placements, touching, leaning)
+    placements |= {side: placed(side, rise) for side, rise in rises.items() if rise.any()}
     return settle(motion, placements, touching, leaning)
 
 
@@ -223,6 +228,10 @@ def _fits_better(motion: CharacterMotion, level: float, terrain: Terrain) -> boo
 
 
 def at_scene_frames(touching: Mask, frames: Array, motion: CharacterMotion) -> Mask:
-    """States (N, S) of the simulation's time grid at the scene frames of a motion, (F, S)."""
-    index = np.searchsorted(frames, motion.frames - 1e-6)
-    return np.asarray(touching[np.minimum(index, len(frames) - 1)])
+    """States (N, S) of the simulation's time grid at the scene frames of a motion, (F, S).
+
+    A sole that leaves within the half frame after a scene frame is seen leaving at it.
+    """
+    ahead = np.array([0.0, 0.5 * motion.time_step * motion.frame_rate])
+    index = np.searchsorted(frames, motion.frames[:, None] + ahead - 1e-6)
+    return np.asarray(touching[np.minimum(index, len(frames) - 1)].all(axis=1))
