@@ -88,14 +88,25 @@ class Hand:
         self.region().tag_redraw()
         yield 0.5
 
-    def find_button(self, operator: str, offset: float = 0.5) -> Any:
+    def middle(self) -> tuple[int, int]:
+        """A place in the viewport, beside the panels."""
+        region = self.region("WINDOW")
+        return region.x + region.width // 3, region.y + region.height // 3
+
+    def frame_all(self) -> Steps:
+        """Show all objects in the viewport."""
+        with bpy.context.temp_override(window=self.window, area=self.area(), region=self.region("WINDOW")):
+            bpy.ops.view3d.view_all()
+        yield 0.5
+
+    def find_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Any:
         """Place of the button that runs an operator, by what Ctrl-C copies from it; None where there is none.
 
         A generator like the others: `place = yield from hand.find_button(...)`.
         """
         region = self.region()
         x = region.x + int(region.width * offset)
-        for y in range(region.y + region.height - ROW, region.y, -ROW):
+        for y in range(below or region.y + region.height - ROW, region.y, -ROW):
             bpy.context.window_manager.clipboard = ""
             yield from self.move(x, y)
             yield from self.key("C", ctrl=True)
@@ -103,8 +114,8 @@ class Hand:
                 return x, y
         return None
 
-    def press_button(self, operator: str, offset: float = 0.5) -> Steps:
-        place = yield from self.find_button(operator, offset)
+    def press_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Steps:
+        place = yield from self.find_button(operator, offset, below=below)
         if place is None:
             raise LookupError(f"there is no button for {operator} in the sidebar")
         yield from self.click(*place)

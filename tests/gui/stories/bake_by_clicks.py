@@ -1,14 +1,90 @@
-from tests.gui.shot import open_walk
+"""From an animated rig to prints in two clicks; undo, redo, Esc and Cancel in the middle; save and open again."""
+
+from __future__ import annotations
+
 import bpy
-def tell(hand, facts):
-    open_walk()
+
+from tests.blender import fingerprints
+from tests.gui import meter
+from tests.gui.hand import Hand, Steps
+from tests.gui.shot import open_walk
+
+FRAMES = 250
+
+
+def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
+    bpy.utils.register_class(meter.TEST_OT_pauses)
+    open_walk(FRAMES)
     yield from hand.open_sidebar()
-    yield from hand.picture("panel_first")
+    yield from hand.frame_all()
+    yield from hand.picture("panel_start")
+
     yield from hand.press_button("softground.add_character")
-    facts["characters"] = len(bpy.context.scene.softground.characters)
-    yield from hand.picture("panel_added")
-    yield from hand.press_button("softground.bake")
-    yield 0.3
-    yield from hand.picture("baking")
-    yield from hand.wait_for(lambda: bpy.context.scene.softground.ground is not None, 60)
-    yield from hand.picture("baked")
+    facts["characters"] = [character.name for character in scene().softground.characters]
+    facts["soles"] = [sole.name for sole in scene().softground.characters[0].soles]
+    yield from hand.picture("panel_character")
+
+    button = yield from hand.find_button("softground.bake")
+    before = fingerprints.of_file()
+    for way_out in ("escape", "cancel"):
+        yield from hand.click(*button)
+        yield from hand.wait_for(lambda: session().progress > 0.1, 30)
+        facts[f"{way_out}: baking"] = session().is_baking
+        if way_out == "escape":
+            yield from hand.picture("baking")
+            yield from hand.key("ESC")
+        else:
+            yield from hand.press_button("softground.cancel_bake", below=button[1])
+        yield from hand.wait_for(lambda: not session().is_baking, 5)
+        facts[f"{way_out}: as before"] = fingerprints.of_file() == before
+
+    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region("WINDOW")):
+        bpy.ops.test.pauses("INVOKE_DEFAULT")
+    yield 0.5
+    yield from hand.click(*button)
+    yield from hand.wait_for(lambda: session().is_baking, 5)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
+    meter.TEST_OT_pauses.running = False
+    facts["longest pause"], facts["longest pause at"] = meter.longest()
+    yield 0.5
+    facts["prints"] = summary()
+    facts["deepest vertex"] = deepest()
+    yield from hand.frame_all()
+    yield from hand.picture("panel_baked")
+
+    baked = fingerprints.of_file()
+    yield from hand.move(*hand.middle())
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    facts["undo: as before"] = fingerprints.of_file() == before
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.5
+    facts["redo: as baked"] = fingerprints.of_file()["meshes"] == baked["meshes"]
+
+    path = str(hand.pictures / "walk.blend")
+    with bpy.context.temp_override(window=hand.window):
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+    yield 1.0
+    facts["reload: prints"] = summary()
+    facts["reload: deepest vertex"] = deepest()
+    yield from hand.open_sidebar()
+    yield from hand.press_button("softground.clear_bake")
+    facts["cleared: deepest vertex"] = deepest()
+
+
+def scene():
+    return bpy.context.window_manager.windows[0].scene
+
+
+def session():
+    return bpy.context.window_manager.softground
+
+
+def summary():
+    return dict(scene().softground.ground.data["softground_summary"])
+
+
+def deepest():
+    mesh = scene().softground.ground.data
+    return min(vertex.co.z for vertex in mesh.vertices)

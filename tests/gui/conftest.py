@@ -1,0 +1,108 @@
+"""A real Blender on a virtual screen, with the packaged add-on installed as a user would.
+
+Each story (`tests/gui/stories`) is told once per Blender; tests look at what it noted down. Pictures of it stay in
+`build/gui`; the docs show some of them (`make pictures`).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from functools import cache, lru_cache
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+TOOL = REPOSITORY.parent / "shared" / "tools" / "real_blender.sh"
+PROVISIONED = Path(os.environ.get("REAL_BLENDER_ROOT", "/var/tmp/real-blender"))
+OUTPUT = REPOSITORY / "build" / "gui"
+PACKAGE = REPOSITORY / "build" / "softground.zip"
+SUITES = ("trixie", "sid")
+"""Blender 4.3, which is always to be had, and the newest one where it was provisioned."""
+
+STORY_SECONDS = 400
+
+PREFERENCES = """
+import bpy
+preferences = bpy.context.preferences
+preferences.view.show_splash = False
+preferences.use_preferences_save = False
+bpy.ops.wm.save_userpref()
+"""
+
+
+@lru_cache(maxsize=1)
+def built() -> Path:
+    """The package as users get it, built and validated by Blender's own tool."""
+    builder = next(Path(sys.prefix).rglob("bl_pkg/cli/blender_ext.py"), None)
+    if builder is None:
+        pytest.skip("no bpy in this environment: run the GUI tests with `make gui`")
+    PACKAGE.parent.mkdir(exist_ok=True)
+    arguments = ["build", "--source-dir", str(REPOSITORY), "--output-filepath", str(PACKAGE)]
+    subprocess.run([sys.executable, str(builder), *arguments], check=True, capture_output=True)
+    return PACKAGE
+
+
+def blender(suite: str, verb: str, *arguments: str, seconds: int = 120) -> str:
+    """Run the suite's Blender in its own home; returns what it printed."""
+    home = OUTPUT / suite / "home"
+    environment = {**os.environ, "REAL_BLENDER_HOME": str(home), "TMPDIR": str(OUTPUT / suite)}
+    command = [str(TOOL), verb, suite, *arguments]
+    done = subprocess.run(
+        command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=seconds, check=False
+    )
+    return done.stdout + done.stderr
+
+
+@cache
+def installed(suite: str) -> str:
+    """Install the package in a fresh home; returns what Blender printed when it started with it."""
+    home = OUTPUT / suite / "home"
+    shutil.rmtree(home, ignore_errors=True)
+    home.mkdir(parents=True)
+    message = blender(suite, "run", "--command", "extension", "install-file", "-r", "user_default", "-e", str(built()))
+    assert "Installed" in message, message
+    return blender(suite, "run", "-b", "--python-expr", PREFERENCES)
+
+
+@cache
+def told(suite: str, story: str) -> dict:
+    """What a story noted down; told once."""
+    installed(suite)
+    folder = OUTPUT / suite / story
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    teller = str(REPOSITORY / "tests" / "gui" / "teller.py")
+    arguments = ("--enable-event-simulate", "--python", teller, "--", str(REPOSITORY), story, str(folder))
+    printed = blender(suite, "gui", *arguments, seconds=STORY_SECONDS)
+    (folder / "printed.txt").write_text(printed, encoding="utf-8")
+    facts = folder / "facts.json"
+    found = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {"error": "it ended before the story"}
+    return {**found, "printed": printed}
+
+
+@pytest.fixture(scope="session", params=SUITES)
+def suite(request):
+    if not TOOL.is_file():
+        pytest.skip(f"no real Blender to be had: {TOOL} is not here")
+    if not (PROVISIONED / request.param / ".ready").is_file():
+        if request.param != "trixie":
+            pytest.skip(f"Blender of {request.param} is not here: `{TOOL.name} provision {request.param}` gets it")
+        if os.geteuid() != 0 or shutil.which("debootstrap") is None:
+            pytest.skip("a real Blender is provisioned with root rights and debootstrap: apt-get install debootstrap")
+        subprocess.run([str(TOOL), "provision", request.param], check=True, timeout=1200, cwd=REPOSITORY)
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def tell(suite):
+    def facts(story: str) -> dict:
+        found = told(suite, story)
+        assert "error" not in found, f"{found['error']}\n{found['printed'][-2000:]}"
+        return found
+
+    return facts
