@@ -1,0 +1,246 @@
+"""`softground batch` on real shots: the same results however it is run, killed and resumed."""
+
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+
+from softground_addon.blender import batch, cli, ground_mesh
+from tests.blender import fingerprints, shots
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def night(scene, tmp_path):
+    """A folder of shots that differ, and a manifest of them all."""
+
+    def make(count, frames=30):
+        for number in range(count):
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            shots.walker(bpy.context.scene, frames=frames, speed=1.0 + 0.02 * number)
+            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{number:03}.blend"))
+        path = tmp_path / "night.toml"
+        path.write_text(
+            'defaults.save = "baked/{name}.blend"\ndefaults.report = "baked/{name}.json"\n'
+            'shots = [{ files = "0*.blend" }]\n'
+        )
+        return path
+
+    return make
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "softground_addon", "batch", *map(str, arguments)]
+
+
+def run(*arguments, timeout=300):
+    return subprocess.run(
+        command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False
+    )  # fmt: skip
+
+
+def results(folder):
+    """What the bakes of a folder gave, as bytes: every mesh, the records, and the reports without their timings."""
+    found = {}
+    for path in sorted(folder.glob("*.blend")):
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        meshes = {mesh.name: fingerprints.of_mesh(mesh) | {"properties": None} for mesh in bpy.data.meshes}
+        records = [bytes(mesh[ground_mesh.RECORD]) for mesh in bpy.data.meshes if ground_mesh.RECORD in mesh.keys()]  # noqa: SIM118
+        assert len(records) == 1
+        report = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        del report["timings"]
+        found[path.stem] = hashlib.sha256(repr((meshes, records, report)).encode()).hexdigest()
+    return found
+
+
+def test_shots_baked_side_by_side_are_those_baked_one_by_one(night, capfd):
+    manifest = night(3)
+    done = run(manifest, "--jobs", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 done" in done.stdout
+    summary = json.loads((manifest.parent / "night.batch" / "batch.json").read_text())
+    assert summary["totals"]["done"] == 3
+    side_by_side = results(manifest.parent / "baked")
+    assert len(side_by_side) == 3
+    assert len(set(side_by_side.values())) == 3
+    for number in range(3):
+        bpy.ops.wm.open_mainfile(filepath=str(manifest.parent / f"{number:03}.blend"))
+        target = manifest.parent / "baked" / f"{number:03}"
+        assert cli.run_in_blender(["bake", f"--save={target}.blend", f"--report={target}.json"]) == 0
+    assert results(manifest.parent / "baked") == side_by_side
+
+
+def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night):
+    manifest = night(3, frames=60)
+    process = subprocess.Popen(
+        command(manifest, "--progress", "json"), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("{") and json.loads(line)["ended"] == 1:
+            break
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130, errors
+    assert "goes on where it stopped" in errors
+    state = manifest.parent / "night.batch"
+    assert json.loads((state / "batch.json").read_text())["totals"] | {"skipped": 0} == {
+        "done": 1, "skipped": 0, "refused": 0, "failed": 0, "crashed": 0, "interrupted": 2,
+    }  # fmt: skip
+    assert sorted(path.name for path in (manifest.parent / "baked").iterdir()) == ["000.blend", "000.json"]
+    again = run(manifest)
+    assert again.returncode == 0, again.stderr
+    assert "2 done, 1 skipped" in again.stdout
+
+
+def test_a_worker_ends_by_itself_when_its_batch_is_killed(night):
+    manifest = night(1, frames=1500)
+    process = subprocess.Popen(command(manifest, "--progress", "json"), cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 30
+    while (
+        subprocess.run(["pgrep", "-f", f"bake {manifest.parent}"], stdout=subprocess.DEVNULL, check=False).returncode
+        == 0
+    ):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    assert not list((manifest.parent / "baked").iterdir())
+
+
+def test_a_bad_shot_does_not_keep_the_others_from_being_baked(night):
+    manifest = night(2)
+    (manifest.parent / "0bad.blend").write_bytes(b"BLENDER-v405" + b"\0" * 100)
+    done = run(manifest)
+    assert done.returncode == 2, done.stdout
+    assert "2 done, 1 refused" in done.stdout
+    assert "could not be opened" in done.stdout
+    manifest.write_text(manifest.read_text() + "[defaults.set]\n'material.density' = 3\n")
+    done = run(manifest)
+    assert "3 refused" in done.stdout
+    assert "no setting 'material.density'" in done.stdout
+
+
+def test_a_shot_baked_in_place_is_baked_once(night):
+    manifest = night(1)
+    manifest.write_text("shots = [{ file = '000.blend', in_place = true }]")
+    assert run(manifest).returncode == 0
+    baked = (manifest.parent / "000.blend").read_bytes()
+    assert "1 skipped" in run(manifest).stdout
+    assert (manifest.parent / "000.blend").read_bytes() == baked
+
+
+def test_a_changed_library_bakes_the_shot_again(night):
+    manifest = night(1)
+    rig = manifest.parent / "rig.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(rig))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(rig), link=True) as (_, linked):
+        linked.objects = ["Walker"]
+    bpy.context.scene.collection.objects.link(linked.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(manifest.parent / "000.blend"))
+    assert "1 done" in run(manifest).stdout
+    assert "1 skipped" in run(manifest).stdout
+    rig.write_bytes(rig.read_bytes() + b"\0")
+    assert "1 done" in run(manifest).stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "says"),
+    [
+        ("shots = 3", (), "has no shots"),
+        ("shots = [{ file = 'gone.blend', in_place = true }]", (), "gone.blend"),
+        (None, ("--shot", "99"), "no shot '99'"),
+        (None, ("--jobs", "0"), "no number of processes"),
+        (None, ("--timeout", "nan"), "no number of seconds"),
+        (None, ("--state", "/dev/null/x"), "choose another --state"),
+    ],
+)
+def test_bad_input_exits_with_2_before_anything_is_baked(night, capfd, text, options, says):
+    manifest = night(1)
+    if text:
+        manifest.write_text(text)
+    assert cli.run_in_blender(["batch", str(manifest), *options]) == 2
+    assert says in capfd.readouterr().err
+    assert not (manifest.parent / "baked").exists()
+
+
+def test_the_table_shows_hostile_names_on_one_line():
+    shot = batch.manifest.BatchShot(name='it\'s "two"\nlines\x1b[31m ❄ \u202e', file=Path("a.blend"))
+    lines = batch.table([batch.Outcome(shot, "refused", message="first\nsecond")]).splitlines()
+    assert len(lines) == 3
+    assert r"\nlines\x1b[31m" in lines[1]
+    assert r"first\nsecond" in lines[1]
+
+
+@pytest.mark.slow
+def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
+    """Kill -9 of the batch at random moments; every result is that of one go, and nothing done is done again."""
+    manifest = night(50)
+    assert run(manifest, "--jobs", 2, timeout=600).returncode == 0
+    whole = results(manifest.parent / "baked")
+    for folder in ("baked", "night.batch"):
+        for path in (manifest.parent / folder).iterdir():
+            path.unlink()
+    chance = random.Random(5)
+    finished: dict[Path, int] = {}
+    for _ in range(5):
+        process = subprocess.Popen(command(manifest, "--jobs", 2, "--progress", "none"), cwd=ROOT)
+        time.sleep(chance.uniform(3.0, 9.0))
+        process.kill()
+        process.wait()
+        time.sleep(2 * cli.PARENT_POLL)
+        for path in (manifest.parent / "baked").glob("[!.]*.blend"):
+            assert finished.get(path, path.stat().st_mtime_ns) == path.stat().st_mtime_ns, f"{path} was baked twice"
+            finished[path] = path.stat().st_mtime_ns
+    assert finished
+    done = run(manifest, "--jobs", 2, timeout=600)
+    assert done.returncode == 0, done.stdout
+    assert all(path.stat().st_mtime_ns == moment for path, moment in finished.items())
+    assert results(manifest.parent / "baked") == whole
+    assert not [path for path in (manifest.parent / "baked").iterdir() if path.name.startswith(".")]
+
+
+@pytest.mark.benchmark
+def test_two_jobs_are_almost_twice_as_fast_as_one(night):
+    if (os.cpu_count() or 1) < 2:
+        pytest.skip("needs two cores")
+    manifest = night(8, frames=120)
+    seconds = {}
+    for jobs in (1, 2):
+        started = time.perf_counter()
+        assert run(manifest, "--jobs", jobs, "--state", manifest.parent / f"state{jobs}").returncode == 0
+        seconds[jobs] = time.perf_counter() - started
+    print(
+        f"\n8 shots: {seconds[1]:.1f} s with one job, {seconds[2]:.1f} s with two ({seconds[1] / seconds[2]:.2f} times)"
+    )
+    busy = os.getloadavg()[0] > 2.5
+    assert seconds[1] / seconds[2] >= (1.3 if busy else 1.7)
+
+
+@pytest.mark.benchmark
+def test_the_command_line_adds_little_to_a_bake(night):
+    shot = night(1, frames=120).parent / "000.blend"
+    options = ["--progress=none", f"--save={shot.parent / 'out.blend'}"]
+    within, whole = [], []
+    for _ in range(3):
+        bpy.ops.wm.open_mainfile(filepath=str(shot))
+        started = time.perf_counter()
+        assert cli.run_in_blender(["bake", *options]) == 0
+        within.append(time.perf_counter() - started)
+        started = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "softground_addon", "bake", str(shot), *options], cwd=ROOT, check=True)
+        whole.append(time.perf_counter() - started)
+    print(f"\nin process {min(within):.2f} s, command line {min(whole):.2f} s")
+    assert min(whole) - min(within) <= 1.5
