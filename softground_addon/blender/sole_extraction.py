@@ -15,6 +15,9 @@ from ..core.motion import Array
 from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_mesh, sole_from_underside
 from .rig_mapping import SoleSource
 
+_REACH = 2.0
+"""How far around a bone of the foot its skin is looked for, in its lengths; at least as far as the shank is long."""
+
 _OWNED = 0.5
 """A vertex belongs to the foot when the foot's bones hold more than this share of its weight."""
 
@@ -141,7 +144,7 @@ def find_foot_meshes(
             continue
         if _deformed_by(thing, armature):
             to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
-            found = _weighted_parts(thing, groups, rest_world @ to_armature)
+            found = _weighted_parts(thing, armature, groups, rest_world, to_armature)
         elif thing.parent == armature and thing.parent_type == "BONE":
             found = _rigid_part(thing, armature, groups, rest_world)
         else:
@@ -173,7 +176,11 @@ def _deformed_by(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
 
 
 def _weighted_parts(
-    thing: bpy.types.Object, groups: Mapping[str, tuple[frozenset[str], frozenset[str]]], to_world: Array
+    thing: bpy.types.Object,
+    armature: bpy.types.Object,
+    groups: Mapping[str, tuple[frozenset[str], frozenset[str]]],
+    rest_world: Array,
+    to_armature: Array,
 ) -> dict[str, FootMesh]:
     """Parts of a skinned mesh that belong to each foot."""
     names = {group.index: group.name for group in thing.vertex_groups}
@@ -181,8 +188,8 @@ def _weighted_parts(
     if not feet.intersection(names.values()):
         return {}
     bones = frozenset(names.values())
-    vertex, group, weight = _read_weights(thing)
     vertices, triangles = _read_mesh(thing)
+    vertex, group, weight = _read_weights(thing, _near_feet(armature, feet, _moved(to_armature, vertices)))
     count = len(vertices)
     group_name = np.array([names.get(index, "") for index in range(max(names, default=0) + 1)])
     total = np.bincount(vertex, weight, count)
@@ -198,7 +205,7 @@ def _weighted_parts(
         chosen = triangles[owned[triangles].all(axis=1)]
         if len(chosen):
             share = toe_weight / np.maximum(foot_weight, 1e-9)
-            parts[name] = FootMesh(_moved(to_world, vertices), np.clip(share, 0.0, 1.0), chosen)
+            parts[name] = FootMesh(_moved(rest_world @ to_armature, vertices), np.clip(share, 0.0, 1.0), chosen)
     return parts
 
 
@@ -245,11 +252,23 @@ def _read_mesh(thing: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
 
 
-def _read_weights(thing: bpy.types.Object) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Vertex, group and weight of every vertex weight."""
-    entries = [
-        (vertex.index, group.group, group.weight) for vertex in _mesh_of(thing).vertices for group in vertex.groups
-    ]
+def _near_feet(armature: bpy.types.Object, feet: frozenset[str], points: Array) -> NDArray[np.intp]:
+    """Which of the points, in armature space, are near enough to a bone of the feet to be moved by it."""
+    near = np.zeros(len(points), dtype=bool)
+    for name in feet & set(armature.data.bones.keys()):
+        bone = armature.data.bones[name]
+        ends = np.array([bone.head_local, bone.tail_local])
+        reach = max(_REACH * bone.length, bone.parent.length if bone.parent else 0.0)
+        near |= ((points > ends.min(axis=0) - reach) & (points < ends.max(axis=0) + reach)).all(axis=1)
+    return np.flatnonzero(near)
+
+
+def _read_weights(
+    thing: bpy.types.Object, wanted: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Vertex, group and weight of every weight of the wanted vertices, which can only be read one by one."""
+    vertices = _mesh_of(thing).vertices
+    entries = [(index, group.group, group.weight) for index in wanted.tolist() for group in vertices[index].groups]
     table = np.array(entries, dtype=float).reshape(-1, 3)
     return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
 
