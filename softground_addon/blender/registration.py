@@ -7,8 +7,10 @@ import bpy
 from . import (
     character_editing,
     cli,
+    force_curves,
     handlers,
     live,
+    menus,
     modal_bake,
     operators,
     overlay,
@@ -27,6 +29,8 @@ CLASSES = (
     *live.CLASSES,
     *overlay.CLASSES,
     *preset_menu.CLASSES,
+    *force_curves.CLASSES,
+    *menus.CLASSES,
     *panels.CLASSES,
 )
 
@@ -43,6 +47,7 @@ def register() -> None:
     bpy.types.WindowManager.softground = bpy.props.PointerProperty(type=session.SoftGroundSession)
     handlers.register()
     overlay.register()
+    menus.register()
     _command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
 
 
@@ -52,6 +57,7 @@ def unregister() -> None:
     if _command is not None:
         bpy.utils.unregister_cli_command(_command)
         _command = None
+    menus.unregister()
     overlay.unregister()
     handlers.unregister()
     del bpy.types.WindowManager.softground

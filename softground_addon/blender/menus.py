@@ -1,0 +1,49 @@
+"""Entries in Blender's own menus; the search (F3) finds operators through them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+
+class SOFTGROUND_MT_object(bpy.types.Menu):
+    """Footprints of animated characters"""
+
+    bl_label = "SoftGround"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.operator("softground.add_character", icon="ARMATURE_DATA")
+        layout.operator("softground.create_ground", icon="MESH_GRID")
+        layout.separator()
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")
+        layout.operator("softground.live", icon="PLAY")
+        layout.operator("softground.clear_bake", icon="TRASH")
+        layout.separator()
+        layout.operator("softground.overlay", icon="HIDE_OFF")
+        layout.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+        layout.operator("softground.match_depth")
+        layout.separator()
+        layout.operator("softground.force_curves", icon="GRAPH")
+        layout.operator("softground.export_forces", icon="EXPORT")
+
+
+def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the add-on's menu to the Object menu."""
+    menu.layout.separator()
+    menu.layout.menu("SOFTGROUND_MT_object")
+
+
+def register() -> None:
+    """Add the entries."""
+    bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
+
+
+def unregister() -> None:
+    """Take the entries away."""
+    bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
+
+
+CLASSES = (SOFTGROUND_MT_object,)
