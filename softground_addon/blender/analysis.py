@@ -125,7 +125,14 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
 
 
 def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial) -> float:
-    results = simulate(analysis.loads, analysis.shot.terrain, material, settings.cell_size_of(scene))
+    results = simulate(
+        analysis.loads,
+        analysis.shot.terrain,
+        material,
+        settings.cell_size_of(scene),
+        pressure=scene.softground.pressure,
+        variation=analysis.shot.variation,
+    )
     return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
 
 
@@ -147,6 +154,7 @@ def _source(scene: bpy.types.Scene) -> Hashable:
     return (
         (options.frame_start, options.frame_end, render.fps, render.fps_base, scene.unit_settings.scale_length),
         options.ground and options.ground.session_uid,
+        (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(
             (
                 character.armature.session_uid,

@@ -7,6 +7,7 @@ is refused before that has changed nothing.
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, TypeVar
@@ -25,7 +26,8 @@ from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
 from ..core.terrain import MeshTerrain
-from . import baked_ground, ground_mesh, response_job, settings
+from ..core.variation import PaintedSurface
+from . import baked_ground, ground_mesh, painted_ground, response_job, settings, staleness
 from .character_setup import mapping_of
 from .ground_mesh import GroundPlan, GroundSurface
 from .materials import ensure_material
@@ -114,6 +116,12 @@ class Shot:
     surface: GroundSurface | None
     terrain: Terrain
 
+    @property
+    def variation(self) -> PaintedSurface | None:
+        """How the ground varies from place to place, where it is painted."""
+        painted = self.surface is not None and self.surface.factors is not None
+        return PaintedSurface(self.terrain) if painted and isinstance(self.terrain, MeshTerrain) else None
+
 
 Job = Generator[Progress, None, Result]
 
@@ -183,6 +191,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
     inputs = _inputs(scene, characters, material)
+    if surface and surface.factors is not None:
+        inputs["painted"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
     input_hash = report.hash_inputs(inputs, motions, vertices)
     playback_error: float | None = None
     if write_ground and ground and vertices is not None:
@@ -217,6 +227,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     )
     if write_ground and ground:
         ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = _summary(result)
+        staleness.store(_inputs(scene, characters, material), ground, [one.armature for one in characters])
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 
@@ -229,18 +240,17 @@ def _press(
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them.
     """
     characters = [character for character in scene.softground.characters if character.armature]
-    material, cell_size = settings.material_of(scene), settings.cell_size_of(scene)
     asked = response_job.options_of(scene)
     if asked:
         response_job.check_characters(characters)
     standing = response_job.standing_on(shot.motions, shot.terrain, asked)
     loads = yield from estimate_shot(scene, replace(shot, motions=standing))
-    footprints, forces = yield from _simulate(loads, shot.terrain, material, cell_size)
+    footprints, forces = yield from _simulate(scene, shot, loads)
     leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
     if leaning:
         loads = yield from estimate_shot(scene, replace(shot, motions=leaning))
-        footprints, forces = yield from _simulate(loads, shot.terrain, material, cell_size)
-    check_volumes(footprints, material)
+        footprints, forces = yield from _simulate(scene, shot, loads)
+    check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
     return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)
 
 
@@ -272,7 +282,8 @@ def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
     plan = plan_ground(motions)
     if options.ground is None:
         return Shot(tuple(motions), plan, None, FlatTerrain(plan.height))
-    surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length)
+    painted = painted_ground.names_of(scene)
+    surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
     yield Progress("sample", 1.0)
     return Shot(tuple(motions), plan, surface, surface.terrain(np.stack([plan.lower, plan.upper])))
 
@@ -370,14 +381,22 @@ def _sample(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -
 
 
 def _simulate(
-    loads: Sequence[CharacterLoads], terrain: Terrain, material: GroundMaterial, cell_size: float
+    scene: bpy.types.Scene, shot: Shot, loads: Sequence[CharacterLoads]
 ) -> Job[tuple[list[Footprint], dict[str, object]]]:
     """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(character.motion.frames) for character in loads)
-    for result in simulate(loads, terrain, material, cell_size):
+    results = simulate(
+        loads,
+        shot.terrain,
+        settings.material_of(scene),
+        settings.cell_size_of(scene),
+        pressure=scene.softground.pressure,
+        variation=shot.variation,
+    )
+    for result in results:
         footprints += result.footprints
         frames.append(result.frame)
         forces.append(result.forces)
@@ -453,18 +472,28 @@ def _wants_detail(
     return False
 
 
-def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial) -> None:
-    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4."""
+def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
+    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    material : GroundMaterial
+    factors : (V, 3) float array, optional
+        What is painted on the ground: there, the rim's share lies between the least and the largest painted.
+    """
+    depth, rim = np.ones((2, 2)) if factors is None else (np.append(column, 1.0) for column in factors[:, 1:].T)
+    least, most = np.clip(2.0 * material.poisson_ratio * np.array([rim.min(), rim.max()]), 0.0, 1.0)
     for footprint in footprints:
         raised = footprint.rim_m3 + footprint.unplaced_rim_m3
-        displaced = 2.0 * material.poisson_ratio * footprint.compressed_m3
         rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
-        if not abs(raised - displaced) <= RIM_TOLERANCE * displaced + rounding:
+        low, high = least * footprint.compressed_m3, most * footprint.compressed_m3
+        if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
-                f"{displaced:.6g} m³ were displaced; nothing was written. Please report this shot."
+                f"{high:.6g} m³ were displaced; nothing was written. Please report this shot."
             )
-        if footprint.max_depth_m > material.layer_depth * (1 + 1e-9):
+        if footprint.max_depth_m > material.layer_depth * depth.max() * (1 + 1e-9):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
                 "was written. Please report this shot."
@@ -495,6 +524,16 @@ def _offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
     }
 
 
+def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
+    options = scene.softground
+    if options.ground is None:
+        return ()
+    characters = [character for character in options.characters if character.armature]
+    inputs = _inputs(scene, characters, settings.material_of(scene))
+    return staleness.reasons(inputs, options.ground, [character.armature for character in characters])
+
+
 def _inputs(
     scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], material: GroundMaterial
 ) -> dict[str, object]:
@@ -515,6 +554,7 @@ def _inputs(
         ],
         "preset": options.material.preset,
         "material": asdict(material),
+        "pressure": options.pressure,
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,

@@ -21,7 +21,7 @@ from ..core.footprints import NEVER
 from ..core.heightfield import Terrain
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.terrain import MeshTerrain
-from . import playback
+from . import painted_ground, playback
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -34,6 +34,8 @@ AGE = "softground_age"
 SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
 RECORD = "softground_record"
 SUMMARY = "softground_summary"
+PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
+"""Properties of a mesh that carries a bake."""
 
 ON_SURFACE = 2e-3
 """Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
@@ -54,11 +56,14 @@ class GroundSurface:
         World positions of the evaluated surface [m]: the same, unless modifiers add vertices.
     triangles : (T, 3) int array
         Triangles of the evaluated surface.
+    factors : (W, 3) float array, optional
+        What is painted on the evaluated surface; see `painted_ground`.
     """
 
     vertices: Array
     surface_vertices: Array
     triangles: Indices
+    factors: Array | None = None
 
     def pressed_vertices(self, pressed: PressedGround, terrain: Terrain) -> Indices:
         """Vertices that lie on top of the surface where the ground may have changed, (K,)."""
@@ -68,7 +73,7 @@ class GroundSurface:
 
     def terrain(self, bounds: Array | None = None) -> MeshTerrain:
         """The surface as a function of place, within bounds in the plane [m]."""
-        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds)
+        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors)
 
 
 def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
@@ -144,8 +149,10 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     return vertices
 
 
-def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSurface:
-    """The ground as it is without any bake, in world space and metres.
+def undisturbed_surface(
+    ground: bpy.types.Object, unit_scale: float, painted: painted_ground.Names = ()
+) -> GroundSurface:
+    """The ground as it is without any bake, in world space and metres, with what is painted on it.
 
     Raises
     ------
@@ -157,15 +164,17 @@ def undisturbed_surface(ground: bpy.types.Object, unit_scale: float) -> GroundSu
     to_world = to_world_of(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
         surface, triangles = vertices, _triangles(mesh)
+        factors = painted_ground.factors(ground, mesh, painted)
     else:
         with undisturbed_copy(ground) as evaluated:
             surface = _transform(to_world, _positions(evaluated))
             triangles = _triangles(evaluated)
+            factors = painted_ground.factors(ground, evaluated, painted)
         if len(surface) == len(vertices):
             vertices = surface
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
-    return GroundSurface(vertices, surface, triangles)
+    return GroundSurface(vertices, surface, triangles, factors)
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
@@ -367,8 +376,8 @@ def restore(ground: bpy.types.Object) -> None:
     for name in (REST, *SHADING_ATTRIBUTES):
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
-    del mesh[RECORD]
-    mesh.pop(SUMMARY, None)
+    for key in PROPERTIES:
+        mesh.pop(key, None)
     write_positions(mesh, rest)
 
 

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.heightfield import Window
-from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
-from . import analysis, bake_job, ground_mesh, playback, session, settings
+from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .translation import rpt_
@@ -54,7 +53,14 @@ class LiveMode:
     def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
         self._analysis = known
         cell_size = settings.cell_size_of(scene)
-        self._playhead = Playhead(known.loads, known.shot.terrain, settings.material_of(scene), cell_size)
+        self._playhead = Playhead(
+            known.loads,
+            known.shot.terrain,
+            settings.material_of(scene),
+            cell_size,
+            pressure=scene.softground.pressure,
+            variation=known.shot.variation,
+        )
         self._frame_rate = known.shot.motions[0].frame_rate
 
     def follow(self, scene: bpy.types.Scene) -> bool:
@@ -112,12 +118,9 @@ class LiveMode:
         )
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
-        place = vertices[index, :2].T
         stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
-        ground_mesh.write(ground, index, pressed.sample(*place), stored, unit_scale)
-        over_time = histories(footprints, *place, blur_sigma=sigma)
-        up = ground_mesh.up_of(ground, unit_scale)
-        playback.install(ground, index, over_time, up=up, frame_rate=self._frame_rate)
+        place = baked_ground.Place(ground, index, vertices[index])
+        baked_ground.write(place, footprints, pressed, stored, blur_sigma=sigma, unit_scale=unit_scale)
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
@@ -250,7 +253,7 @@ def _why_not(context: bpy.types.Context) -> str:
         return "A bake is running"
     if not any(character.armature for character in options.characters):
         return "Add a character first: select its armature and press Add Character"
-    if options.ground and ground_mesh.is_baked(options.ground):
+    if options.ground and baked_ground.is_baked(options.ground):
         return "There is a bake on the ground: clear it first"
     return ""
 

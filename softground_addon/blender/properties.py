@@ -194,6 +194,59 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         soft_max=0.05,
         **_limits("blur_sigma"),
     )
+    rim_bias: FloatProperty(
+        name="Rim Ahead",
+        description="How much more of the rim rises ahead of a moving foot than behind it: 0 none, 1 all of it",
+        default=0.0,
+        subtype="FACTOR",
+        **_limits("rim_bias"),
+    )
+    repose_angle: FloatProperty(
+        name="Angle of Repose",
+        description="Steepest slope that loose ground keeps: rims and walls slide down to it. 0 keeps them as pressed; "
+        "dry sand has 32°",
+        default=0.0,
+        subtype="ANGLE",
+        **_limits("repose_angle"),
+    )
+    shortest_time: FloatProperty(
+        name="Shortest Time",
+        description="Under a fast landing the ground gives way within the time that the foot takes to stop, down to "
+        "this. 0 always takes the full time",
+        default=0.0,
+        precision=3,
+        soft_max=0.2,
+        unit="TIME_ABSOLUTE",
+        **_limits("shortest_time"),
+    )
+    hardening: FloatProperty(
+        name="Hardening",
+        description="How much stiffer trodden ground is under the next foot: at 10, a second step like the first adds "
+        "less than a third of it. 0 turns it off",
+        default=0.0,
+        precision=1,
+        soft_max=50.0,
+        **_limits("hardening"),
+    )
+    crust_stress: FloatProperty(
+        name="Crust (Pa)",
+        description="Pressure at which the crust on untouched ground breaks, in pascals; what presses less leaves no "
+        "print. A person stands with about 20 kPa, walks with 40. 0 is no crust",
+        default=0.0,
+        precision=0,
+        soft_max=100e3,
+        step=100000,
+        **_limits("crust_stress"),
+    )
+    firm_depth: FloatProperty(
+        name="Firm Below (m)",
+        description="Depth of compression below which the ground is ten times stiffer, in metres. 0 is loose all "
+        "through",
+        default=0.0,
+        precision=3,
+        soft_max=0.3,
+        **_limits("firm_depth"),
+    )
 
     stiffness_mpa: FloatProperty(
         name="Stiffness (MPa)",
@@ -231,6 +284,29 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         soft_max=5.0,
         precision=2,
         **_in_unit("blur_sigma", 0.01),
+    )
+
+
+class SoftGroundPainted(bpy.types.PropertyGroup):
+    """Vertex groups or float attributes of the ground's mesh that scale its material; see `core.variation`."""
+
+    stiffness: StringProperty(
+        name="Stiffness",
+        description="Vertex group or float attribute of the ground by which its stiffness is multiplied: 1 is as the "
+        "material says, 0.5 half as stiff. Vertices outside the group are as the material says",
+        default="softground_stiffness",
+    )
+    layer_depth: StringProperty(
+        name="Layer Depth",
+        description="Vertex group or float attribute of the ground by which the depth of its loose layer is "
+        "multiplied: 1 is as the material says, 0 takes no print",
+        default="softground_layer_depth",
+    )
+    rim: StringProperty(
+        name="Rim",
+        description="Vertex group or float attribute of the ground by which the volume of its rims is multiplied: 1 is "
+        "as the material says, 0 raises no rim",
+        default="softground_rim_factor",
     )
 
 
@@ -358,6 +434,20 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         ],
         default="BOTH",
     )
+    painted: PointerProperty(name="Painted", type=SoftGroundPainted)
+    pressure: EnumProperty(
+        name="Pressure",
+        description="How the force on a foot spreads over its contact",
+        items=[
+            ("UNIFORM", "Even", "The same pressure under all of the foot that touches, as in the paper"),
+            (
+                "CENTRE_OF_PRESSURE",
+                "Rolling",
+                "Most pressure where the force acts, from the heel to the toes: steps have deep heels and toes",
+            ),
+        ],
+        default="UNIFORM",
+    )
     tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
@@ -374,6 +464,7 @@ CLASSES = (
     SoftGroundSole,
     SoftGroundCharacter,
     SoftGroundMaterial,
+    SoftGroundPainted,
     SoftGroundTilt,
     SoftGroundGrounding,
     SoftGroundSettings,

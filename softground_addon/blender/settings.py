@@ -9,9 +9,9 @@ import bpy
 
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
-from ..core.presets import Preset
+from ..core.presets import MATERIAL_RANGES, Preset
 
-MATERIAL_FIELDS = ("youngs_modulus", "poisson_ratio", "characteristic_time", "layer_depth", "rim_reach", "blur_sigma")
+MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
 
 def scene_of(context: bpy.types.Context) -> bpy.types.Scene:

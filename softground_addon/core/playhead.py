@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from .deformation import GroundMaterial
 from .footprints import Footprint
 from .heightfield import HeightField, Terrain, Window
+from .pressure import Pressure
 from .simulation import CharacterLoads, FrameResult, Simulation
+from .variation import Variation
 
 Array = NDArray[np.float64]
 Series = TypeVar("Series", bound=Any)
@@ -55,6 +57,8 @@ class Playhead:
     material : GroundMaterial
     cell_size : float
         Side of a cell [m].
+    pressure, variation
+        See `simulation.simulate`.
 
     Attributes
     ----------
@@ -65,9 +69,18 @@ class Playhead:
     """
 
     def __init__(
-        self, loads: Sequence[CharacterLoads], terrain: Terrain, material: GroundMaterial, cell_size: float
+        self,
+        loads: Sequence[CharacterLoads],
+        terrain: Terrain,
+        material: GroundMaterial,
+        cell_size: float,
+        *,
+        pressure: Pressure = "UNIFORM",
+        variation: Variation | None = None,
     ) -> None:
         self.material = material
+        self._pressure: Pressure = pressure
+        self._variation = variation
         self.ground = HeightField(cell_size)
         self._loads, self._terrain = tuple(loads), terrain
         self._changes: list[_Change] = []
@@ -138,7 +151,10 @@ class Playhead:
 
     def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press from the first frame on: frames that are known with the material they had, new ones with the newest."""
-        simulation = Simulation(self._terrain, self.material, HeightField(self.ground.cell_size))
+        ground = HeightField(self.ground.cell_size)
+        simulation = Simulation(
+            self._terrain, self.material, ground, pressure=self._pressure, variation=self._variation
+        )
         results = simulation.run(loads)
         for number in numbers():
             known = number < len(self._changes)

@@ -23,8 +23,14 @@ MATERIAL_RANGES: Mapping[str, tuple[float, float]] = {
     "layer_depth": (1e-3, 100.0),
     "rim_reach": (0.0, 10.0),
     "blur_sigma": (0.0, 1.0),
+    "rim_bias": (0.0, 1.0),
+    "repose_angle": (0.0, 1.4),
+    "shortest_time": (0.0, 60.0),
+    "hardening": (0.0, 1e3),
+    "crust_stress": (0.0, 1e9),
+    "firm_depth": (0.0, 100.0),
 }
-"""Smallest and largest value that is accepted for each field of `GroundMaterial`, in its SI unit."""
+"""Smallest and largest value that is accepted for each field of `GroundMaterial`, in its SI unit (angles in rad)."""
 
 SURFACES = ("snow", "sand", "mud", "soil")
 """Looks that a preset may ask for; each is a procedural render material."""

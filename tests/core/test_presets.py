@@ -1,7 +1,9 @@
 """Presets: JSON in, validated materials out, and nothing else."""
 
 import json
+from dataclasses import fields
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,6 +39,25 @@ def test_the_papers_presets_hold_the_middle_of_its_table(name):
     (low, high), tau, nu, blur = PAPER_RANGES[name]
     material = presets.find(name).material
     assert material == GroundMaterial((low + high) / 2, nu, tau, layer_depth=0.3, rim_reach=0.04, blur_sigma=blur)
+
+
+def test_what_goes_beyond_the_paper_is_off_where_a_preset_does_not_say_so():
+    text = (presets.FOLDER / "mud.json").read_text(encoding="utf-8")
+    beyond = ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress", "firm_depth")
+    assert not any(name in text for name in beyond)
+    assert not any(getattr(presets.parse(text, "mud").material, name) for name in beyond)
+    changed = text.replace('"blur_sigma"', '"repose_angle": 0.6, "hardening": 10, "blur_sigma"')
+    assert presets.parse(changed, "mud").material.hardening == 10.0
+    with pytest.raises(InputError, match=r"'repose_angle' is 32.* 0 to 1\.4"):
+        presets.parse(text.replace('"blur_sigma"', '"repose_angle": 32, "blur_sigma"'), "mud")
+
+
+def test_every_field_of_a_material_has_a_range():
+    assert set(presets.MATERIAL_RANGES) == {field.name for field in fields(GroundMaterial)}
+
+
+def test_loose_dry_sand_keeps_slopes_of_32_degrees():
+    assert presets.find("loose_dry_sand").material.repose_angle == pytest.approx(np.radians(32.0), abs=1e-4)
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
