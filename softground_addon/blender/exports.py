@@ -177,7 +177,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     for name in [attribute.name for attribute in mesh.attributes]:
         if name == ground_mesh.REST or playback.is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
-    for key in (ground_mesh.RECORD, ground_mesh.SUMMARY):
+    for key in ground_mesh.PROPERTIES:
         mesh.pop(key, None)
     still.matrix_world = carrier.matrix_world
     scene.collection.objects.link(still)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
-from . import analysis, ground_mesh, live, overlay_shapes, session, settings
+from . import analysis, baked_ground, ground_mesh, live, overlay_shapes, session, settings
 from .operators import reports_errors
 from .overlay_shapes import Outline
 
@@ -134,10 +134,11 @@ def _cells(scene: bpy.types.Scene, frame: float) -> tuple[Array, Array, float]:
         contact, rim = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
         return np.concatenate([none, *contact]), np.concatenate([none, *rim]), shown[1]
     ground = scene.softground.ground
-    if ground is None or not ground_mesh.is_baked(ground):
+    if ground is None or not baked_ground.is_baked(ground):
         return none, none, 1.0
-    stored = bytes(ground_mesh.mesh_of(ground)[ground_mesh.RECORD])
-    footprints = _footprints(ground.data.session_uid, zlib.crc32(stored), stored)
+    carrier = baked_ground.carrier_of(ground)
+    stored = bytes(ground_mesh.mesh_of(carrier)[ground_mesh.RECORD])
+    footprints = _footprints(carrier.data.session_uid, zlib.crc32(stored), stored)
     contact, rim = overlay_shapes.cells_at(footprints, frame)
     size = footprints[0].cell_size if footprints else 1.0
     return np.concatenate([none, *contact]), np.concatenate([none, *rim]), size

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.motion import JOINTS
-from . import analysis, ground_mesh, session, settings
+from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
 from .character_editing import active_character, active_sole
 from .translation import iface_
 
@@ -246,9 +246,11 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         _live_buttons(layout, state)
         layout.operator("softground.clear_bake", icon="TRASH")
-        summary = ground_mesh.summary_of(options.ground) if options.ground else {}
+        summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
         if summary:
             _result(layout, summary)
+            for reason in bake_job.stale_reasons(settings.scene_of(context)):
+                layout.label(text=reason, icon="ERROR", translate=False)
 
 
 def _live_buttons(layout: Any, state: Any) -> None:
@@ -281,6 +283,19 @@ class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
         column = layout.column(align=True, heading="Show")
         for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
             column.prop(state, part)
+
+
+class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
+    """What to take out of a bake"""
+
+    bl_label = "Output"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.column()
+        column = layout.column(align=True)
+        column.operator("softground.force_curves", icon="GRAPH")
+        column.operator("softground.export_forces", icon="EXPORT")
 
 
 def _result(layout: Any, summary: Any) -> None:
@@ -328,4 +343,5 @@ CLASSES = (
     SOFTGROUND_PT_material_details,
     SOFTGROUND_PT_bake,
     SOFTGROUND_PT_overlay,
+    SOFTGROUND_PT_output,
 )

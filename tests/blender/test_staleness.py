@@ -1,0 +1,92 @@
+"""A bake that no longer fits what it was made from says so."""
+
+import bpy
+import pytest
+
+from softground_addon.blender import bake_job, baked_ground
+from tests.blender import shots
+from tests.blender.test_bake import plane
+
+
+@pytest.fixture(params=["NEVER", "ALWAYS"])
+def baked(scene, request):
+    shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.softground.ground = plane(scene)
+    scene.softground.detail, scene.softground.frame_end = request.param, 40
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    return scene
+
+
+def test_a_fresh_bake_is_up_to_date_also_after_a_reload(baked, tmp_path):
+    assert bake_job.stale_reasons(baked) == ()
+    baked.frame_set(17)
+    assert bake_job.stale_reasons(baked) == ()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    assert bake_job.stale_reasons(bpy.context.scene) == ()
+
+
+def change_setting(scene):
+    scene.softground.material.youngs_modulus *= 1.01
+
+
+def change_mass(scene):
+    scene.softground.characters[0].mass += 1
+
+
+def move_ground(scene):
+    scene.softground.ground.location.z += 0.01
+
+
+def delete_vertex(scene):
+    import bmesh  # only there once bpy is
+
+    for thing in {scene.softground.ground, baked_ground.carrier_of(scene.softground.ground)}:
+        edited = bmesh.new()
+        edited.from_mesh(thing.data)
+        edited.verts.ensure_lookup_table()
+        edited.verts.remove(edited.verts[0])
+        edited.to_mesh(thing.data)
+        edited.free()
+
+
+def move_key(scene):
+    animation = scene.softground.characters[0].armature.animation_data
+    bag = animation.action.fcurves if hasattr(animation.action, "fcurves") else None
+    curve = bag[0] if bag else animation.action.layers[0].strips[0].channelbags[0].fcurves[0]
+    curve.keyframe_points[3].co.y += 0.001
+
+
+def add_strip(scene):
+    armature = scene.softground.characters[0].armature
+    track = armature.animation_data.nla_tracks.new()
+    track.strips.new("again", 60, armature.animation_data.action)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (change_setting, "settings"),
+        (change_mass, "settings"),
+        (move_ground, "'Field' has changed"),
+        (delete_vertex, "'Field"),
+        (move_key, "animation of 'Walker'"),
+        (add_strip, "animation of 'Walker'"),
+    ],
+)
+def test_every_change_of_the_inputs_makes_it_stale_until_the_next_bake(baked, change, message):
+    change(baked)
+    bpy.context.view_layer.update()
+    reasons = bake_job.stale_reasons(baked)
+    assert any(message in reason for reason in reasons)
+    if change is not delete_vertex or baked.softground.detail == "ALWAYS":
+        bpy.ops.softground.bake()
+        assert bake_job.stale_reasons(baked) == ()
+
+
+def test_a_cleared_ground_is_not_stale(baked):
+    bpy.ops.softground.clear_bake()
+    change_setting(baked)
+    assert bake_job.stale_reasons(baked) == ()
