@@ -194,9 +194,12 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
     return responding(motion, response)
 
 
-_UNEVEN = 0.005
-"""Spread of the terrain's height under the soles from which on a motion for level ground needs to be put on it, in leg
-lengths."""
+_LEVEL = 0.005
+"""Difference of height up to which ground counts as level, in leg lengths."""
+_SAME_GROUND = 0.015
+"""Spread of the standing soles' clearance up to which a motion was made for a ground, in leg lengths."""
+_SHORTER = 0.8
+"""A motion touches the ground it was made for at least for so much of the time that it touches any level."""
 
 
 def _level_of(motion: CharacterMotion) -> float | None:
@@ -208,23 +211,22 @@ def _level_of(motion: CharacterMotion) -> float | None:
 
 
 def _fits_better(motion: CharacterMotion, level: float, terrain: Terrain) -> bool:
-    """Whether the soles stand at one level more nearly than on the terrain, and the terrain is not level itself."""
-    on_level = detect_contacts(motion, FlatTerrain(level)).touching
-    heights, clearances = [], []
-    for index, sole in enumerate(motion.soles):
-        points = sole.landmark_positions()
-        place = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
-        ground = terrain.heights(place[:, 0], place[:, 1])
-        stands = on_level[:, index] & np.isfinite(ground)
-        heights.append(ground[stands])
-        clearances.append((place[:, 2] - ground)[stands])
-    ground_heights, clearance = np.concatenate(heights), np.concatenate(clearances)
-    if len(clearance) < 2:
+    """Whether the motion was made for one level rather than for the terrain."""
+    paths = np.concatenate([sole.landmark_positions().reshape(-1, 3) for sole in motion.soles])
+    heights = terrain.heights(paths[:, 0], paths[:, 1])
+    heights = heights[np.isfinite(heights)]
+    if not len(heights) or np.ptp(heights) < _LEVEL * motion.leg_length:
         return False
-    return (
-        float(np.ptp(ground_heights)) > _UNEVEN * motion.leg_length
-        and float(np.std(clearance)) > _UNEVEN * motion.leg_length
-    )
+    at_level, _ = _standing(motion, FlatTerrain(level))
+    on_terrain, spread = _standing(motion, terrain)
+    return bool(on_terrain < _SHORTER * at_level or spread > _SAME_GROUND * motion.leg_length)
+
+
+def _standing(motion: CharacterMotion, terrain: Terrain) -> tuple[int, float]:
+    """How many samples of soles touch a terrain, and how much their clearance varies [m]."""
+    contacts = detect_contacts(motion, terrain)
+    clearance = contacts.clearance[contacts.touching]
+    return len(clearance), float(np.std(clearance)) if len(clearance) else 0.0
 
 
 def at_scene_frames(touching: Mask, frames: Array, motion: CharacterMotion) -> Mask:
