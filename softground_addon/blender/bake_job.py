@@ -22,6 +22,7 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import FlatTerrain, Terrain
+from ..core.memory import check_memory
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
@@ -31,7 +32,6 @@ from . import baked_ground, ground_mesh, painted_ground, response_job, settings,
 from .character_setup import mapping_of
 from .ground_mesh import GroundPlan, GroundSurface
 from .materials import ensure_material
-from .nla_layer import LayerCurve
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character
 
@@ -202,7 +202,13 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         else:
             place = baked_ground.on_itself(ground, index, vertices)
         playback_error = baked_ground.write(
-            place, footprints, pressed, stored, blur_sigma=material.blur_sigma, unit_scale=unit_scale
+            place,
+            footprints,
+            pressed,
+            stored,
+            blur_sigma=material.blur_sigma,
+            unit_scale=unit_scale,
+            shape_keys=options.shape_keys,
         )
     if write and options.output != "PRINTS":
         response_job.put_layers(scene, characters, layers)
@@ -256,14 +262,14 @@ def _press(
 
 def _layers(
     scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[response_job.Answer]
-) -> Job[list[list[LayerCurve]]]:
+) -> Job[list[response_job.Layer]]:
     """The keys of each character's layer."""
     job = response_job.layers_of(scene, characters, answers)
     while True:
         try:
             yield Progress("write", next(job))
         except StopIteration as finished:
-            layers: list[list[LayerCurve]] = finished.value
+            layers: list[response_job.Layer] = finished.value
             return layers
 
 
@@ -385,6 +391,7 @@ def _simulate(
 ) -> Job[tuple[list[Footprint], dict[str, object]]]:
     """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
+    check_memory(loads, cell_size)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(character.motion.frames) for character in loads)

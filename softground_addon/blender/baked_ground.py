@@ -81,6 +81,7 @@ def write(
     *,
     blur_sigma: float,
     unit_scale: float,
+    shape_keys: bool = True,
 ) -> float:
     """Put a bake on its place: the finished ground, the record, and the playback.
 
@@ -90,7 +91,8 @@ def write(
         Largest error of a played height [m].
     """
     x, y = place.position[:, :2].T
-    ground_mesh.write(place.carrier, place.index, pressed.sample(x, y), stored, unit_scale)
+    sample = pressed.sample(x, y)
+    ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
     over_time = histories(footprints, x, y, blur_sigma=blur_sigma)
     up = ground_mesh.up_of(place.carrier, unit_scale)
     playback.install(place.carrier, place.index, over_time, up=up, frame_rate=pressed.frame_rate)

@@ -301,10 +301,19 @@ def _add_uv(mesh: bpy.types.Mesh, quads: Indices, positions: NDArray[np.float32]
     layer.uv.foreach_set("vector", uv[quads.ravel()].ravel())
 
 
-def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, record: bytes, unit_scale: float) -> None:
+def write(
+    ground: bpy.types.Object,
+    index: Indices,
+    pressed: GroundSample,
+    record: bytes,
+    unit_scale: float,
+    *,
+    shape_keys: bool = True,
+) -> None:
     """Put a bake on the ground, in place of the one that may be there.
 
     The raw heights become the mesh's positions and Basis, the blurred ones the shape key `DISPLAY_KEY` at value 1.
+    Without shape keys, the blurred heights are the mesh's positions.
 
     Parameters
     ----------
@@ -317,6 +326,8 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
         The footprints, from `core.record`.
     unit_scale : float
         Metres per Blender unit.
+    shape_keys : bool
+        Blender evaluates shape keys on the whole mesh at each frame that is played, which a dense ground feels.
     """
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
@@ -327,12 +338,10 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
     raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
     display[index] += (pressed.display[:, None] * up).astype(np.float32)
 
-    if not mesh.shape_keys:
-        ground.shape_key_add(name="Basis", from_mix=False)
-        ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
-    basis, key = mesh.shape_keys.reference_key, mesh.shape_keys.key_blocks[DISPLAY_KEY]
-    basis.points.foreach_set("co", raw.ravel())
-    key.points.foreach_set("co", display.ravel())
+    if shape_keys:
+        _write_shape_keys(ground, raw, display)
+    else:
+        ground.shape_key_clear()
     for name, values, default in (
         (COMPRESSION, pressed.compression, 0.0),
         (RIM, pressed.rim, 0.0),
@@ -345,7 +354,16 @@ def write(ground: bpy.types.Object, index: Indices, pressed: GroundSample, recor
     # Numbers, not bytes: Blender's Alembic exporter ends the program on bytes that hold a zero.
     mesh.pop(RECORD, None)  # an array that is there would keep its length
     mesh[RECORD] = np.frombuffer(record + bytes(-len(record) % 4), dtype=np.int32)
-    write_positions(mesh, raw)
+    write_positions(mesh, raw if shape_keys else display)
+
+
+def _write_shape_keys(ground: bpy.types.Object, raw: NDArray[np.float32], display: NDArray[np.float32]) -> None:
+    mesh = mesh_of(ground)
+    if not mesh.shape_keys:
+        ground.shape_key_add(name="Basis", from_mix=False)
+        ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
+    mesh.shape_keys.reference_key.points.foreach_set("co", raw.ravel())
+    mesh.shape_keys.key_blocks[DISPLAY_KEY].points.foreach_set("co", display.ravel())
 
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:

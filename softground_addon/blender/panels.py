@@ -172,6 +172,7 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
             row.operator("softground.create_ground", icon="MESH_GRID")
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
+        column.prop(options, "shape_keys")
         estimate = _estimate(options)
         if estimate:
             _note(layout, estimate)

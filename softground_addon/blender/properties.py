@@ -414,6 +414,14 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         precision=2,
         **_in_unit("cell_size", 0.01),
     )
+    shape_keys: BoolProperty(
+        name="Shape Keys",
+        description=(
+            "Keep the raw and the smoothed heights as shape keys, to sculpt or blend. "
+            "Without them a dense ground plays several times faster"
+        ),
+        default=True,
+    )
     detail: EnumProperty(
         name="Detail",
         description="Whether a fine copy of the ground along the trail takes the prints, with the ground hidden",

@@ -38,7 +38,7 @@ def ground_object(scene, spacing=0.02, matrix=None):
     return ground
 
 
-def bake_onto(ground, footprints, material=SAND, unit_scale=1.0):
+def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True):
     """What the bake job does once the record is there."""
     surface = ground_mesh.undisturbed_surface(ground, unit_scale)
     pressed_ground = PressedGround.at(
@@ -46,7 +46,7 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0):
     )
     index = np.flatnonzero(pressed_ground.covers(*surface.vertices[:, :2].T))
     place = surface.vertices[index, :2].T
-    ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale)
+    ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
     playback.install(
         ground, index, histories(footprints, *place, blur_sigma=material.blur_sigma), up=up, frame_rate=30.0
@@ -124,9 +124,11 @@ def test_pressure_is_there_only_during_the_contact(scene, footprints):
     assert pressure.max() == pytest.approx(print_.peak_force_n / print_.area_m2, rel=1e-4)
 
 
-def test_without_the_modifier_the_finished_ground_stands_there(scene, footprints):
+@pytest.mark.parametrize("shape_keys", [True, False])
+def test_without_the_modifier_the_finished_ground_stands_there(scene, footprints, shape_keys):
     ground = ground_object(scene)
-    surface = bake_onto(ground, footprints)
+    surface = bake_onto(ground, footprints, shape_keys=shape_keys)
+    assert bool(ground.data.shape_keys) == shape_keys
     playback.modifier_of(ground).show_viewport = False
     moved = world_positions(evaluated(ground, scene, 1)) - surface.vertices
     np.testing.assert_allclose(moved[:, 2], recorded(footprints, 1e9, surface).display, atol=1e-6)
