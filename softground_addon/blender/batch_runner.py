@@ -7,7 +7,6 @@ JSON lines.
 from __future__ import annotations
 
 import contextlib
-import glob
 import json
 import os
 import queue
@@ -21,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from ..core import receipts
+from ..core import files, receipts
 from ..core.errors import InputError
 from ..core.manifest import BatchShot
 
@@ -201,7 +200,7 @@ class _Batch:
                 return
             for path in (*shot.outputs, place.receipt(shot)):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                _remove_leftovers(path)
+                files.remove_leftovers(path)
             command = place.command(
                 shot.file,
                 [*shot.options, "--progress=json", f"--receipt={place.receipt(shot)}", f"--parent={os.getpid()}"],
@@ -323,9 +322,3 @@ def _locked(path: Path) -> IO[bytes]:
         else:
             break
     return lock
-
-
-def _remove_leftovers(path: Path) -> None:
-    """Remove what a killed worker has left beside `path`; call it with the shot's lock held."""
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*.partial"):
-        left.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,9 +21,11 @@ def replacing(path: Path) -> Iterator[Path]:
         If the folder is missing or cannot be written, or the disk is full. `path` is then as it was.
     """
     partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
+    if path.exists() and not path.is_file():
+        raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
     try:
         yield partial
-        with partial.open("rb") as written:
+        with partial.open("r+b") as written:  # Windows syncs only what may be written
             os.fsync(written.fileno())
         partial.replace(path)
     except OSError as error:
@@ -32,6 +35,12 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what killed writers of `path` have left beside it; nobody may be writing it now."""
+    for left in path.parent.glob(f".{glob.escape(path.stem)}.*.partial{glob.escape(path.suffix)}"):
+        left.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -211,7 +211,7 @@ def test_two_batches_do_not_bake_the_same_shot_at_the_same_time(batch):
 def test_what_a_killed_worker_left_behind_is_removed(batch):
     shot = batch.shot("a")
     (batch.folder / "baked").mkdir()
-    left, foreign = (batch.folder / "baked" / name for name in (".a.blend.123.partial", ".ab.blend.123.partial"))
+    left, foreign = (batch.folder / "baked" / name for name in (".a.123.partial.blend", ".ab.123.partial.blend"))
     left.touch()
     foreign.touch()
     batch.run(shot)

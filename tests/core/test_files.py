@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.files import replacing, write_text
+from softground_addon.core.files import remove_leftovers, replacing, write_text
 
 
 def write_half(path):
@@ -49,3 +49,25 @@ def test_a_full_disk_is_named_and_leaves_the_old_file(tmp_path: Path):
     with pytest.raises(InputError, match="free disk space"):
         write_to_full_disk(path, full)
     assert path.read_text() == "old"
+
+
+@pytest.mark.parametrize("kind", ["folder", "device"])
+def test_what_is_no_file_is_not_replaced(tmp_path: Path, kind: str):
+    path = tmp_path if kind == "folder" else tmp_path / "null"
+    if kind == "device":
+        path.symlink_to("/dev/null")
+    with pytest.raises(InputError, match="not a file"):
+        write_text(path, "text")
+    assert path.exists()
+
+
+def test_leftovers_of_a_killed_writer_are_found_by_their_name(tmp_path: Path):
+    path = tmp_path / "a[1].json"
+    with replacing(path) as partial:
+        partial.write_text("half")
+        other = tmp_path / partial.name.replace("a[1]", "b")
+        other.write_text("of another file")
+        remove_leftovers(path)
+        assert not partial.exists()
+        partial.write_text("whole")
+    assert {entry.name for entry in tmp_path.iterdir()} == {"a[1].json", other.name}

@@ -1,0 +1,60 @@
+"""How much memory a bake will take: an absurd cell size is refused before it fills the machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from .errors import InputError
+from .simulation import CharacterLoads
+
+BYTES_PER_CELL = 1000.0
+"""What a cell under a print takes from simulation to playback [bytes], as measured on walks at 1 and 0.5 mm."""
+
+USABLE = 0.8
+"""Share of the machine's memory that a bake may take."""
+
+
+def pressed_area(loads: Sequence[CharacterLoads]) -> float:
+    """Area that the soles of all characters cover on the ground, with each step counted [m²]."""
+    area = 0.0
+    for character in loads:
+        for index, sole in enumerate(character.motion.soles):
+            touching = character.contacts.touching[:, index].astype(int)
+            steps = int((np.diff(touching, prepend=0) > 0).sum())
+            paths = sole.landmark_positions()[..., :2].mean(axis=1)
+            travel = np.linalg.norm(np.diff(paths, axis=0), axis=1)[touching[1:] > 0].sum()
+            area += steps * sole.sole.area + float(travel) * float(np.ptp(sole.sole.outline[:, 1]))
+    return area
+
+
+def check_memory(loads: Sequence[CharacterLoads], cell_size: float, available: float | None = None) -> None:
+    """Raise InputError if the bake would not fit into memory, naming the estimate and a cell size that does.
+
+    Parameters
+    ----------
+    loads : sequence of CharacterLoads
+    cell_size : float
+        [m]
+    available : float, optional
+        Memory [bytes]; that of the machine by default, where the system tells it.
+    """
+    available = machine_memory() if available is None else available
+    needed = pressed_area(loads) / cell_size**2 * BYTES_PER_CELL
+    if available is None or needed <= USABLE * available:
+        return
+    fits = cell_size * np.sqrt(needed / (USABLE * available)) * 1.05
+    raise InputError(
+        f"Cells of {cell_size * 1e3:g} mm would take about {needed / 1e9:,.0f} GB of memory for this shot, and this "
+        f"machine has {available / 1e9:,.0f} GB: set a cell size of at least {fits * 1e3:.2g} mm, or bake fewer frames."
+    )
+
+
+def machine_memory() -> float | None:
+    """Memory of this machine [bytes]; None where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return None
