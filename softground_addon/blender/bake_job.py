@@ -192,7 +192,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
     inputs = _inputs(scene, characters, material)
     if surface and surface.factors is not None:
-        inputs["painted"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
+        inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
     input_hash = report.hash_inputs(inputs, motions, vertices)
     playback_error: float | None = None
     if write_ground and ground and vertices is not None:
@@ -391,7 +391,7 @@ def _simulate(
 ) -> Job[tuple[list[Footprint], dict[str, object]]]:
     """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_memory(loads, cell_size)
+    check_memory(loads, settings.cell_size_of(scene))
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(character.motion.frames) for character in loads)
@@ -562,6 +562,7 @@ def _inputs(
         "preset": options.material.preset,
         "material": asdict(material),
         "pressure": options.pressure,
+        "painted": [options.painted.stiffness, options.painted.layer_depth, options.painted.rim],
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,
