@@ -7,7 +7,7 @@ at the bottom: NLA would otherwise take them for their defaults, and the value w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -76,7 +76,12 @@ def check_layerable(thing: bpy.types.Object) -> None:
         raise InputError(f"NLA track '{solo.name}' of '{thing.name}' is solo, which mutes any layer: end its solo.")
 
 
-def add_layer(thing: bpy.types.Object, curves: Sequence[LayerCurve], frames: tuple[int, int]) -> None:
+def add_layer(
+    thing: bpy.types.Object,
+    curves: Sequence[LayerCurve],
+    frames: tuple[int, int],
+    notes: Mapping[str, str] | None = None,
+) -> None:
     """Put curves above the object's animation; a layer that is there already goes first.
 
     Parameters
@@ -86,6 +91,8 @@ def add_layer(thing: bpy.types.Object, curves: Sequence[LayerCurve], frames: tup
     curves : sequence of LayerCurve
     frames : (int, int)
         First and last frame; the layer acts between them only.
+    notes : mapping of str to str, optional
+        Kept with the layer's action, for `notes_of`.
 
     Raises
     ------
@@ -97,6 +104,8 @@ def add_layer(thing: bpy.types.Object, curves: Sequence[LayerCurve], frames: tup
     remove_layer(thing)
     standing = _standing_values(thing, curves)
     action = _new_action(f"{thing.name} Response", thing, curves)
+    for key, text in (notes or {}).items():
+        action[key] = text
     animation = thing.animation_data or thing.animation_data_create()
     span = _whole_span(thing, frames)
     own = animation.action
@@ -116,6 +125,13 @@ def add_layer(thing: bpy.types.Object, curves: Sequence[LayerCurve], frames: tup
         strip = _add_strip(animation, name, action, slot_of_action(action), frames)
         strip.blend_type, strip.extrapolation = "COMBINE", "NOTHING"
     set_strength(thing, 1.0 if strength is None else strength)
+
+
+def notes_of(thing: bpy.types.Object) -> dict[str, str]:
+    """What was noted with the layer; nothing where there is none."""
+    strip = _strip(thing, RESPONSE)
+    action = strip.action if strip else None
+    return {key: str(action[key]) for key in action.keys()} if action else {}  # noqa: SIM118
 
 
 def remove_layer(thing: bpy.types.Object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -24,7 +25,7 @@ from ..core.response import (
 from ..core.simulation import CharacterLoads
 from ..core.tilt import TiltGains
 from . import nla_layer, settings
-from .character_keys import response_curves
+from .character_keys import controls_of, response_curves
 from .character_setup import mapping_of
 from .properties import SoftGroundCharacter
 
@@ -38,6 +39,14 @@ class ResponseOptions:
 
     tilt: TiltOptions | None
     grounding: GroundingOptions | None
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One character's keys, and what the panel says of them."""
+
+    curves: list[nla_layer.LayerCurve]
+    notes: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -128,31 +137,42 @@ def answers_of(
 
 def layers_of(
     scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[Answer]
-) -> Generator[float, None, list[list[nla_layer.LayerCurve]]]:
+) -> Generator[float, None, list[Layer]]:
     """The keys of each character's layer; yields the part that is done."""
-    layers = []
+    layers: list[Layer] = []
     for number, (character, answer) in enumerate(zip(characters, answers, strict=False)):
         job = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
         while True:
             try:
                 read = next(job)
             except StopIteration as finished:
-                layers.append(finished.value)
+                layers.append(Layer(finished.value, _notes(scene, character, answer)))
                 break
             yield (number + read / len(answer.motion.frames)) / len(answers)
     return layers
 
 
+CARRIER = "softground_carrier"
+"""Note of the bone that carries the body."""
+WORST = "softground_worst_gaps"
+"""Note of the frames where a gap is left, as JSON."""
+
+
+def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: Answer) -> dict[str, str]:
+    controls = controls_of(scene, character.armature, mapping_of(character))
+    return {CARRIER: controls.bones[0], WORST: json.dumps(worst_gaps([answer]))}
+
+
 def put_layers(
     scene: bpy.types.Scene,
     characters: Sequence[SoftGroundCharacter],
-    layers: Sequence[Sequence[nla_layer.LayerCurve]],
+    layers: Sequence[Layer],
 ) -> None:
     """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
     span = scene.softground.frame_start, scene.softground.frame_end
     for number, character in enumerate(characters):
-        if number < len(layers) and layers[number]:
-            nla_layer.add_layer(character.armature, layers[number], span)
+        if number < len(layers) and layers[number].curves:
+            nla_layer.add_layer(character.armature, layers[number].curves, span, layers[number].notes)
             nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
         else:
             nla_layer.remove_layer(character.armature)
@@ -194,6 +214,8 @@ def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:
     }
 
 
+NOTICEABLE_GAP_MM = 1.0
+"""Gaps from this on are worth a look [mm]."""
 WORST_GAPS = 10
 """Frames that the report lists as the worst."""
 

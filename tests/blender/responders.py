@@ -186,7 +186,7 @@ def gaps_on_the_rig(scene, result, terrain, character=None):
         stands = np.zeros(len(frames), bool)
         for step in result.report["steps"]:
             if step["contact"] == sole.sole.name and step["character"] == armature.name:
-                stands |= (frames >= step["frame_start"]) & (frames <= step["frame_end"])
+                stands |= (frames >= step["frame_start"]) & (frames <= step["frame_end"] - 0.5)  # then it is leaving
         found.append(lowest_clearance(posed_points(carried)[stands], history, motion.frames[stands]))
     return np.concatenate(found)
 

@@ -1,10 +1,12 @@
 """The response on real rigs: it does what was computed, and the user's animation is as it was."""
 
+import json
+
 import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import nla_layer
+from softground_addon.blender import nla_layer, response_job
 from softground_addon.core.errors import InputError
 from softground_addon.core.heightfield import FlatTerrain
 from tests.blender import fingerprints, responders, rigs, shots
@@ -235,3 +237,30 @@ def test_an_override_of_a_linked_character_responds(scene, tmp_path):
     assert np.percentile(gaps, 95) < 2.0
     bpy.ops.softground.clear_bake()
     assert responders.world_matrices(scene, armature, ["hips", "foot.L"], [10, 40]) == pytest.approx(before, abs=1e-6)
+
+
+def test_the_layer_notes_its_carrier_and_worst_frames(scene):
+    armature = shots.walker(scene)
+    set_up(armature)
+    result = responders.bake(scene)
+    notes = nla_layer.notes_of(armature)
+    assert notes[response_job.CARRIER] == "hips"
+    assert json.loads(notes[response_job.WORST]) == result.report["worst_gaps"]
+    bpy.ops.softground.show_frame(frame=17.0)
+    assert scene.frame_current == 17
+
+
+def test_tilt_presets_set_the_papers_gains_for_the_characters_mass(scene):
+    character = set_up(shots.walker(scene))
+    tilt = scene.softground.tilt
+    bpy.ops.softground.tilt_preset(source="AUTHORS")
+    assert 0.5 < tilt.frequency < 0.75
+    assert 0.7 < tilt.damping < 1.0
+    bpy.ops.softground.tilt_preset(source="PAPER")
+    assert 1 / tilt.frequency > 8
+    light = tilt.frequency
+    character.mass *= 4
+    bpy.ops.softground.tilt_preset(source="PAPER")
+    assert tilt.frequency == pytest.approx(light / 2, rel=1e-3)
+    bpy.ops.softground.tilt_preset(source="DEFAULT")
+    assert (tilt.frequency, tilt.damping) == pytest.approx((0.6, 0.85))
