@@ -17,6 +17,7 @@ from . import (
     panels,
     preset_menu,
     properties,
+    response_panel,
     session,
 )
 
@@ -32,6 +33,7 @@ CLASSES = (
     *force_curves.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *response_panel.CLASSES,
 )
 
 _command: object | None = None
