@@ -8,6 +8,7 @@ from . import (
     character_editing,
     cli,
     force_curves,
+    ground_options_panel,
     handlers,
     live,
     menus,
@@ -33,6 +34,7 @@ CLASSES = (
     *force_curves.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
 )
 
