@@ -9,7 +9,9 @@ from __future__ import annotations
 import time
 import zlib
 from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import bpy
@@ -22,6 +24,7 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import FlatTerrain, Terrain
+from ..core.histories import histories
 from ..core.memory import check_memory
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
@@ -34,6 +37,9 @@ from .ground_mesh import GroundPlan, GroundSurface
 from .materials import ensure_material
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character
+
+PATIENCE = 0.005
+"""Longest wait for a computation that runs aside before its driver gets to do something else [s]."""
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -138,7 +144,16 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
             show(progress)
 
 
-def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
+def _aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
+    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering."""
+    with ThreadPoolExecutor(1) as thread:
+        outcome = thread.submit(function, *arguments)
+        while not wait([outcome], timeout=PATIENCE).done:
+            yield Progress(stage, fraction)
+    return outcome.result()
+
+
+def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # noqa: PLR0915  (one stage after the other)
     """Bake the scene's characters into its ground.
 
     Without a ground in the settings, one is created that fits the walk.
@@ -173,18 +188,20 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     yield Progress("write", 0.0)
     layers = (yield from _layers(scene, characters, answers)) if write else []
     write_ground = write and options.output != "RESPONSE"
-    pressed = PressedGround.at(
+    at_the_end = partial(
+        PressedGround.at,
         footprints,
         frame=float(options.frame_end),
         frame_rate=motions[0].frame_rate,
         cell_size=cell_size,
         blur_sigma=material.blur_sigma,
     )
+    pressed = yield from _aside("write", 0.1, at_the_end)
     vertices = surface.vertices if surface else None
     index = np.zeros(0, dtype=np.intp)
     refine = False
     if ground and surface and write_ground:
-        index = surface.pressed_vertices(pressed, terrain)
+        index = yield from _aside("write", 0.2, surface.pressed_vertices, pressed, terrain)
         refine = _wants_detail(ground, _spacing(surface.vertices[index], pressed), options.detail, cell_size, loads)
     elif write_ground:
         ground = create_ground(scene, plan)
@@ -193,23 +210,19 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
     inputs = _inputs(scene, characters, material)
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
-    input_hash = report.hash_inputs(inputs, motions, vertices)
+    input_hash = yield from _aside("write", 0.3, report.hash_inputs, inputs, motions, vertices)
     playback_error: float | None = None
     if write_ground and ground and vertices is not None:
-        stored = record.dump(footprints, {"inputs": inputs, "input_hash": input_hash})
+        about = {"inputs": inputs, "input_hash": input_hash}
+        stored = yield from _aside("write", 0.4, record.dump, footprints, about)
         if refine:
             place = baked_ground.on_detail(ground, pressed, terrain, cell_size, unit_scale)
         else:
             place = baked_ground.on_itself(ground, index, vertices)
-        playback_error = baked_ground.write(
-            place,
-            footprints,
-            pressed,
-            stored,
-            blur_sigma=material.blur_sigma,
-            unit_scale=unit_scale,
-            shape_keys=options.shape_keys,
-        )
+        fitting = partial(histories, footprints, *place.position[:, :2].T, blur_sigma=material.blur_sigma)
+        over_time = yield from _aside("write", 0.6, fitting)
+        baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale, shape_keys=options.shape_keys)
+        playback_error = over_time.error
     if write and options.output != "PRINTS":
         response_job.put_layers(scene, characters, layers)
     finished = time.perf_counter()
@@ -230,6 +243,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:
         forces=forces if options.keep_forces else None,
         gaps_mm=response_job.gap_table(answers),
         worst_gaps=response_job.worst_gaps(answers),
+        suggested_speed=response_job.suggested_speeds(motions, footprints),
     )
     if write_ground and ground:
         ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = _summary(result)
@@ -285,13 +299,14 @@ def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
     characters = [character for character in options.characters if character.armature]
     check_settings(scene, characters)
     motions = yield from _sample(scene, characters)
-    plan = plan_ground(motions)
+    plan = yield from _aside("sample", 1.0, plan_ground, motions)
     if options.ground is None:
         return Shot(tuple(motions), plan, None, FlatTerrain(plan.height))
     painted = painted_ground.names_of(scene)
     surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
     yield Progress("sample", 1.0)
-    return Shot(tuple(motions), plan, surface, surface.terrain(np.stack([plan.lower, plan.upper])))
+    terrain = yield from _aside("sample", 1.0, surface.terrain, np.stack([plan.lower, plan.upper]))
+    return Shot(tuple(motions), plan, surface, terrain)
 
 
 def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads]]:
@@ -307,8 +322,8 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
     loads = []
     for motion, character in zip(shot.motions, characters, strict=True):
         moved = replace(motion, mass=settings.typed(character.mass))
-        loads.append(estimate_loads(moved, shot.terrain, force_model=character.force_model, material=material))
-        yield Progress("sample", 1.0)
+        estimate = partial(estimate_loads, force_model=character.force_model, material=material)
+        loads.append((yield from _aside("sample", 1.0, estimate, moved, shot.terrain)))
     _check_contacts(loads, shot.terrain, scene.softground.ground)
     return loads
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
-from ..core.histories import histories
+from ..core.histories import Histories
 from ..core.pressed_ground import PressedGround
 from . import ground_mesh, playback, trail_detail
 
@@ -75,28 +74,33 @@ def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Plac
 
 def write(
     place: Place,
-    footprints: Sequence[Footprint],
     pressed: PressedGround,
+    over_time: Histories,
     stored: bytes,
     *,
-    blur_sigma: float,
     unit_scale: float,
     shape_keys: bool = True,
-) -> float:
+) -> None:
     """Put a bake on its place: the finished ground, the record, and the playback.
 
-    Returns
-    -------
-    float
-        Largest error of a played height [m].
+    Parameters
+    ----------
+    place : Place
+    pressed : PressedGround
+        The finished ground.
+    over_time : Histories
+        Of the place's positions.
+    stored : bytes
+        The footprints, from `core.record`.
+    unit_scale : float
+        Metres per Blender unit.
+    shape_keys : bool
+        See `ground_mesh.write`.
     """
-    x, y = place.position[:, :2].T
-    sample = pressed.sample(x, y)
+    sample = pressed.sample(*place.position[:, :2].T)
     ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
-    over_time = histories(footprints, x, y, blur_sigma=blur_sigma)
     up = ground_mesh.up_of(place.carrier, unit_scale)
     playback.install(place.carrier, place.index, over_time, up=up, frame_rate=pressed.frame_rate)
-    return over_time.error
 
 
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.heightfield import Window
+from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
 from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
@@ -120,7 +121,8 @@ class LiveMode:
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
         stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
         place = baked_ground.Place(ground, index, vertices[index])
-        baked_ground.write(place, footprints, pressed, stored, blur_sigma=sigma, unit_scale=unit_scale)
+        over_time = histories(footprints, *place.position[:, :2].T, blur_sigma=sigma)
+        baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale)
 
     def discard(self) -> None:
         """Leave the ground as it was before."""

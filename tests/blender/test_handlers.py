@@ -1,0 +1,65 @@
+"""What the add-on hooks into Blender costs nothing while it is idle, and leaves with it."""
+
+import timeit
+
+import bpy
+import pytest
+
+import softground_addon
+from softground_addon.blender import analysis, handlers, live
+from tests.blender.shots import walker
+
+IDLE_COST = 5e-6
+"""Most that a handler may take while nothing is armed [s]."""
+
+
+@pytest.mark.parametrize("handler", [handlers.follow_frame, handlers.notice_edits])
+def test_an_idle_handler_costs_next_to_nothing(scene, handler):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    analysis.forget()
+    runs = 2000
+    best = min(timeit.repeat(lambda: handler(scene, depsgraph), number=runs, repeat=5)) / runs
+    assert best < IDLE_COST
+
+
+def test_each_handler_is_there_once_and_survives_a_new_file(scene):
+    bpy.ops.wm.read_homefile(use_empty=True)
+    for name, handler in handlers._HANDLERS:
+        assert list(getattr(bpy.app.handlers, name)).count(handler) == 1
+
+
+def test_disabling_the_add_on_in_live_mode_takes_the_prints_and_the_handlers_away(scene):
+    walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.create_ground()
+    ground = scene.softground.ground
+    bpy.ops.softground.live()
+    scene.frame_set(40)
+    assert ground.data.shape_keys
+    softground_addon.unregister()
+    try:
+        assert not live.is_on()
+        assert ground.data.shape_keys is None
+        assert not hasattr(bpy.types.Scene, "softground")
+        for name, handler in handlers._HANDLERS:
+            assert handler not in getattr(bpy.app.handlers, name)
+        scene.frame_set(41)
+    finally:
+        softground_addon.register()
+
+
+def test_an_edited_action_makes_the_prediction_worthless(scene):
+    armature = walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    analysis.read(scene)
+    assert analysis.known(scene)
+    action = armature.animation_data.action
+    action.update_tag()
+    bpy.context.view_layer.update()
+    assert analysis.known(scene) is None
+
+
+def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene):
+    bpy.data.scenes.new(handlers.LEFT_OVER)
+    handlers.after_load()
+    assert [s.name for s in bpy.data.scenes] == [scene.name]

@@ -1,0 +1,148 @@
+"""Panels, presets and the depth to expect, as far as they can be seen without a window."""
+
+import json
+
+import bpy
+import pytest
+
+from softground_addon.blender import analysis, panels, preset_menu, registration
+from softground_addon.core import presets
+from tests.blender.shots import import_motion, walker
+
+
+@pytest.fixture
+def shot(scene):
+    walker(scene, frames=60)
+    bpy.ops.softground.add_character()
+    return scene
+
+
+@pytest.fixture
+def user_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(preset_menu, "user_folder", lambda: tmp_path)
+    return tmp_path
+
+
+def operators():
+    return [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Operator)]
+
+
+def test_everything_has_a_tooltip_and_search_finds_it(addon):
+    for cls in operators():
+        assert cls.bl_label
+        assert cls.__doc__ or hasattr(cls, "description")
+    groups = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
+    for group in groups:
+        for setting in group.bl_rna.properties:
+            nameless = setting.identifier in ("rna_type", "name") or setting.is_hidden
+            if not nameless and setting.type not in ("POINTER", "COLLECTION"):
+                assert setting.description, f"{group.__name__}.{setting.identifier}"
+
+
+def test_panels_come_in_the_order_of_work(addon):
+    shown = [cls for cls in panels.CLASSES if issubclass(cls, bpy.types.Panel)]
+    order = [cls.bl_label for cls in shown if not hasattr(cls, "bl_parent_id")]
+    assert order[:3] == ["Character", "Ground", "Bake"]
+
+
+def test_the_material_is_shown_in_field_units(shot):
+    material = shot.softground.material
+    material.stiffness_mpa = 2.5
+    assert material.youngs_modulus == 2.5e6
+    material.layer_depth = 0.45
+    assert material.layer_depth_cm == pytest.approx(45.0)
+    shot.softground.cell_size_cm = 2
+    assert shot.softground.cell_size == pytest.approx(0.02)
+
+
+def test_the_depth_to_expect_is_that_of_a_bake(shot):
+    assert analysis.expected_depth(shot) is None
+    bpy.ops.softground.predict_depth()
+    expected = analysis.expected_depth(shot)
+    bpy.ops.softground.bake()
+    assert shot.softground.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(expected, rel=0.02)
+
+
+def test_the_depth_to_expect_follows_the_sliders(shot):
+    bpy.ops.softground.predict_depth()
+    before = analysis.expected_depth(shot)
+    shot.softground.material.stiffness_mpa *= 3
+    assert analysis.expected_depth(shot) == pytest.approx(before / 3, rel=0.3)
+    shot.softground.characters[0].mass *= 2
+    assert analysis.expected_depth(shot) > 0.5 * before
+
+
+@pytest.mark.parametrize("depth", [2.0, 6.0])
+@pytest.mark.parametrize("motion", [None, "walk", "run"])
+def test_a_matched_depth_is_met_by_the_bake(scene, motion, depth):
+    if motion:
+        import_motion(motion)
+    else:
+        walker(scene, frames=60)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.match_depth(depth=depth)
+    bpy.ops.softground.bake()
+    reached = scene.softground.ground.data["softground_summary"]["max_depth_m"]
+    assert reached * 100 == pytest.approx(depth, rel=0.02)
+
+
+def test_a_depth_beyond_the_layer_is_refused(shot):
+    with pytest.raises(RuntimeError, match="No stiffness gives"):
+        bpy.ops.softground.match_depth(depth=80)
+
+
+def tooltip(**choice):
+    class Choice:
+        name, filepath = choice.get("name", ""), choice.get("filepath", "")
+
+    return preset_menu.SOFTGROUND_OT_load_preset.description(bpy.context, Choice)
+
+
+def test_the_tooltip_of_a_preset_gives_source_and_depth(shot):
+    assert "Alvarado" in tooltip(name="Snow")
+    assert "cm" not in tooltip(name="Snow")
+    bpy.ops.softground.predict_depth()
+    bpy.ops.softground.load_preset(name="Mud")
+    expected = analysis.expected_depth(shot)
+    bpy.ops.softground.load_preset(name="Snow")
+    assert tooltip(name="Mud").endswith(f"Walker: {expected * 100:.1f} cm")
+
+
+def test_a_preset_of_one_s_own_comes_back_as_it_was_saved(shot, user_folder):
+    shot.softground.material.stiffness_mpa = 0.123
+    bpy.ops.softground.save_preset(name="Beach at Noon", source="measured with a stick")
+    (path,) = user_folder.glob("*.json")
+    assert presets.load(path).source == "measured with a stick"
+    bpy.ops.softground.load_preset(name="Snow")
+    assert not bpy.ops.softground.remove_preset.poll()
+    bpy.ops.softground.load_preset(filepath=str(path))
+    assert shot.softground.material.youngs_modulus == pytest.approx(123e3)
+    bpy.ops.softground.remove_preset()
+    assert not list(user_folder.glob("*.json"))
+    with pytest.raises(RuntimeError, match="comes with SoftGround"):
+        bpy.ops.softground.save_preset(name="Snow")
+
+
+def test_broken_preset_files_are_left_out_with_a_message(user_folder):
+    (user_folder / "broken.json").write_text("{")
+    (user_folder / "odd.json").write_text(json.dumps({"schema_version": 1, "name": "Odd", "material": {"x": 1}}))
+    (user_folder / "good.json").write_text(presets.dump(presets.find("snow")))
+    found, broken = preset_menu.listed(user_folder)
+    assert [path.name for path, _ in found] == ["good.json"]
+    assert len(broken) == 2
+    assert all("json" in message for message in broken)
+
+
+def test_characters_and_soles_can_be_corrected(shot):
+    character = shot.softground.characters[0]
+    bpy.ops.softground.add_sole()
+    assert [sole.name for sole in character.soles] == ["foot.L", "foot.R", "sole 1"]
+    bpy.ops.softground.remove_sole()
+    character.joints[0].bone = "nonsense"
+    bpy.ops.softground.detect_bones()
+    assert "nonsense" not in [joint.bone for joint in character.joints]
+    assert [sole.name for sole in character.soles] == ["foot.L", "foot.R"]
+    bpy.ops.softground.remove_character()
+    assert not shot.softground.characters
+    assert not bpy.ops.softground.remove_character.poll()
+    assert not bpy.ops.softground.bake.poll()
