@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +13,9 @@ Array = NDArray[np.float64]
 
 Pressure = Literal["UNIFORM", "CENTRE_OF_PRESSURE"]
 """Evenly, as in the paper; or linearly over the contact, so that it acts where the force does."""
+
+KERN = 1 / sqrt(3.0)
+"""Edge of the kern of a rectangle, a sixth of its length from its middle, in standard deviations of its area."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +64,10 @@ class PressureSlope:
 def pressure_slope(x: Array, y: Array, area: Array, centre: Array, least_extent: float) -> PressureSlope:
     """The linear pressure over a contact whose middle is the centre of pressure.
 
-    As in the section of a beam under an eccentric force, the slope is that of the second moments of the contact times
-    the eccentricity. A centre of pressure so far out that one side would have to pull (beyond the kern of the section)
-    is met in part: the far side is free of pressure.
+    As in the section of a beam under an eccentric force, the slope is the eccentricity over the second moments of the
+    contact. A centre of pressure so far out that one side would have to pull, beyond the kern of the section, says that
+    the contact or the centre is not known that well: it counts as on the edge of the kern, where the pressure falls to
+    nothing on one side and doubles on the other.
 
     Parameters
     ----------
@@ -83,4 +88,6 @@ def pressure_slope(x: Array, y: Array, area: Array, centre: Array, least_extent:
     spread = np.einsum("niq,njq->nij", from_middle * share[:, None], from_middle)
     spread += np.eye(2) * (least_extent**2 / 12.0)
     eccentricity = np.where(loaded[:, None], centre - middle, 0.0)
-    return PressureSlope(middle, np.linalg.solve(spread, eccentricity[..., None])[..., 0])
+    slope = np.linalg.solve(spread, eccentricity[..., None])[..., 0]
+    deviations = np.sqrt(np.maximum(np.einsum("ni,ni->n", slope, eccentricity), 0.0))
+    return PressureSlope(middle, slope * np.minimum(1.0, KERN / np.maximum(deviations, KERN))[:, None])
