@@ -25,6 +25,9 @@ Sampling = Generator[int, None, CharacterMotion]
 _SCALE_TOLERANCE = 1e-3
 """Relative difference of scale between axes, and cosine between them, that still counts as uniform."""
 
+_FARTHEST = 1e6
+"""Largest coordinate that a pose may have [Blender units]: single precision knows no centimetres beyond."""
+
 _TEMPORARY = "SoftGround Sampling"
 """Name of what exists only while a rig is read."""
 
@@ -252,11 +255,11 @@ def _is_animated(armature: bpy.types.Object) -> bool:
 
 def _check_recording(name: str, recording: Recording) -> None:
     for matrices in (recording.armature, *recording.bones.values(), *recording.things.values()):
-        bad = ~np.isfinite(matrices).all(axis=(1, 2))
+        bad = ~(np.abs(matrices) <= _FARTHEST).all(axis=(1, 2))
         if bad.any():
             raise InputError(
                 f"'{name}' has no finite pose at frame {int(recording.frames[bad.argmax()])}: "
-                "look for broken keys (NaN or infinite values) in its action and delete them."
+                "look for broken keys (NaN, infinite or huge values) in its action and delete them."
             )
     axes = recording.armature[:, :3, :3]
     gram = np.swapaxes(axes, -1, -2) @ axes

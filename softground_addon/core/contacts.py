@@ -258,7 +258,7 @@ def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
         if last < len(touching):
             landmark = rise[last].argmin()
             begin = max(last - search, start + 1)
-            end = begin + int(np.argmax(acceleration[begin : last + search, landmark]))
+            end = begin + int(np.argmax(acceleration[begin : last + max(search, 1), landmark]))
         sharp[start:end] = True
     return sharp
 

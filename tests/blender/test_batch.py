@@ -217,6 +217,7 @@ def test_two_jobs_are_almost_twice_as_fast_as_one(night):
     if (os.cpu_count() or 1) < 2:
         pytest.skip("needs two cores")
     manifest = night(8, frames=120)
+    busy = os.getloadavg()[0] > 1.2
     seconds = {}
     for jobs in (1, 2):
         started = time.perf_counter()
@@ -225,8 +226,9 @@ def test_two_jobs_are_almost_twice_as_fast_as_one(night):
     print(
         f"\n8 shots: {seconds[1]:.1f} s with one job, {seconds[2]:.1f} s with two ({seconds[1] / seconds[2]:.2f} times)"
     )
-    busy = os.getloadavg()[0] > 2.5
-    assert seconds[1] / seconds[2] >= (1.3 if busy else 1.7)
+    if busy:
+        pytest.skip("the machine was busy with other work, so that the ratio says nothing")
+    assert seconds[1] / seconds[2] >= 1.8
 
 
 @pytest.mark.benchmark
@@ -236,11 +238,11 @@ def test_the_command_line_adds_little_to_a_bake(night):
     within, whole = [], []
     for _ in range(3):
         bpy.ops.wm.open_mainfile(filepath=str(shot))
-        started = time.perf_counter()
+        started = time.process_time()  # of processors, whatever else the machine does
         assert cli.run_in_blender(["bake", *options]) == 0
-        within.append(time.perf_counter() - started)
-        started = time.perf_counter()
+        within.append(time.process_time() - started)
+        started = sum(os.times()[2:4])
         subprocess.run([sys.executable, "-m", "softground_addon", "bake", str(shot), *options], cwd=ROOT, check=True)
-        whole.append(time.perf_counter() - started)
-    print(f"\nin process {min(within):.2f} s, command line {min(whole):.2f} s")
+        whole.append(sum(os.times()[2:4]) - started)
+    print(f"\nin process {min(within):.2f} s, command line {min(whole):.2f} s of processor time")
     assert min(whole) - min(within) <= 1.5
