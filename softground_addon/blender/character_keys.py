@@ -85,6 +85,7 @@ def _parts_in_armature(response: Response, motion: CharacterMotion, poses: RigPo
             f"foot_{side}": leg.foot,
             f"knee_{side}": shift,
         }
+    parts |= {f"arm_{side}": response.body @ arm for side, arm in response.arms.items()}
     to_world = poses.world
     from_world = np.linalg.inv(to_world)
     result = {}

@@ -382,6 +382,38 @@ class SoftGroundGrounding(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
     )
+    knee_lift: FloatProperty(
+        name="Lift Knees",
+        description="Lift swinging feet higher, at 1 by as much as they had sunk",
+        default=0.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    hold: FloatProperty(
+        name="Hold Feet",
+        description="Let feet stay longer in deep ground and catch up in their swing",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    crouch: FloatProperty(
+        name="Bend Knees",
+        description="Bring the hips down in deep ground, at 1 by half the sinkage",
+        default=0.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    arms: FloatProperty(
+        name="Arms Out",
+        description="Raise the arms sideways for balance in deep ground",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
 
 
 class SoftGroundSettings(bpy.types.PropertyGroup):

@@ -13,12 +13,14 @@ from ..core.footprints import Footprint
 from ..core.grounding import Response, responding
 from ..core.heightfield import Terrain
 from ..core.motion import CharacterMotion
+from ..core.performance import Performance, suggested_speed
 from ..core.response import (
     Gaps,
     GroundingOptions,
     TiltOptions,
     at_scene_frames,
     gaps,
+    mean_sinkage,
     respond,
     stood_on,
 )
@@ -28,6 +30,9 @@ from . import nla_layer, settings
 from .character_keys import controls_of, response_curves
 from .character_setup import mapping_of
 from .properties import SoftGroundCharacter
+
+PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
+"""What can be acted in deep ground, as the settings and the core call it."""
 
 NOTICEABLE_LEAN = np.radians(0.25)
 """A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
@@ -77,7 +82,11 @@ def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
         gains = TiltGains(settings.typed(options.tilt.frequency), settings.typed(options.tilt.damping))
         tilt = TiltOptions(gains, settings.typed(options.tilt.strength), settings.typed(options.tilt.lateral))
     if options.grounding.use:
-        grounding = GroundingOptions(settings.typed(options.grounding.align), settings.typed(options.grounding.lock))
+        grounding = GroundingOptions(
+            settings.typed(options.grounding.align),
+            settings.typed(options.grounding.lock),
+            Performance(**{part: settings.typed(getattr(options.grounding, part)) for part in PERFORMANCE}),
+        )
     return ResponseOptions(tilt, grounding)
 
 
@@ -241,3 +250,8 @@ def warnings(answers: Sequence[Answer]) -> list[str]:
         for answer in answers
         if not answer.response.legs
     ]
+
+
+def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:
+    """Speed that people would choose on this ground, over that of level hard ground, by character."""
+    return {motion.name: round(suggested_speed(mean_sinkage(footprints, motion.name)), 3) for motion in motions}

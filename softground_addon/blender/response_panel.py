@@ -91,7 +91,10 @@ class SOFTGROUND_PT_response(bpy.types.Panel):
         scene = settings.scene_of(context)
         options, character = scene.softground, active_character(scene)
         layout.prop(options, "output")
-        _group(layout, options.grounding, ("align", "lock"))
+        column = _group(layout, options.grounding, ("align", "lock"))
+        column.separator()
+        for part in response_job.PERFORMANCE:
+            column.prop(options.grounding, part)
         column = _group(layout, options.tilt, ("strength", "lateral", "frequency", "damping"))
         column.operator_menu_enum("softground.tilt_preset", "source")
         if character and nla_layer.has_layer(character.armature):

@@ -32,7 +32,8 @@ class Control:
     ----------
     bone : str
     part : str
-        What it moves with: "body", or "thigh", "shank", "foot", "knee" and a side, e.g. "thigh_l".
+        What it moves with: "body", or "thigh", "shank", "foot", "knee", "arm" and a side, e.g.
+        "thigh_l".
     carried_by : str
         The part that its parents move with already; empty if none of them is keyed.
     moves : bool
@@ -93,6 +94,10 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
                 sides.append(side)
                 found += leg
                 parts |= {bone: part for bone, part, _ in leg}
+        arm = _arm_control(rig, mapping, side)
+        if arm and arm not in parts:
+            found.append((arm, f"arm_{side}", False))
+            parts[arm] = f"arm_{side}"
     controls = []
     for bone, part, moves in found:
         above = (ancestor for ancestor in rig.behind(bone) if ancestor != bone and ancestor in parts)
@@ -144,6 +149,15 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
     return [(bone, f"{part}_{side}", False) for bone, part in zip(bones, ("thigh", "shank", "foot"), strict=True)]
 
 
+def _arm_control(rig: _Rig, mapping: RigMapping, side: str) -> str:
+    """The upper arm of an FK arm; empty where there is none."""
+    if f"shoulder_{side}" not in mapping.joints:
+        return ""
+    arm = rig.origin(mapping.joints[f"shoulder_{side}"][0])
+    solved = any(rig.solvers(bone) for bone in (arm, *rig.below(arm)))
+    return arm if rig.is_free(arm) and not solved else ""
+
+
 class _Rig:
     """An armature's bones as a graph of what follows what."""
 
@@ -164,6 +178,10 @@ class _Rig:
                 if source not in seen:
                     seen.add(source)
                     waiting.append(source)
+
+    def below(self, bone: str) -> list[str]:
+        """The bones under another one."""
+        return [child.name for child in self._bones[bone].children_recursive]
 
     def origin(self, bone: str) -> str:
         """The bone that another one copies, and so on to the first."""

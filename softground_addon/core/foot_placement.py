@@ -112,6 +112,7 @@ def place_sole(
     align: float = 1.0,
     lock: float = 0.0,
     heel_rise: Array | None = None,
+    change: Array | None = None,
 ) -> Placement:
     """Put a sole on the ground.
 
@@ -137,6 +138,8 @@ def place_sole(
         How much of the source's sliding during a contact is taken out, 0 to 1.
     heel_rise : (F,) float array, optional
         Angle by which the foot rolls further over its toes [rad].
+    change : (F, 3) float array, optional
+        Further displacement, 0 while it touches [m].
 
     Returns
     -------
@@ -165,6 +168,8 @@ def place_sole(
     lift = _between_contacts(_let_down(np.where(np.isfinite(needed), needed, 0.0), touching, steepest), touching)
     lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * per_second)))
     carry[:, 2, 3] += lift
+    if change is not None:
+        carry[:, :3, 3] += change
     on_top = -lowest_clearance(turned, undisturbed, frames)
     sinkage = np.maximum(np.where(touching & np.isfinite(on_top), on_top - needed, 0.0), 0.0)
     return Placement(carry, lift, sinkage)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,21 +65,21 @@ class Response:
         By side, "l" and "r".
     lean : (F, 2) float array
         Angle that the body leans toward +x and +y [rad].
-    arms : (F,) float array
-        Angle by which the upper arms are raised sideways [rad].
+    arms : mapping of str to (F, 4, 4) float array
+        By side, what moves the upper arms before `body` does; empty if nothing.
     """
 
     frames: Array
     body: Array
     legs: Mapping[str, LegResponse]
     lean: Array
-    arms: Array
+    arms: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def is_none(self) -> bool:
         """Whether nothing moves."""
         parts = [self.body, *(part for leg in self.legs.values() for part in (leg.thigh, leg.shank, leg.foot))]
-        return not self.arms.any() and all(np.allclose(part, np.eye(4), atol=1e-7) for part in parts)
+        return all(np.allclose(part, np.eye(4), atol=1e-7) for part in (*parts, *self.arms.values()))
 
 
 def leg_soles(motion: CharacterMotion) -> dict[str, int]:
@@ -193,7 +193,7 @@ def settle(
         foot = placements[side][1].carry.copy()
         foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
         responses[side] = LegResponse(solved.thigh, solved.shank, foot)
-    return Response(motion.frames, body, responses, lean, np.zeros(count))
+    return Response(motion.frames, body, responses, lean)
 
 
 def heel_rises(
@@ -267,7 +267,7 @@ def hips_of(motion: CharacterMotion) -> Array:
 def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
     """The motion with the response on top of it."""
     feet = leg_soles(motion)
-    carry_of_joint = {
+    carry_of_joint: dict[str, Array] = {
         f"{joint}_{side}": part
         for side, leg in response.legs.items()
         for joint, part in (
@@ -278,11 +278,13 @@ def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
             ("toe", leg.foot),
         )
     }
+    for side, arm in response.arms.items():
+        carry_of_joint |= {f"{joint}_{side}": response.body @ arm for joint in ("shoulder", "elbow", "wrist")}
     joints = {name: carried(carry_of_joint.get(name, response.body), path) for name, path in motion.joints.items()}
     soles = []
     for index, sole in enumerate(motion.soles):
-        side = next((side for side in response.legs if feet.get(side) == index or _worn(motion, sole, side)), None)
-        carry = response.legs[side].foot if side else response.body
+        worn_by = next((side for side in response.legs if feet.get(side) == index or _worn(motion, sole, side)), None)
+        carry = response.legs[worn_by].foot if worn_by else response.body
         soles.append(SoleMotion(sole.sole, carry[:, None] @ sole.transforms))
     return dataclasses.replace(motion, joints=joints, soles=tuple(soles))
 

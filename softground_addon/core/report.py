@@ -27,6 +27,7 @@ def build(
     forces: Mapping[str, object] | None = None,
     gaps_mm: Mapping[str, object] | None = None,
     worst_gaps: Sequence[Mapping[str, object]] = (),
+    suggested_speed: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -52,6 +53,8 @@ def build(
         Distance of the standing soles from the ground before and after grounding, by character.
     worst_gaps : sequence of mapping
         The frames and soles where it is largest after grounding.
+    suggested_speed : mapping, optional
+        Speed that people would choose on this ground, over that on hard ground, by character.
     """
     steps: list[dict[str, Any]] = [
         {
@@ -89,6 +92,8 @@ def build(
     if gaps_mm is not None:
         report["gaps_mm"] = dict(gaps_mm)
         report["worst_gaps"] = [dict(gap) for gap in worst_gaps]
+    if suggested_speed is not None:
+        report["suggested_speed"] = dict(suggested_speed)
     if forces is not None:
         report["forces"] = dict(forces)
     return report

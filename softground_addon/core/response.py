@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,15 @@ from .ground_history import GroundHistory
 from .grounding import Response, heel_rises, hips_of, leg_soles, responding, settle, time_scale
 from .heightfield import FlatTerrain, Terrain
 from .motion import CharacterMotion
+from .performance import (
+    BENT,
+    DEPTH_TIME,
+    Performance,
+    body_depth,
+    raised_arms,
+    sinkage_over_time,
+    swing_change,
+)
 from .slopes import fitted_slope, smoothed
 from .tilt import LARGEST_LEAN, TiltGains, along_heading, lean, ring_around
 
@@ -55,10 +64,13 @@ class GroundingOptions:
         How much of the ground's slope the feet take on, 0 to 1.
     lock : float
         How much of the source's sliding is taken out of contacts, 0 to 1.
+    performance : Performance
+        What is acted on top.
     """
 
     align: float = 1.0
     lock: float = 0.0
+    performance: Performance = field(default_factory=Performance)
 
 
 @dataclass(frozen=True)
@@ -112,7 +124,7 @@ def respond(
         placements = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
         return settle(motion, placements, touching, leaning)
 
-    def placed(side: str, heel_rise: Array | None) -> tuple[int, Placement]:
+    def placed(side: str, heel_rise: Array | None = None, change: Array | None = None) -> tuple[int, Placement]:
         sole = feet[side]
         return sole, place_sole(
             motion.soles[sole],
@@ -125,12 +137,41 @@ def respond(
             align=grounding.align,
             lock=grounding.lock,
             heel_rise=heel_rise,
+            change=change,
         )
 
-    placements = {side: placed(side, None) for side in feet}
-    rises = heel_rises(motion, placements, touching, leaning)
-    placements |= {side: placed(side, rise) for side, rise in rises.items() if rise.any()}
-    return settle(motion, placements, touching, leaning)
+    placements = {side: placed(side) for side in feet}
+    acted, crouch, arms = _acted(motion, touching, placements, grounding.performance)
+    placements |= {side: placed(side, change=change) for side, change in acted.items()}
+    rises = heel_rises(motion, placements, touching, leaning, crouch=crouch)
+    placements |= {side: placed(side, rise, acted.get(side)) for side, rise in rises.items() if rise.any()}
+    return replace(settle(motion, placements, touching, leaning, crouch=crouch), arms=arms)
+
+
+def _acted(
+    motion: CharacterMotion, touching: Mask, placements: Mapping[str, tuple[int, Placement]], acting: Performance
+) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
+    """What is acted on top: displacement of each foot, how much deeper the hips go, and what raises the arms."""
+    if acting.is_none or not placements:
+        return {}, None, {}
+    depths = {
+        side: sinkage_over_time(placement.sinkage, touching[:, sole]) for side, (sole, placement) in placements.items()
+    }
+    depth = body_depth(depths, DEPTH_TIME * motion.frame_rate * time_scale(motion))
+    feet = {
+        side: swing_change(motion.joints[f"ankle_{side}"], depths[side], touching[:, sole], acting, motion.leg_length)
+        for side, (sole, _) in placements.items()
+        if acting.knee_lift or acting.hold
+    }
+    shoulders = {side: motion.joints[f"shoulder_{side}"] for side in "lr" if f"shoulder_{side}" in motion.joints}
+    arms = raised_arms(shoulders, _heading(motion), depth, acting.arms, motion.leg_length) if acting.arms else {}
+    return feet, acting.crouch * BENT * depth, arms
+
+
+def mean_sinkage(footprints: Sequence[Footprint], character: str) -> float:
+    """Mean depth of a character's prints [m]."""
+    depths = [footprint.max_depth_m for footprint in footprints if footprint.character == character]
+    return float(np.mean(depths)) if depths else 0.0
 
 
 def _unmoved(count: int) -> Placement:

@@ -264,3 +264,26 @@ def test_tilt_presets_set_the_papers_gains_for_the_characters_mass(scene):
     assert tilt.frequency == pytest.approx(light / 2, rel=1e-3)
     bpy.ops.softground.tilt_preset(source="DEFAULT")
     assert (tilt.frequency, tilt.damping) == pytest.approx((0.6, 0.85))
+
+
+def test_acting_raises_the_arms_and_the_knees_on_the_rig(scene):
+    set_up(shots.walker(scene))
+    scene.softground.material.youngs_modulus = 5e4
+    joints = dict(responders.mapping_of(scene.softground.characters[0]).joints)
+    bones = [joints[joint][0] for joint in ("wrist_l", "wrist_r", "shoulder_l", "shoulder_r")]
+    frames = range(20, 60, 4)
+    responders.bake(scene, tilt=False)
+    plain = responders.world_matrices(scene, scene.softground.characters[0].armature, bones, frames)[..., :3, 3]
+    knees = responders.knee_angles(scene).max()
+    grounding = scene.softground.grounding
+    grounding.arms, grounding.knee_lift = 1.0, 1.0
+    result = responders.bake(scene, tilt=False)
+    acted = responders.world_matrices(scene, scene.softground.characters[0].armature, bones, frames)[..., :3, 3]
+
+    def spread(points):
+        return np.linalg.norm((points[:, 0] - points[:, 1])[:, :2], axis=1)
+
+    assert (spread(acted) > spread(plain) + 0.1).all()
+    assert acted[:, 2:] == pytest.approx(plain[:, 2:], abs=0.03)
+    assert responders.knee_angles(scene).max() > knees
+    assert 0.8 < result.report["suggested_speed"]["Walker"] < 0.95
