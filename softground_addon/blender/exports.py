@@ -49,7 +49,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
 
     def samples() -> Iterator[NDArray[np.float32]]:
         for frame in range(start, end + 1):
-            height = over_time.ramps.at(frame, len(moved))[:, 0]
+            height = over_time.heights.at(frame, len(moved))
             sample = rest.copy()
             sample[moved] += (height[:, None] * up).astype(np.float32)
             yield sample
@@ -147,11 +147,12 @@ def export_images(
     paths = []
     with _image(resolution) as image:
         for frame in range(start, end + 1):
-            value = over_time.ramps.at(frame, len(pixels.index))
+            height = over_time.heights.at(frame, len(pixels.index))
+            compression = over_time.compression.at(frame, len(pixels.index))
             age = _age(over_time, frame, len(pixels.index), scene)
-            mask = np.stack([value[:, 1], np.maximum(value.sum(axis=1), 0.0), age], axis=-1)
+            mask = np.stack([compression, np.maximum(height + compression, 0.0), age], axis=-1)
             for name, channels, empty in (
-                (DISPLACEMENT, np.repeat(value[:, :1], 3, axis=1), (0.0, 0.0, 0.0)),
+                (DISPLACEMENT, np.repeat(height[:, None], 3, axis=1), (0.0, 0.0, 0.0)),
                 (MASK, mask, (0.0, 0.0, -1.0)),
             ):
                 path = folder / f"{bpy.path.clean_name(ground.name)}_{name}_{frame:04d}.exr"

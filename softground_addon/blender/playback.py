@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, cast
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.histories import Histories
+from ..core.histories import Histories, Visits
+from ..core.ramps import Ramps
 from . import playback_nodes as nodes
 from .playback_nodes import numbered
 
@@ -23,7 +25,8 @@ PER_LAYER = 3
 NO_VISIT = 1e9
 """Frame of visits that never come."""
 
-_PREFIXES = (*nodes.RAMPS, nodes.MOVES, nodes.VISIT)
+_NAMES = (nodes.MOVED, nodes.SPAN, nodes.VISITED, nodes.PRESSURE)
+_NUMBERED = (*nodes.HEIGHTS, *nodes.COMPRESSIONS, nodes.VISIT)
 _VALUE = {"FLOAT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector"}
 
 
@@ -48,9 +51,14 @@ def install(
     """
     remove(ground)
     mesh = cast("bpy.types.Mesh", ground.data)
-    layers = _write_ramps(mesh, index, histories)
-    visits = _write_visits(mesh, index, histories)
-    group = nodes.build(layers=layers, visits=visits, up=up.tolist(), frame_rate=frame_rate)
+    _write_spans(mesh, index, histories)
+    group = nodes.build(
+        height_layers=_write_ramps(mesh, index, histories.heights, nodes.HEIGHTS),
+        compression_layers=_write_ramps(mesh, index, histories.compression, nodes.COMPRESSIONS),
+        visits=_write_visits(mesh, index, histories.visits),
+        up=up.tolist(),
+        frame_rate=frame_rate,
+    )
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
     modifier.show_in_editmode = False
@@ -83,12 +91,12 @@ def remove(ground: bpy.types.Object) -> None:
 
 def is_playback_attribute(name: str) -> bool:
     """Whether an attribute of this name belongs to the playback."""
-    return name in (nodes.VISITED, nodes.PRESSURE) or name.rpartition("_")[0] in _PREFIXES
+    return name in _NAMES or name.rpartition("_")[0] in _NUMBERED
 
 
 def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     """Vertices that the playback moves, (K,)."""
-    attribute: Any = mesh.attributes.get(numbered(nodes.MOVES, 0))
+    attribute: Any = mesh.attributes.get(nodes.MOVED)
     if attribute is None:
         return np.zeros(0, dtype=np.intp)
     moves = np.empty(len(attribute.data), dtype=bool)
@@ -96,28 +104,36 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     return np.flatnonzero(moves)
 
 
-def _write_ramps(mesh: bpy.types.Mesh, index: Indices, histories: Histories) -> int:
-    """Store the ramps in layers; returns how many layers there are."""
-    ramps = histories.ramps
+def _write_spans(mesh: bpy.types.Mesh, index: Indices, histories: Histories) -> None:
+    """Store which vertices the bake moves, from when to when, and how far in all."""
+    spans = np.zeros((len(mesh.vertices), 3))
+    spans[:, 0], spans[:, 1] = np.inf, -np.inf
+    for part in (histories.heights, histories.compression, histories.visits):
+        np.minimum.at(spans[:, 0], index[part.point], part.start)
+        np.maximum.at(spans[:, 1], index[part.point], part.end)
+    moved = np.isfinite(spans[:, 0])
+    spans[~moved] = 0.0
+    np.add.at(spans[:, 2], index[histories.heights.point], histories.heights.change)
+    _store(mesh, nodes.MOVED, "BOOLEAN", moved)
+    _store(mesh, nodes.SPAN, "FLOAT_VECTOR", spans.astype(np.float32))
+
+
+def _write_ramps(mesh: bpy.types.Mesh, index: Indices, ramps: Ramps, names: Sequence[str]) -> int:
+    """Store ramps in layers; returns how many layers there are."""
     layer, place = np.divmod(ramps.rank(), PER_LAYER)
     count = int(layer.max(initial=-1)) + 1
-    columns = (ramps.start, ramps.end, ramps.change[:, 0], ramps.change[:, 1])
     for number in range(count):
         chosen = layer == number
         vertex = index[ramps.point[chosen]]
-        moves = np.zeros(len(mesh.vertices), dtype=bool)
-        moves[vertex] = True
-        _store(mesh, numbered(nodes.MOVES, number), "BOOLEAN", moves)
-        for name, values in zip(nodes.RAMPS, columns, strict=True):
+        for name, values in zip(names, (ramps.start, ramps.end, ramps.change), strict=True):
             vectors = np.zeros((len(mesh.vertices), PER_LAYER), dtype=np.float32)
             vectors[vertex, place[chosen]] = values[chosen]
             _store(mesh, numbered(name, number), "FLOAT_VECTOR", vectors)
     return count
 
 
-def _write_visits(mesh: bpy.types.Mesh, index: Indices, histories: Histories) -> int:
+def _write_visits(mesh: bpy.types.Mesh, index: Indices, visits: Visits) -> int:
     """Store the contacts; returns the largest number of one vertex."""
-    visits = histories.visits
     rank = visits.rank()
     count = int(rank.max(initial=-1)) + 1
     if count:
@@ -129,9 +145,8 @@ def _write_visits(mesh: bpy.types.Mesh, index: Indices, histories: Histories) ->
     for number in range(count):
         chosen = rank == number
         vertex = index[visits.point[chosen]]
-        latest[vertex] = np.maximum(
-            latest[vertex], visits.end[chosen]
-        )  # soles may leave in another order than they come
+        # Soles may leave in another order than they came.
+        latest[vertex] = np.maximum(latest[vertex], visits.end[chosen])
         vectors = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
         vectors[:, :2] = NO_VISIT
         vectors[vertex] = np.stack([visits.start[chosen], latest[vertex], visits.pressure[chosen]], axis=-1)

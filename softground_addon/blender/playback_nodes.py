@@ -1,7 +1,8 @@
 """The node group that plays a bake: attributes and the time in, the ground at that time out.
 
-It is native Blender data and needs nothing of this add-on. Per layer it reads three ramps of each vertex (`RAMPS`)
-and adds them up; only the vertices that a layer moves are evaluated. Positions start from the undisturbed ones.
+It is native Blender data and needs nothing of this add-on. Each vertex stands still most of the time: before its first
+movement where it was, after its last where that left it. Only vertices in between have their ramps added up, three to
+a layer. Positions start from the undisturbed ones.
 """
 
 from __future__ import annotations
@@ -14,14 +15,18 @@ import bpy
 GROUP = "SoftGround Playback"
 
 REST = "softground_rest"
-START, END, RISE, COMPRESS = "softground_start", "softground_end", "softground_rise", "softground_compress"
-RAMPS = (START, END, RISE, COMPRESS)
-"""Vectors that hold three ramps each: first and last frame, change of height and of compression [m]; by layer."""
-MOVES = "softground_moves"
-"""Whether a layer moves the vertex."""
+MOVED = "softground_moved"
+"""Whether the bake moves or touches the vertex at all."""
+SPAN = "softground_span"
+"""Frame before which nothing happens to the vertex, frame after which nothing does, and change of height in all [m]."""
+HEIGHTS = ("softground_height_start", "softground_height_end", "softground_height_change")
+COMPRESSIONS = ("softground_press_start", "softground_press_end", "softground_press_change")
+"""Vectors that hold three ramps each: first frame, last frame, change [m]; by layer."""
 VISIT = "softground_visit"
 """First and last frame of a contact and its pressure [Pa], by number of the visit."""
 VISITED = "softground_visited"
+ACTIVE = "softground_active"
+"""Whether something happens to the vertex at the frame that is shown; made by the nodes."""
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
 LOADING = 0.2
@@ -36,12 +41,14 @@ def numbered(name: str, layer: int) -> str:
     return f"{name}_{layer}"
 
 
-def build(*, layers: int, visits: int, up: Sequence[float], frame_rate: float) -> bpy.types.NodeTree:
+def build(
+    *, height_layers: int, compression_layers: int, visits: int, up: Sequence[float], frame_rate: float
+) -> bpy.types.NodeTree:
     """A new node group.
 
     Parameters
     ----------
-    layers : int
+    height_layers, compression_layers : int
         Number of layers of three ramps.
     visits : int
         Largest number of contacts of one vertex.
@@ -52,47 +59,60 @@ def build(*, layers: int, visits: int, up: Sequence[float], frame_rate: float) -
     """
     graph = _Graph(GROUP)
     geometry, frame = graph.inputs(up)
-    geometry = _heights(graph, geometry, frame, layers)
-    shaded = _shading(graph, geometry, frame, layers, visits, frame_rate)
+    first, last, total = graph.components(graph.attribute(SPAN))
+    under_way = graph.both(graph.compare("LESS_THAN", first, frame), graph.compare("LESS_THAN", frame, last))
+    geometry = graph.store(geometry, ACTIVE, under_way, MOVED, kind="BOOLEAN")
+    graph.next_row()
+    over = graph.compare("GREATER_EQUAL", frame, last)
+    geometry = graph.raise_from_rest(geometry, MOVED, graph.math("MULTIPLY", total, over))
+    if height_layers:
+        geometry = graph.raise_from_rest(geometry, ACTIVE, _sum(graph, frame, HEIGHTS, height_layers))
+    shaded = _compression_and_rim(graph, geometry, frame, over, compression_layers)
+    if visits:
+        shaded = _age_and_pressure(graph, shaded, frame, visits, frame_rate)
+    graph.next_row()
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
 
 
-def _heights(graph: _Graph, geometry: Any, frame: Any, layers: int) -> Any:
+def _sum(graph: _Graph, frame: Any, names: Sequence[str], layers: int) -> Any:
+    """Sum of the ramps of all layers."""
+    start, end, change = names
+    total: Any = None
     for layer in range(layers):
         graph.next_row()
-        rise = graph.vector("DOT_PRODUCT", _shares(graph, frame, layer), graph.attribute(numbered(RISE, layer)))
-        node = graph.node("GeometryNodeSetPosition")
-        graph.link(geometry, node.inputs["Geometry"])
-        graph.link(graph.attribute(numbered(MOVES, layer), "BOOLEAN"), node.inputs["Selection"])
-        if layer == 0:
-            graph.link(graph.attribute(REST), node.inputs["Position"])
-        graph.link(graph.vector("SCALE", graph.up, scale=rise), node.inputs["Offset"])
-        geometry = node.outputs["Geometry"]
-    return geometry
+        share = graph.map_range(
+            "FLOAT_VECTOR", frame, graph.attribute(numbered(start, layer)), graph.attribute(numbered(end, layer))
+        )
+        value = graph.vector("DOT_PRODUCT", share, graph.attribute(numbered(change, layer)))
+        total = value if total is None else graph.math("ADD", total, value)
+    return total
 
 
-def _shading(graph: _Graph, geometry: Any, frame: Any, layers: int, visits: int, frame_rate: float) -> Any:
-    for layer in range(layers):
+def _compression_and_rim(graph: _Graph, geometry: Any, frame: Any, over: Any, layers: int) -> Any:
+    """Both as the finished ground has them where a vertex has come to rest, nothing before its first movement."""
+    for name in (COMPRESSION, RIM):
         graph.next_row()
-        value = graph.vector("DOT_PRODUCT", _shares(graph, frame, layer), graph.attribute(numbered(COMPRESS, layer)))
-        if layer:
-            value = graph.math("ADD", graph.attribute(COMPRESSION, "FLOAT"), value)
-        geometry = graph.store(geometry, COMPRESSION, value, numbered(MOVES, layer))
+        geometry = graph.store(geometry, name, graph.math("MULTIPLY", graph.attribute(name, "FLOAT"), over), MOVED)
+    value = _sum(graph, frame, COMPRESSIONS, layers) if layers else 0.0
+    geometry = graph.store(geometry, COMPRESSION, value, ACTIVE)
     graph.next_row()
-    moved = graph.vector("SUBTRACT", graph.node("GeometryNodeInputPosition").outputs["Position"], graph.attribute(REST))
+    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+    moved = graph.vector("SUBTRACT", position, graph.attribute(REST))
     per_metre = graph.vector("DOT_PRODUCT", graph.up, graph.up)
     height = graph.math("DIVIDE", graph.vector("DOT_PRODUCT", moved, graph.up), per_metre)
     rim = graph.math("MAXIMUM", graph.math("ADD", height, graph.attribute(COMPRESSION, "FLOAT")), 0.0)
-    geometry = graph.store(geometry, RIM, rim, numbered(MOVES, 0))
-    if not visits:
-        return geometry
+    return graph.store(geometry, RIM, rim, ACTIVE)
+
+
+def _age_and_pressure(graph: _Graph, geometry: Any, frame: Any, visits: int, frame_rate: float) -> Any:
+    """Time since the latest contact that has begun, and the pressure while it lasts."""
     graph.next_row()
     latest = graph.attribute(numbered(VISIT, 0))
-    begun = graph.at_most(graph.components(latest)[0], frame)
+    begun = graph.compare("LESS_EQUAL", graph.components(latest)[0], frame)
     for number in range(1, visits):
         visit = graph.attribute(numbered(VISIT, number))
-        later = graph.at_most(graph.components(visit)[0], frame)
+        later = graph.compare("LESS_EQUAL", graph.components(visit)[0], frame)
         latest = graph.choose("VECTOR", later, latest, visit)
     start, end, pressure = graph.components(latest)
     graph.next_row()
@@ -103,13 +123,7 @@ def _shading(graph: _Graph, geometry: Any, frame: Any, layers: int, visits: int,
     passed = graph.map_range("FLOAT", frame, start, end)
     sides = graph.math("MINIMUM", passed, graph.math("SUBTRACT", 1.0, passed))
     loaded = graph.math("MULTIPLY", sides, 1.0 / LOADING, clamp=True)
-    return graph.store(geometry, PRESSURE, graph.math("MULTIPLY", loaded, pressure), VISITED)
-
-
-def _shares(graph: _Graph, frame: Any, layer: int) -> Any:
-    """How much of each of a layer's three ramps has passed, 0 to 1; 0 where a vertex has no such ramp."""
-    start, end = graph.attribute(numbered(START, layer)), graph.attribute(numbered(END, layer))
-    return graph.map_range("FLOAT_VECTOR", frame, start, end)
+    return graph.store(geometry, PRESSURE, graph.math("MULTIPLY", loaded, pressure), ACTIVE)
 
 
 class _Graph:
@@ -162,9 +176,18 @@ class _Graph:
         node.inputs["Name"].default_value = name
         return node.outputs["Attribute"]
 
-    def store(self, geometry: Any, name: str, value: Any, selection: str) -> Any:
+    def raise_from_rest(self, geometry: Any, selection: str, height: Any) -> Any:
+        """Put the selected vertices so many metres above their undisturbed positions."""
+        node = self.node("GeometryNodeSetPosition")
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(self.attribute(selection, "BOOLEAN"), node.inputs["Selection"])
+        self.link(self.attribute(REST), node.inputs["Position"])
+        self.link(self.vector("SCALE", self.up, scale=height), node.inputs["Offset"])
+        return node.outputs["Geometry"]
+
+    def store(self, geometry: Any, name: str, value: Any, selection: str, *, kind: str = "FLOAT") -> Any:
         node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = "FLOAT", "POINT"
+        node.data_type, node.domain = kind, "POINT"
         node.inputs["Name"].default_value = name
         self.link(geometry, node.inputs["Geometry"])
         self.link(self.attribute(selection, "BOOLEAN"), node.inputs["Selection"])
@@ -178,9 +201,16 @@ class _Graph:
         self.link(second, node.inputs[1])
         return node.outputs["Value"]
 
-    def at_most(self, first: Any, second: Any) -> Any:
+    def both(self, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeBooleanMath")
+        node.operation = "AND"
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Boolean"]
+
+    def compare(self, operation: str, first: Any, second: Any) -> Any:
         node = self.node("FunctionNodeCompare")
-        node.data_type, node.operation = "FLOAT", "LESS_EQUAL"
+        node.data_type, node.operation = "FLOAT", operation
         self.link(first, node.inputs["A"])
         self.link(second, node.inputs["B"])
         return node.outputs["Result"]

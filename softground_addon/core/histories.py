@@ -57,15 +57,17 @@ class Histories:
 
     Attributes
     ----------
-    ramps : Ramps
-        Channel 0 is the change of the displayed height, channel 1 the displayed compression [m]; the rim is their
-        sum.
+    heights : Ramps
+        Change of the displayed height [m].
+    compression : Ramps
+        Displayed compression [m], to `SHADING_TOLERANCE`; the rim is the sum of both.
     visits : Visits
     error : float
         Largest error of a displayed height, at any place and frame [m].
     """
 
-    ramps: Ramps
+    heights: Ramps
+    compression: Ramps
     visits: Visits
     error: float
 
@@ -90,20 +92,25 @@ def histories(
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
-    parts: list[Ramps] = []
+    heights: list[Ramps] = []
+    compressions: list[Ramps] = []
     visits: list[Visits] = []
     error = 0.0
     for number, footprint in enumerate(footprints):
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
         for points, frames, moved in _movements(footprint, places, kernels[footprint.cell_size]):
             shared = sum(_inside(reach[other], footprints[other].cell_size, x[points], y[points]) for other in together)
-            allowed = np.stack([tolerance / shared, SHADING_TOLERANCE / shared], axis=-1)
-            fitted = fit(frames, moved, allowed)
-            ramps = fitted.ramps
-            parts.append(Ramps(points[ramps.point], ramps.start, ramps.end, ramps.change))
-            error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
+            fitted = fit(frames, moved[..., 0], tolerance / shared)
+            heights.append(_at_points(fitted.ramps, points))
+            compressions.append(_at_points(fit(frames, moved[..., 1], SHADING_TOLERANCE / shared).ramps, points))
+            error = max(error, float((fitted.error * shared).max(initial=0.0)))
         visits.append(_visits(footprint, places))
-    return Histories(Ramps.joined(parts, channels=2), _joined(visits), error)
+    return Histories(Ramps.joined(heights), Ramps.joined(compressions), _joined(visits), error)
+
+
+def _at_points(ramps: Ramps, points: Indices) -> Ramps:
+    """Ramps of the points numbered 0, 1, ... as those of given ones."""
+    return Ramps(points[ramps.point], ramps.start, ramps.end, ramps.change)
 
 
 class _Places:

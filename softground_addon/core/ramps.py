@@ -32,8 +32,8 @@ class Ramps:
         The point that each ramp belongs to, ascending; each point's ramps are in the order of their start.
     start, end : (R,) float arrays
         Frames between which the value changes; start < end.
-    change : (R, C) float array
-        Change of each of C channels.
+    change : (R,) float array
+        By how much.
     """
 
     point: Indices
@@ -42,9 +42,9 @@ class Ramps:
     change: Array
 
     @classmethod
-    def joined(cls, parts: Sequence[Ramps], channels: int = 1) -> Ramps:
+    def joined(cls, parts: Sequence[Ramps]) -> Ramps:
         """All ramps of several sets, which may share points."""
-        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels)))
+        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
         point, start, end, change = (
             np.concatenate([getattr(part, name) for part in (none, *parts)])
             for name in ("point", "start", "end", "change")
@@ -53,11 +53,15 @@ class Ramps:
         return cls(point[order], start[order], end[order], change[order])
 
     def at(self, frame: float, points: int) -> Array:
-        """Values of points 0 to `points` - 1 at a frame, (points, C)."""
+        """Values of points 0 to `points` - 1 at a frame, (points,)."""
         share = np.clip((frame - self.start) / (self.end - self.start), 0.0, 1.0)
-        return np.stack(
-            [np.bincount(self.point, channel * share, minlength=points) for channel in self.change.T], axis=-1
-        )
+        values = np.zeros(points)
+        values += np.bincount(self.point, self.change * share, minlength=points)
+        return values
+
+    def _without_rests(self) -> Ramps:
+        kept = self.change != 0
+        return Ramps(self.point[kept], self.start[kept], self.end[kept], self.change[kept])
 
     def rank(self) -> Indices:
         """Number of each ramp among those of its point, (R,), from 0."""
@@ -71,7 +75,7 @@ class Fit:
     Attributes
     ----------
     ramps : Ramps
-    error : (K, C) float array
+    error : (K,) float array
         Largest difference at each point, over time.
     """
 
@@ -84,15 +88,15 @@ def fit(frames: Array, histories: Array, tolerance: Array | float = TOLERANCE) -
 
     From the start of each movement the longest straight line that stays within the tolerance is taken, then the next
     (a funnel of slopes that narrows frame by frame). The ends of a movement are met exactly, so that points at rest
-    are where they were, to half a `QUANTUM`. All channels of a point share the ramps' times.
+    are where they were, to half a `QUANTUM`.
 
     Parameters
     ----------
     frames : (T,) float array
         Frame numbers, ascending.
-    histories : (T, K, C) float array
-        Values of K points in C channels, 0 at the first frame.
-    tolerance : (C,) or (K, C) float array
+    histories : (T, K) float array
+        Values of K points, 0 at the first frame.
+    tolerance : float or (K,) float array
         Largest error while a value moves.
 
     Returns
@@ -103,19 +107,19 @@ def fit(frames: Array, histories: Array, tolerance: Array | float = TOLERANCE) -
     --------
     A print that is pressed between frames 2 and 4 takes one ramp:
 
-    >>> pressed = fit(np.arange(6.0), -np.array([0, 0, 0, 1, 2, 2])[:, None, None] / 128)
+    >>> pressed = fit(np.arange(6.0), -np.array([0, 0, 0, 1, 2, 2])[:, None] / 128)
     >>> pressed.ramps.start, pressed.ramps.end, pressed.ramps.change
-    (array([2.]), array([4.]), array([[-0.015625]]))
+    (array([2.]), array([4.]), array([-0.015625]))
     """
     values = np.round(histories / QUANTUM) * QUANTUM
-    count, channels = values.shape[1:]
-    margin = np.broadcast_to(np.maximum(np.asarray(tolerance) - QUANTUM, 0.0), (count, channels))
-    moves = (np.diff(values, axis=0) != 0).any(axis=-1)
+    count = values.shape[1]
+    margin = np.broadcast_to(np.maximum(np.asarray(tolerance) - QUANTUM, 0.0), count)
+    moves = np.diff(values, axis=0) != 0
     rests = np.ones((len(frames), count), dtype=bool)
     rests[1:-1] = ~(moves[:-1] & moves[1:])
 
     begin = np.zeros(count, dtype=np.intp)
-    origin, low, high = np.zeros((3, count, channels))
+    origin, low, high = np.zeros((3, count))
     rising = np.zeros(count, dtype=bool)
     parts: list[Ramps] = []
 
@@ -132,40 +136,36 @@ def fit(frames: Array, histories: Array, tolerance: Array | float = TOLERANCE) -
         moving = np.flatnonzero(rising)
         if not len(moving):
             continue
-        lower, upper = _slopes(values[at], origin, margin, rests[at], moving, frames[at] - frames[begin])
-        missed = (np.maximum(lower, low[moving]) > np.minimum(upper, high[moving])).any(axis=-1)
+        slack = np.where(rests[at, moving], 0.0, margin[moving])
+        lower, upper = _slopes(values[at, moving] - origin[moving], slack, frames[at] - frames[begin[moving]])
+        missed = np.maximum(lower, low[moving]) > np.minimum(upper, high[moving])
         if missed.any():
             turning = moving[missed]
-            run = (frames[at - 1] - frames[begin[turning]])[:, None]
+            run = frames[at - 1] - frames[begin[turning]]
             slope = np.clip((values[at - 1, turning] - origin[turning]) / run, low[turning], high[turning])
             close(turning, at - 1, np.round((origin[turning] + slope * run) / QUANTUM) * QUANTUM)
-            lower, upper = _slopes(values[at], origin, margin, rests[at], moving, frames[at] - frames[begin])
+            rise, step = values[at, turning] - origin[turning], frames[at] - frames[at - 1]
+            lower[missed], upper[missed] = _slopes(rise, slack[missed], step)
         low[moving], high[moving] = np.maximum(lower, low[moving]), np.minimum(upper, high[moving])
         settled = moving[rests[at, moving]]
         if len(settled):
             close(settled, at, values[at, settled])
             rising[settled] = False
 
-    ramps = Ramps.joined(parts, channels)
+    ramps = Ramps.joined(parts)._without_rests()
     return Fit(ramps, _largest_error(ramps, frames, values) + QUANTUM / 2)
 
 
-def _slopes(
-    values: Array, origin: Array, margin: Array, rests: NDArray[np.bool_], points: Indices, run: Array
-) -> tuple[Array, Array]:
-    """Least and greatest slopes of lines from the points' origins that pass their values within the margin."""
-    slack = np.where(rests[points, None], 0.0, margin[points])
-    rise, run = values[points] - origin[points], run[points, None]
+def _slopes(rise: Array, slack: Array, run: Array | float) -> tuple[Array, Array]:
+    """Least and greatest slopes of lines that pass a rise after a run, within the slack."""
     return (rise - slack) / run, (rise + slack) / run
 
 
 def _largest_error(ramps: Ramps, frames: Array, values: Array) -> Array:
-    """Largest difference between the ramps' sum and the values, over the frames, (K, C)."""
+    """Largest difference between the ramps' sum and the values, over the frames, (K,)."""
     count = values.shape[1]
     share = np.clip((frames[:, None] - ramps.start) / (ramps.end - ramps.start), 0.0, 1.0)
     cell = (np.arange(len(frames))[:, None] * count + ramps.point).ravel()
-    error = np.empty(values.shape[1:])
-    for channel in range(values.shape[2]):
-        fitted = np.bincount(cell, (share * ramps.change[:, channel]).ravel(), minlength=len(frames) * count)
-        error[:, channel] = np.abs(fitted.reshape(len(frames), count) - values[..., channel]).max(axis=0)
+    fitted = np.bincount(cell, (share * ramps.change).ravel(), minlength=len(frames) * count)
+    error: Array = np.abs(fitted.reshape(len(frames), count) - values).max(axis=0)
     return error
