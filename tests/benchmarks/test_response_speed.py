@@ -1,0 +1,43 @@
+"""What the response costs: at most a second per thousand frames after sampling."""
+
+import time
+
+import numpy as np
+import pytest
+
+from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.grounding import responding
+from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.key_reduction import kept_samples
+from softground_addon.core.response import GroundingOptions, TiltOptions, at_scene_frames, gaps, respond
+from softground_addon.core.simulation import estimate_loads, simulate
+from tests.core.test_grounding import walk
+
+SNOW = GroundMaterial(youngs_modulus=375e3, poisson_ratio=0.05, characteristic_time=0.2)
+
+pytestmark = pytest.mark.benchmark
+
+
+def test_a_thousand_frames_respond_within_a_second():
+    motion, _ = walk(1000)
+    terrain = FlatTerrain(0.0)
+    loads = estimate_loads(motion, terrain, force_model="WHOLE_BODY", material=SNOW)
+    started = time.thread_time()
+    footprints = [f for result in simulate([loads], terrain, SNOW, 0.01) for f in result.footprints]
+    simulated = time.thread_time() - started
+    started = time.thread_time()
+    touching = at_scene_frames(loads.contacts.touching, loads.motion.frames, motion)
+    response = respond(motion, touching, terrain, footprints, tilt=TiltOptions(), grounding=GroundingOptions())
+    responded = time.thread_time() - started
+    gaps(responding(motion, response), touching, terrain, footprints)
+    measured = time.thread_time() - started
+    parts = [response.body, *(part for leg in response.legs.values() for part in (leg.thigh, leg.shank, leg.foot))]
+    for part in parts:
+        kept_samples(part[:, :3, :].reshape(len(part), -1), 2e-4)
+    reduced = time.thread_time() - started
+    print(
+        f"\n1000 frames: simulation {simulated:.2f} s, response {responded:.2f} s, with gaps {measured:.2f} s, "
+        f"with keys {reduced:.2f} s"
+    )
+    assert np.abs(response.body[:, 2, 3]).max() > 0.01
+    assert reduced < 1.0
