@@ -355,7 +355,7 @@ def rim_weights(
 def _leaning(coverage: Fraction, toward: Array) -> Array:
     """1 + b·cos(theta) of each cell, (N, rows, columns), seen from the middle of the contact."""
     _, rows, columns = coverage.shape
-    total = np.maximum(coverage.sum(axis=(1, 2)), 1e-300)
+    total = np.maximum(coverage.sum(axis=(1, 2), dtype=np.float64), 1e-300)
     x = np.arange(columns) - (coverage.sum(axis=1) @ np.arange(columns) / total)[:, None]
     y = np.arange(rows) - (coverage.sum(axis=2) @ np.arange(rows) / total)[:, None]
     along = toward[:, 0, None, None] * x[:, None, :] + toward[:, 1, None, None] * y[:, :, None]

@@ -20,8 +20,9 @@ from .forces import ContactForces, impulse_forces, whole_body_forces
 from .heightfield import HeightField, Terrain, Window
 from .imprint import sole_points
 from .motion import CharacterMotion, steps_per_frame
-from .pressing import Press, Stance, Steps, Timing
+from .pressing import Press
 from .pressure import Pressure
+from .stance import Stance, Steps, Timing
 from .variation import Variation
 
 Array = NDArray[np.float64]

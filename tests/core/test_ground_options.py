@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.deformation import (
@@ -62,6 +62,11 @@ def test_the_rim_leans_by_one_plus_b_cos_theta_and_keeps_its_volume(bias, headin
     ring = even > 0
     expected = 1 + bias * np.cos(np.arctan2(y, x) - heading)
     assert leaning[ring] / even[ring] == pytest.approx(expected[ring], abs=0.02)
+
+
+def test_a_step_without_contact_has_no_rim_that_leans():
+    nothing = np.zeros((1, 5, 5), np.float32)
+    assert not rim_weights(nothing, in_contact(nothing), 2.0, toward=np.array([[0.5, 0.0]])).any()
 
 
 def test_a_sole_that_slides_piles_up_the_rim_ahead_and_one_that_stands_does_not():
@@ -253,6 +258,7 @@ def check_every_frame(loads, terrain, material, cell_size, pressure):
 
 
 @settings(max_examples=12, deadline=None)
+@example(77, replace(SAND, rim_bias=0.5, repose_angle=0.8, crust_stress=1e5, hardening=1.0), 0.05, "UNIFORM", 0.16)
 @given(
     st.integers(0, 2**32 - 1),
     st.builds(
