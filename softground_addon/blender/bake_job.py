@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import record, report
+from ..core.cell_limits import check_cell_size
 from ..core.contacts import detect_contacts
 from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import FlatTerrain, Terrain
 from ..core.histories import histories
-from ..core.memory import check_memory
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, estimate_loads, simulate
@@ -406,7 +406,7 @@ def _simulate(
 ) -> Job[tuple[list[Footprint], dict[str, object]]]:
     """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_memory(loads, settings.cell_size_of(scene))
+    check_cell_size(loads, settings.cell_size_of(scene))
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(character.motion.frames) for character in loads)

@@ -1,4 +1,4 @@
-"""How much memory a bake will take: an absurd cell size is refused before it fills the machine."""
+"""Whether a cell size suits a shot: not so fine that no memory holds it, nor so coarse that it swallows a foot."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from .simulation import CharacterLoads
 
 BYTES_PER_CELL = 1000.0
 """What a cell under a print takes from simulation to playback [bytes], as measured on walks at 1 and 0.5 mm."""
+
+CELLS_ALONG_SOLE = 10
+"""Cells along a sole that show its outline."""
 
 USABLE = 0.8
 """Share of the machine's memory that a bake may take."""
@@ -30,8 +33,8 @@ def pressed_area(loads: Sequence[CharacterLoads]) -> float:
     return area
 
 
-def check_memory(loads: Sequence[CharacterLoads], cell_size: float, available: float | None = None) -> None:
-    """Raise InputError if the bake would not fit into memory, naming the estimate and a cell size that does.
+def check_cell_size(loads: Sequence[CharacterLoads], cell_size: float, available: float | None = None) -> None:
+    """Raise InputError if the bake would not fit into memory, or a sole into a cell; names a cell size that works.
 
     Parameters
     ----------
@@ -41,14 +44,24 @@ def check_memory(loads: Sequence[CharacterLoads], cell_size: float, available: f
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
     """
+    for character in loads:
+        length = max(float(np.ptp(sole.sole.outline[:, 0])) for sole in character.motion.soles)
+        if length < cell_size:
+            raise InputError(
+                f"The soles of '{character.motion.name}' are {length * 1e3:.3g} mm long, smaller than a cell of "
+                f"{cell_size * 1e3:g} mm: set a cell size of at most {length / CELLS_ALONG_SOLE * 1e3:.2g} mm, or "
+                "correct the scale of the character or of the scene's units."
+            )
     available = machine_memory() if available is None else available
     needed = pressed_area(loads) / cell_size**2 * BYTES_PER_CELL
     if available is None or needed <= USABLE * available:
         return
+    names = ", ".join(f"'{character.motion.name}'" for character in loads)
     fits = cell_size * np.sqrt(needed / (USABLE * available)) * 1.05
     raise InputError(
-        f"Cells of {cell_size * 1e3:g} mm would take about {needed / 1e9:,.0f} GB of memory for this shot, and this "
-        f"machine has {available / 1e9:,.0f} GB: set a cell size of at least {fits * 1e3:.2g} mm, or bake fewer frames."
+        f"Cells of {cell_size * 1e3:g} mm would take about {needed / 1e9:,.0f} GB of memory for the steps of {names}, "
+        f"and this machine has {available / 1e9:,.0f} GB: set a cell size of at least {fits * 1e3:.2g} mm, or bake "
+        "fewer frames."
     )
 
 
