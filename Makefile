@@ -12,7 +12,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: demo test slow bench validate lint types clean
+.PHONY: demo test slow bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -41,6 +41,22 @@ lint: $(READY)
 
 types: $(READY)
 	$(BIN)/mypy
+
+# The extension as users install it, built and checked by Blender's own tool.
+package: $(READY)
+	mkdir -p build
+	$(BIN)/python $$(find $(VENV) -path '*/bl_pkg/cli/blender_ext.py') build --source-dir . --output-filepath build/softground.zip
+	$(BIN)/python $$(find $(VENV) -path '*/bl_pkg/cli/blender_ext.py') validate build/softground.zip
+
+# Real Blenders on a virtual screen: 4.3, and the newest that Debian has. Those that cannot be had are left out.
+REAL_BLENDER := ../shared/tools/real_blender.sh
+gui: $(READY)
+	for suite in trixie sid; do [ ! -x $(REAL_BLENDER) ] || $(REAL_BLENDER) provision $$suite || true; done
+	$(BIN)/python -m pytest -m gui -rs tests/gui
+
+# The pictures in the docs, as the GUI tests took them in Blender 4.3.
+pictures: gui
+	cp build/gui/trixie/*/docs/*.png docs/images/
 
 clean:
 	rm -rf build .venv .venv-*

@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from mathutils import Euler
 
 Pause = float
 """Seconds until the story goes on; Blender handles events and draws in between."""
 
 Steps = Iterator[Pause]
 
-SHORT: Pause = 0.05
-ROW = 9
-"""Distance between two places where a button is looked for, less than half a button's height [px]."""
+SHORT: Pause = 0.03
+ROW = 11
+"""Distance between two places where a button is looked for, little more than half a button's height [px]."""
 
 
 class Hand:
@@ -77,9 +78,17 @@ class Hand:
             yield 0.1
             waited += 0.1
 
-    def picture(self, name: str) -> Steps:
+    def picture(self, name: str, *, of: str = "") -> Steps:
+        """Keep what the window shows, or one region of the viewport."""
         yield 0.5
-        subprocess.run(["import", "-window", "root", str(self.pictures / f"{name}.png")], check=True)
+        crop = []
+        if of:
+            region = self.region(of)
+            top = self.window.height - region.y - region.height
+            crop = ["-crop", f"{region.width}x{region.height}+{region.x}+{top}", "+repage"]
+        folder = self.pictures / "docs"
+        folder.mkdir(exist_ok=True)
+        subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=True)
 
     def open_sidebar(self, tab: str = "SoftGround") -> Steps:
         self.area().spaces.active.show_region_ui = True
@@ -97,6 +106,23 @@ class Hand:
         """Show all objects in the viewport."""
         with bpy.context.temp_override(window=self.window, area=self.area(), region=self.region("WINDOW")):
             bpy.ops.view3d.view_all()
+        yield 0.5
+
+    def look_at_walk(self) -> Steps:
+        """Look along the walk from the side and above, at the height of the feet."""
+        space = self.area().spaces.active
+        space.region_3d.view_perspective = "PERSP"
+        place = self.window.scene.objects["Walker"].pose.bones[0].head
+        space.region_3d.view_location = (place.x, place.y, 0.25)
+        space.region_3d.view_distance = 3.2
+        space.region_3d.view_rotation = Euler((1.05, 0.0, 0.9)).to_quaternion()
+        yield 0.7
+
+    def choose_in_menu(self, place: tuple[int, int], letter: str) -> Steps:
+        """Open a menu and choose the entry that is underlined at a letter."""
+        yield from self.click(*place)
+        yield 0.5
+        yield from self.key(letter)
         yield 0.5
 
     def find_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Any:

@@ -1,0 +1,113 @@
+"""Presets by the menu, a matched depth, the overlay, and live mode: played, stepped, scrubbed, tuned."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from tests.blender import fingerprints
+from tests.gui.hand import Hand, Steps
+from tests.gui.shot import open_walk
+
+
+def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
+    open_walk(96)
+    yield from hand.open_sidebar()
+    yield from hand.press_button("softground.add_character")
+    yield from hand.press_button("softground.create_ground")
+    yield 0.3
+    facts["ground"] = scene().softground.ground.name
+
+    place = yield from hand.find_button("softground.save_preset", offset=0.76)
+    menu = (place[0] - 120, place[1])
+    yield from hand.click(*menu)
+    yield 0.5
+    yield from hand.move(menu[0], menu[1] + 60)
+    yield 1.5
+    yield from hand.picture("presets")
+    yield from hand.key("ESC")
+    yield from hand.choose_in_menu(menu, "MUD"[0])
+    facts["preset"] = scene().softground.material.preset
+    bpy.ops.softground.load_preset(name="Fresh Snow")
+    yield 0.3
+
+    yield from hand.press_button("softground.live")
+    facts["live"] = bpy.context.window_manager.softground.is_live
+    before = heights()
+    yield from hand.move(*hand.middle())
+    yield from hand.key("SPACE")
+    yield from hand.wait_for(lambda: scene().frame_current > 40, 60)
+    yield from hand.key("SPACE")
+    yield 0.3
+    facts["played to"] = scene().frame_current
+    facts["played: deepest"] = float(heights().min())
+    for _ in range(3):
+        yield from hand.key("RIGHT_ARROW")
+    stopped = scene().frame_current
+    here = heights()
+    facts["scrubbed back"] = []
+    for frame in (10, 25, 1):
+        scene().frame_set(frame)
+        yield 0.2
+        facts["scrubbed back"].append(float(heights().min()))
+    facts["first frame: as before"] = bool((heights() == before).all())
+    scene().frame_set(stopped)
+    yield 0.2
+    facts["forth again: as before"] = bool((heights() == here).all())
+
+    yield from hand.press_button("softground.overlay", offset=0.12)
+    facts["overlay"] = bpy.context.window_manager.softground.show_overlay
+    scene().frame_set(58)
+    yield from hand.look_at_walk()
+    yield from hand.picture("live")
+    scene().frame_set(96)
+    yield 0.5
+    yield from hand.press_button("softground.live", offset=0.75)
+    facts["kept"] = "softground_record" in scene().softground.ground.data
+    facts["no longer live"] = not bpy.context.window_manager.softground.is_live
+    scene().frame_set(59)
+    yield from hand.look_at_walk()
+    yield from hand.picture("overlay")
+    bpy.ops.softground.clear_bake()
+    facts["cleared: as before"] = bool((heights() == before).all())
+
+    saved = fingerprints.of_file()
+    yield from hand.press_button("softground.live")
+    scene().frame_set(80)
+    yield 0.3
+    yield from hand.press_button("softground.live", offset=0.3)
+    scene().frame_set(59)
+    yield 0.3
+    facts["discarded: as before"] = fingerprints.of_file() == saved
+
+    yield from hand.press_button("softground.live")
+    path = str(hand.pictures / "live.blend")
+    scene().frame_set(80)
+    with bpy.context.temp_override(window=hand.window):
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+    yield 1.0
+    facts["reloaded: not live"] = not bpy.context.window_manager.softground.is_live
+    yield from hand.move(*hand.middle())
+    yield from hand.key("F3")
+    yield from hand.type("soft")
+    yield 0.8
+    yield from hand.picture("search")
+    yield from hand.key("ESC")
+    bpy.ops.preferences.addon_disable(module="bl_ext.user_default.softground")
+    yield 0.3
+    facts["disabled: no handlers"] = not [
+        handler for handler in bpy.app.handlers.frame_change_post if "softground" in handler.__module__
+    ]
+
+
+def scene():
+    return bpy.context.window_manager.windows[0].scene
+
+
+def heights():
+    layer = bpy.context.window_manager.windows[0].view_layer
+    ground = scene().softground.ground.evaluated_get(layer.depsgraph)
+    positions = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
+    ground.data.attributes["position"].data.foreach_get("vector", positions)
+    return positions.reshape(-1, 3)[:, 2].copy()

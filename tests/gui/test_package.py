@@ -1,0 +1,20 @@
+"""The package itself: valid, and silent when it is installed and enabled."""
+
+import pytest
+
+from tests.gui import conftest
+
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(900)]
+
+
+def test_blender_s_own_tool_finds_the_package_valid(suite):
+    printed = conftest.blender(suite, "run", "--command", "extension", "validate", str(conftest.built()))
+    assert "FATAL" not in printed
+    assert "Error" not in printed.replace("No errors", "")
+    assert "Success" in printed or "valid" in printed.lower()
+
+
+def test_enabling_it_prints_nothing(suite):
+    printed = conftest.installed(suite)
+    own = [line for line in printed.splitlines() if "softground" in line.lower() or "Traceback" in line]
+    assert own == []
