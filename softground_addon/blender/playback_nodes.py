@@ -27,6 +27,8 @@ VISIT = "softground_visit"
 VISITED = "softground_visited"
 ACTIVE = "softground_active"
 """Whether something happens to the vertex at the frame that is shown; made by the nodes."""
+PENDING = "softground_pending"
+"""Whether something is still to happen to the vertex after the frame that is shown; made by the nodes."""
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
 LOADING = 0.2
@@ -67,7 +69,7 @@ def build(
     geometry = graph.raise_from_rest(geometry, MOVED, graph.math("MULTIPLY", total, over))
     if height_layers:
         geometry = graph.raise_from_rest(geometry, ACTIVE, _sum(graph, frame, HEIGHTS, height_layers))
-    shaded = _compression_and_rim(graph, geometry, frame, over, compression_layers)
+    shaded = _compression_and_rim(graph, geometry, frame, last, compression_layers)
     if visits:
         shaded = _age_and_pressure(graph, shaded, frame, visits, frame_rate)
     graph.next_row()
@@ -89,11 +91,12 @@ def _sum(graph: _Graph, frame: Any, names: Sequence[str], layers: int) -> Any:
     return total
 
 
-def _compression_and_rim(graph: _Graph, geometry: Any, frame: Any, over: Any, layers: int) -> Any:
+def _compression_and_rim(graph: _Graph, geometry: Any, frame: Any, last: Any, layers: int) -> Any:
     """Both as the finished ground has them where a vertex has come to rest, nothing before its first movement."""
+    graph.next_row()
+    geometry = graph.store(geometry, PENDING, graph.compare("LESS_THAN", frame, last), MOVED, kind="BOOLEAN")
     for name in (COMPRESSION, RIM):
-        graph.next_row()
-        geometry = graph.store(geometry, name, graph.math("MULTIPLY", graph.attribute(name, "FLOAT"), over), MOVED)
+        geometry = graph.store(geometry, name, 0.0, PENDING)
     value = _sum(graph, frame, COMPRESSIONS, layers) if layers else 0.0
     geometry = graph.store(geometry, COMPRESSION, value, ACTIVE)
     graph.next_row()

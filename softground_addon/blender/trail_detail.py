@@ -22,8 +22,8 @@ DETAIL_OF = "softground_detail_of"
 WAS_HIDDEN = "softground_was_hidden"
 """Property of the copy: whether the ground was hidden in viewports and renders before."""
 
-FLOOR = 2e-5
-"""Ground that moves less stays coarse [m]: a tenth of the playback's tolerance."""
+FLOOR = 1e-4
+"""Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
 
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:

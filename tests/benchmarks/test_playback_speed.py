@@ -1,0 +1,226 @@
+"""What a frame of a baked shot costs, against the bare shot, Dynamic Paint and a point cache; ratios from one run.
+
+All on the same walking character, with a skin of about 28,000 vertices.
+"""
+
+import time
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+import pytest
+
+import softground_addon
+from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, playback
+from tests.blender import shots
+
+pytestmark = pytest.mark.benchmark
+
+FRAMES = 170
+SIZE = 12.0
+SKIN_VERTICES = 28_000
+TIMED = np.random.default_rng(0).permutation(np.arange(2, FRAMES))[:60]
+
+
+@pytest.fixture
+def scene():
+    softground_addon.register()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    yield bpy.context.scene
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    softground_addon.unregister()
+
+
+def heavy_walker(scene, frames=FRAMES):
+    """The project's walker with a skin as heavy as a production character's."""
+    import bmesh  # only there once bpy is
+
+    armature = shots.walker(scene, frames=frames)
+    skins = [child for child in armature.children if child.type == "MESH"]
+    while sum(len(skin.data.vertices) for skin in skins) < SKIN_VERTICES / 2:
+        for skin in skins:
+            finer = bmesh.new()
+            finer.from_mesh(skin.data)
+            bmesh.ops.subdivide_edges(finer, edges=finer.edges, cuts=1, use_grid_fill=True)
+            finer.to_mesh(skin.data)
+            finer.free()
+    scene.frame_start, scene.frame_end = 1, frames
+    bpy.context.view_layer.objects.active = armature
+    return armature, max(skins, key=lambda skin: len(skin.data.vertices))
+
+
+def grid(scene, count, size=SIZE, name="Field"):
+    axis = np.linspace(-1.0, size - 1.0, count, dtype=np.float32)
+    position = np.zeros((count, count, 3), dtype=np.float32)
+    position[..., 0], position[..., 1] = axis, (axis - size / 2 + 1)[:, None]
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    quads = (corner[:, None] + [0, 1, count + 1, count]).astype(np.int32)
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(count**2)
+    mesh.attributes["position"].data.foreach_set("vector", position.ravel())
+    mesh.loops.add(quads.size)
+    mesh.loops.foreach_set("vertex_index", quads.ravel())
+    mesh.polygons.add(len(quads))
+    mesh.polygons.foreach_set("loop_start", np.arange(len(quads), dtype=np.int32) * 4)
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    ground = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(ground)
+    return ground
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Milliseconds of a frame, without and with the vertex normals of the ground: the quickest quarter's slowest."""
+
+    frame: float
+    with_normals: float
+
+
+def cost(scene, shown, frames=TIMED):
+    plain, whole = [], []
+    for frame in frames:
+        start = time.perf_counter()
+        scene.frame_set(int(frame))
+        plain.append(time.perf_counter() - start)
+        if shown is not None:
+            mesh = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+            mesh.vertex_normals[0].vector  # noqa: B018  (computes them)
+        whole.append(time.perf_counter() - start)
+    return Cost(float(np.percentile(plain, 25)) * 1e3, float(np.percentile(whole, 25)) * 1e3)
+
+
+def dynamic_paint(scene, ground, brush):
+    """The cost of Blender's own displacement of the ground by the same character, while it plays."""
+    canvas = ground.modifiers.new("Dynamic Paint", "DYNAMIC_PAINT")
+    canvas.ui_type = "CANVAS"
+    with bpy.context.temp_override(object=ground, active_object=ground):
+        bpy.ops.dpaint.type_toggle(type="CANVAS")
+    surface = canvas.canvas_settings.canvas_surfaces[0]
+    surface.surface_type = "DISPLACE"
+    surface.frame_start, surface.frame_end = 1, scene.frame_end
+    painter = brush.modifiers.new("Dynamic Paint", "DYNAMIC_PAINT")
+    painter.ui_type = "BRUSH"
+    with bpy.context.temp_override(object=brush, active_object=brush):
+        bpy.ops.dpaint.type_toggle(type="BRUSH")
+    result = cost(scene, ground, np.arange(1, 61))
+    ground.modifiers.remove(canvas)
+    brush.modifiers.remove(painter)
+    return result
+
+
+def bake(scene, ground, *, detail, cell_size=0.01, shape_keys=False):
+    """Bake onto a ground; returns the object that carries the prints, and the report."""
+    options = scene.softground
+    if not options.characters:
+        bpy.ops.softground.add_character()
+    options.ground, options.cell_size, options.detail, options.shape_keys = ground, cell_size, detail, shape_keys
+    options.frame_start, options.frame_end = scene.frame_start, scene.frame_end
+    bpy.context.view_layer.update()
+    result = bake_job.run(bake_job.bake(scene))
+    return baked_ground.carrier_of(ground), result.report
+
+
+def without_shading(carrier):
+    """Play the heights only: what compares with what the others do."""
+    modifier = playback.modifier_of(carrier)
+    socket = next(item for item in modifier.node_group.interface.items_tree if item.name == "Shading")
+    modifier[socket.identifier] = False
+    carrier.update_tag()
+
+
+def table(title, rows, bare):
+    print(f"\n{title}")
+    for name, value in rows.items():
+        print(
+            f"  {name:28s} {value.frame:8.2f} ms {value.frame / bare:7.2f} x bare;  with normals "
+            f"{value.with_normals:8.2f} ms {value.with_normals / bare:7.2f} x bare"
+        )
+
+
+@pytest.mark.parametrize(("count", "limit"), [(512, 1.6), (1024, 2.8)])
+def test_a_uniform_grid_plays_near_the_bare_frame_and_faster_than_dynamic_paint(scene, tmp_path, count, limit):
+    _, skin = heavy_walker(scene)
+    ground = grid(scene, count)
+    rows = {"bare": cost(scene, None), "Dynamic Paint": dynamic_paint(scene, ground, skin)}
+    bake(scene, ground, detail="NEVER", shape_keys=True)
+    rows["playback, shape keys, shading"] = cost(scene, ground)
+    bake(scene, ground, detail="NEVER")
+    rows["playback, shading"] = cost(scene, ground)
+    without_shading(ground)
+    rows["playback"] = cost(scene, ground)
+    if count == 512:
+        exports.export_point_cache(scene, ground, tmp_path / "ground.pc2", 1, FRAMES)
+        exports.use_point_cache(ground, tmp_path / "ground.pc2", 1)
+        rows["Mesh Cache (PC2)"] = cost(scene, ground)
+    ground.hide_viewport = True
+    rows["bare, once more"] = cost(scene, None)
+    bare = max(rows["bare"].frame, rows["bare, once more"].frame)
+    table(f"uniform grid of {count}²", rows, bare)
+    assert rows["playback"].frame <= limit * bare
+    assert rows["Dynamic Paint"].frame >= 2.5 * rows["playback"].frame
+
+
+def test_detail_along_the_trail_plays_near_the_bare_frame_whatever_the_size_of_the_ground(scene):
+    steps_frames = 640
+    _, skin = heavy_walker(scene, steps_frames)
+    fine = grid(scene, 1024, name="Fine")
+    rows = {"bare": cost(scene, None), "Dynamic Paint, 1024²": dynamic_paint(scene, fine, skin)}
+    bpy.data.objects.remove(fine)
+    for size in (100.0, 1000.0):
+        ground = grid(scene, 2, size, f"Plane {size:.0f}")
+        carrier, report = bake(scene, ground, detail="AUTO")
+        rows[f"detail on {size:.0f} m, shading"] = cost(scene, carrier)
+        without_shading(carrier)
+        rows[f"detail on {size:.0f} m"] = cost(scene, carrier)
+        print(f"\n{report['totals']['steps']} steps, {len(carrier.data.vertices):,} vertices")
+        bpy.ops.softground.clear_bake()
+        bpy.data.objects.remove(ground)
+    rows["bare, once more"] = cost(scene, None)
+    bare = max(rows["bare"].frame, rows["bare, once more"].frame)
+    table("detail along the trail", rows, bare)
+    for size in (100, 1000):
+        assert rows[f"detail on {size} m"].frame <= 1.3 * bare
+        assert rows["Dynamic Paint, 1024²"].with_normals >= 10 * rows[f"detail on {size} m"].with_normals
+
+
+def test_the_cost_of_a_bake_does_not_depend_on_the_size_of_the_ground(scene):
+    heavy_walker(scene, 640)
+    seconds = {}
+    for size in (100.0, 1000.0, 100.0, 1000.0):
+        ground = grid(scene, 2, size, f"Plane {size:.0f}")
+        started = time.perf_counter()
+        carrier, report = bake(scene, ground, detail="AUTO", cell_size=0.005)
+        seconds.setdefault(size, []).append(time.perf_counter() - started)
+        print(
+            f"\n{size:.0f} m: {seconds[size][-1]:.2f} s, {report['timings']}, {len(carrier.data.vertices):,} vertices"
+        )
+        bpy.ops.softground.clear_bake()
+        bpy.data.objects.remove(ground)
+    assert min(seconds[1000.0]) == pytest.approx(min(seconds[100.0]), rel=0.25)
+
+
+def test_the_file_grows_by_little_with_each_step(scene, tmp_path):
+    ground = grid(scene, 2, 200.0, "Plane")
+    sizes, steps, records = [], [], []
+    for frames in (160, 640):
+        for thing in list(scene.objects):
+            if thing != ground:
+                bpy.data.objects.remove(thing)
+        scene.softground.characters.clear()
+        heavy_walker(scene, frames)
+        path = tmp_path / f"{frames}.blend"
+        bpy.context.view_layer.update()
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
+        without = path.stat().st_size
+        carrier, report = bake(scene, ground, detail="AUTO")
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
+        sizes.append(path.stat().st_size - without)
+        steps.append(report["totals"]["steps"])
+        records.append(len(bytes(carrier.data[ground_mesh.RECORD])))
+        bpy.ops.softground.clear_bake()
+    per_step = (sizes[1] - sizes[0]) / (steps[1] - steps[0])
+    record_per_step = (records[1] - records[0]) / (steps[1] - steps[0])
+    print(f"\n{per_step / 1e3:.0f} KB of .blend, {record_per_step / 1e3:.1f} KB of record per step")
+    assert per_step <= 150e3
+    assert record_per_step <= 40e3
