@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from .body_dynamics import FREE_FALL, BodyDynamics
 from .centre_of_pressure import lowest_points
-from .contacts import Contacts, close_short, runs
+from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts, close_short, runs
 from .load_sharing import whole_body_shares
 from .motion import CharacterMotion
+from .smoothing_spline import smooth_path
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         Of that motion, before anything is known about flight.
     """
     unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
-    touching = _supported(contacts, body.force[:, 2], motion.leg_length, round(SHORTEST_SUPPORT * unit))
+    touching = _supported(motion, contacts, body.force[:, 2])
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
     lowest = lowest_points(motion)
@@ -111,26 +112,44 @@ def _without_idle(touching: NDArray[np.bool_], load: Array) -> NDArray[np.bool_]
     return np.where(bearing.any(axis=1, keepdims=True), bearing, touching)
 
 
-def _supported(contacts: Contacts, force: Array, leg_length: float, shortest: int) -> NDArray[np.bool_]:
-    """Contacts, with a sole on the ground wherever the body is pushed up: the lowest one, and any about as low.
+def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDArray[np.bool_]:
+    """Contacts, with a sole on the ground wherever the body is pushed up: the lowest one, any about as low and slow.
 
-    Feet that float by more in one step than in another are missed by their height.
+    Feet that float by more in one step than in another are missed by their height. Such a contact may overlap those
+    before and after it for a moment, as in double support.
     """
+    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    overlap = round(SEARCH * unit)
+    same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
+    clearance, speed = contacts.clearance, _sole_speeds(motion)
+    lowest = clearance.min(axis=1, keepdims=True)
+    about_as_low = clearance < lowest + same_height
+    slowest = np.where(about_as_low, speed, np.inf).min(axis=1, keepdims=True)
+    about_as_slow = speed < slowest + TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length)
+    bearing = about_as_low & about_as_slow & (force > 0)[:, None]
+
     touching = contacts.touching.copy()
-    pushed = force > FREE_FALL
-    same_height = SUPPORT_RANGE * leg_length
-    for first, last in zip(*runs(pushed & ~touching.any(axis=1)), strict=True):
-        height = contacts.clearance[first:last].min(axis=0)
-        if last - first < shortest or height.min() > HIGHEST_SUPPORT * leg_length:
+    for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True):
+        if last - first < round(SHORTEST_SUPPORT * unit) or lowest[first:last].min() > highest:
             continue
-        for sole in np.flatnonzero(height < height.min() + same_height):
-            instant = first + int(contacts.clearance[first:last, sole].argmin())
-            away = np.flatnonzero((contacts.clearance[:, sole] > height[sole] + same_height) | (force <= 0))
-            place = np.searchsorted(away, instant)
-            start = away[place - 1] + 1 if place else 0
-            end = away[place] if place < len(away) else len(touching)
-            touching[start:end, sole] = True
+        begin, end = max(first - overlap, 0), last + overlap
+        for sole in range(touching.shape[1]):
+            for start, stop in zip(*runs(bearing[begin:end, sole]), strict=True):
+                if begin + start < last and begin + stop > first:
+                    height = clearance[begin + start : begin + stop, sole]
+                    touching[begin + start : begin + stop, sole] |= height < height.min() + same_height
     return touching
+
+
+def _sole_speeds(motion: CharacterMotion) -> Array:
+    """Horizontal speed of each sole's slowest landmark, (N, S) [m/s]."""
+    cutoff = EDGE_CUTOFF * np.sqrt(motion.gravity / motion.leg_length) / (2 * np.pi)
+    speeds = []
+    for sole in motion.soles:
+        points = sole.landmark_positions()[..., :2]
+        _, velocity, _ = smooth_path(points.reshape(len(points), -1), motion.time_step, cutoff)
+        speeds.append(np.linalg.norm(velocity.reshape(points.shape), axis=-1).min(axis=1))
+    return np.stack(speeds, axis=1)
 
 
 def _landings(touching: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -68,6 +68,26 @@ def test_a_body_that_hangs_high_stands_on_nothing():
     assert not refined.touching.any()
 
 
+def test_steps_that_float_too_high_to_be_seen_are_told_apart_by_their_swings():
+    """Low swings: a foot that bears is told from one that swings by its speed, not by its height."""
+    step = np.arange(440)
+    places, swinging = [], []
+    for phase in (20, 80):
+        cycle, moment = np.divmod(step + phase, 120)
+        swing = np.clip((moment - 72) / 48, 0.0, 1.0)  # 0.6 s on the ground, 0.4 s in the air
+        x = 1.2 * (cycle + swing**2 * (3 - 2 * swing)) - 0.01 * phase
+        places.append(np.stack([x, 0 * x, 0.12 + 0.04 * np.sin(np.pi * swing)], axis=1))
+        swinging.append((swing > 0.25) & (swing < 0.75))
+    hips = np.stack([0.01 * step, 0 * step, np.full(440, 0.9)], axis=1)
+    motion = character([flat_sole(path) for path in places], hips=hips, rate=RATE)
+    clearance = np.stack([path[:, 2] for path in places], axis=1)
+    seen = contacts(np.zeros((440, 2)), clearance)
+    refined = refine_contacts(motion, seen, body_dynamics(motion)).touching
+    assert refined.any(axis=1).all()
+    assert not (refined & np.stack(swinging, axis=1)).any()
+    assert [len(runs(foot)[0]) for foot in refined.T] == [4, 4]
+
+
 def test_a_foot_that_drags_without_load_does_not_touch():
     """The body stands over the first foot; the second slides along half a metre away for a while."""
     places = [np.zeros((240, 3)), np.tile((0.5, 0.0, 0.0), (240, 1))]
