@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import analysis, live, modal_bake, overlay, session
+from . import analysis, bake_job, live, modal_bake, overlay, session
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does."""
 
 SETTLED = 0.3
-"""Time after an edit at which the overlay is worked out anew [s]."""
+"""Time without edits after which what takes a while is worked out anew [s]."""
 
 LEFT_OVER = "SoftGround Sampling"
 """Scenes in which rigs are read; one may come back with an undo step or an autosave from within a bake."""
@@ -27,14 +28,31 @@ def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
 
 
 @persistent
-def notice_edits(_scene: Any, depsgraph: Any = None) -> None:
-    """An edited animation makes what was read from it worthless."""
+def notice_edits(scene: Any, depsgraph: Any = None) -> None:
+    """An edited animation makes what was read from it worthless, and may leave a bake outdated."""
+    if scene.softground.ground is not None and not bpy.app.background:
+        _later(compare_bake)
     if not analysis.is_empty() and depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in EDITED):
         analysis.forget()
         if live.is_on() and not bpy.app.timers.is_registered(live.after_edit):
             bpy.app.timers.register(live.after_edit, first_interval=0.0)
-        if session.current().show_overlay and not bpy.app.timers.is_registered(overlay.read_again):
-            bpy.app.timers.register(overlay.read_again, first_interval=SETTLED)
+        if session.current().show_overlay:
+            _later(overlay.read_again)
+
+
+def compare_bake() -> None:
+    """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
+    for window in bpy.context.window_manager.windows:
+        session.current().stale = "\n".join(bake_job.stale_reasons(window.scene))
+        session.redraw()
+        return
+
+
+def _later(job: Callable[[], None]) -> None:
+    """Do something once the edits have settled."""
+    if bpy.app.timers.is_registered(job):
+        bpy.app.timers.unregister(job)
+    bpy.app.timers.register(job, first_interval=SETTLED)
 
 
 @persistent
@@ -75,6 +93,8 @@ def before_load(*_: Any) -> None:
 def after_load(*_: Any) -> None:
     """An autosave from within a bake may hold its working scene."""
     _remove_left_over_scenes()
+    if not bpy.app.background:
+        _later(compare_bake)
 
 
 def _remove_left_over_scenes() -> None:
@@ -110,5 +130,6 @@ def unregister() -> None:
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:
             handlers.remove(handler)
-    if bpy.app.timers.is_registered(live.after_edit):
-        bpy.app.timers.unregister(live.after_edit)
+    for job in (live.after_edit, compare_bake):
+        if bpy.app.timers.is_registered(job):
+            bpy.app.timers.unregister(job)

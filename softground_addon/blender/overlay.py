@@ -213,16 +213,15 @@ class SOFTGROUND_OT_overlay(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def read_again() -> float | None:
+def read_again() -> None:
     """Predict anew after an edit, for a timer."""
     scene = bpy.context.window_manager.windows[0].scene if bpy.context.window_manager.windows else None
     if scene is not None and session.current().show_overlay:
         try:
             analysis.read(scene)
         except InputError:
-            return None
+            return
         session.redraw(region_type="WINDOW")
-    return None
 
 
 _handles: list[Any] = []

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.motion import JOINTS
-from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
+from . import analysis, baked_ground, ground_mesh, session, settings
 from .character_editing import active_character, active_sole
 from .translation import iface_
 
@@ -250,7 +250,7 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
         if summary:
             _result(layout, summary)
-            for reason in bake_job.stale_reasons(settings.scene_of(context)):
+            for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
 
 

@@ -18,6 +18,7 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     cancel_requested: BoolProperty(name="Cancel Requested", description="The bake is to end at its next step")
     progress: FloatProperty(name="Progress", description="Finished part of the bake", min=0.0, max=1.0)
     status: StringProperty(name="Status", description="What the bake is doing, and the time it still needs")
+    stale: StringProperty(name="Outdated", description="What has changed since the bake on the ground, line by line")
     show_overlay: BoolProperty(name="Overlay", description="Show what the add-on knows in the viewport")
     show_footfalls: BoolProperty(
         name="Footfalls", description="Where the soles will stand, numbered in their order", default=True

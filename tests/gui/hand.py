@@ -15,6 +15,9 @@ Pause = float
 
 Steps = Iterator[Pause]
 
+PAGES = 2
+"""How often the sidebar is looked through, each time further down."""
+
 SHORT: Pause = 0.03
 ROW = 11
 """Distance between two places where a button is looked for, little more than half a button's height [px]."""
@@ -128,8 +131,17 @@ class Hand:
     def find_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Any:
         """Place of the button that runs an operator, by what Ctrl-C copies from it; None where there is none.
 
-        A generator like the others: `place = yield from hand.find_button(...)`.
+        A generator like the others: `place = yield from hand.find_button(...)`. Scrolls down if it is not in sight.
         """
+        for page in range(PAGES):
+            place = yield from self._find_in_sight(operator, offset, below if page == 0 else None)
+            if place:
+                return place
+            for _ in range(6):
+                yield from self.key("WHEELDOWNMOUSE")
+        return None
+
+    def _find_in_sight(self, operator: str, offset: float, below: int | None) -> Any:
         region = self.region()
         x = region.x + int(region.width * offset)
         for y in range(below or region.y + region.height - ROW, region.y, -ROW):

@@ -22,7 +22,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     menu = (place[0] - 120, place[1])
     yield from hand.click(*menu)
     yield 0.5
-    yield from hand.move(menu[0], menu[1] + 60)
+    yield from hand.move(menu[0], menu[1] - 110)
     yield 1.5
     yield from hand.picture("presets")
     yield from hand.key("ESC")
