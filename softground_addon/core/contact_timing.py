@@ -164,7 +164,7 @@ def _onset(force: Array, first: int, search: int) -> float:
     The low-pass leads the force into the flight; its steep flank stays in place. The flank is that of a half sine, as
     running and landing show: from one half of the peak through one quarter to 0 in known proportion.
     """
-    window = force[max(first - search, 0) : first + search]
+    window = force[max(first - search, 0) : first + max(search, 1)]
     crest = int(window.argmax())
     peak = window[crest]
     quarter, half = (_last_below(window[: crest + 1], level * peak) for level in (0.25, 0.5))

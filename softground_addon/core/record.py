@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,13 @@ FORMAT = 1
 """Version of the bytes' layout."""
 
 _TEXT = "record.json"
+_DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError),  # of the archive
+    *(KeyError, ValueError, TypeError, RecursionError),  # of the text
+    *(SyntaxError, tokenize.TokenError, MemoryError),  # of an array's header: what numpy cannot read, and absurd sizes
+)
+"""What reading a damaged record may raise."""
+
 _FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
 
 
@@ -56,16 +64,7 @@ def load(record: bytes) -> tuple[list[Footprint], dict[str, object]]:
                 for name in archive.namelist()
                 if name.endswith(".npy")
             }
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        KeyError,
-        ValueError,
-        TypeError,
-        EOFError,
-        OSError,
-        NotImplementedError,
-    ) as error:
+    except _DAMAGE as error:
         raise InputError(
             f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
         ) from None
