@@ -66,6 +66,7 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         print(f"softground: {error}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
+        previous.clear()  # the process is about to end: a second signal must not spoil that
         print("softground: interrupted; nothing was written.", file=sys.stderr)
         return EXIT_INTERRUPTED
     finally:

@@ -1,0 +1,204 @@
+"""Whatever happens to a bake (kills, full disks, folders that cannot be written), the files on disk are whole."""
+
+import hashlib
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+
+from softground_addon.blender import cli
+from tests.blender import shots
+
+ROOT = Path(__file__).parents[2]
+
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")
+
+
+@pytest.fixture
+def shot(scene, tmp_path):
+    shots.walker(scene, frames=40)
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def bake(*options):
+    return [sys.executable, "-m", "softground_addon", "bake", *map(str, options)]
+
+
+def checksum(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def kill_at(moment, command):
+    """Run a command and kill it after that many seconds; whether it had ended before."""
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        process.wait(timeout=moment)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        return False
+    return True
+
+
+@posix
+@pytest.mark.parametrize("kills", [5, pytest.param(200, marks=pytest.mark.slow)])
+def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, kills):
+    """Kill -9 at random moments, most of them around the saving."""
+    old = shot.read_bytes()
+    before, receipt = checksum(shot), tmp_path / "receipt.json"
+    command = bake(shot, "--in-place", "--progress=none", "--receipt", receipt)
+    started = time.perf_counter()
+    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    whole = time.perf_counter() - started
+    chance = random.Random(1)
+    seen = {"old": 0, "new": 0}
+    for attempt in range(kills):
+        shot.write_bytes(old)
+        receipt.unlink(missing_ok=True)
+        kill_at(whole * (chance.uniform(0.6, 1.1) if attempt % 4 else chance.uniform(0.0, 1.0)), command)
+        found = checksum(shot)
+        if found == before:
+            seen["old"] += 1
+            continue
+        assert found == json.loads(receipt.read_text())["wrote"][str(shot.resolve())], f"attempt {attempt}"
+        seen["new"] += 1
+    print(seen)
+    assert seen["old"]
+    left = [path for path in tmp_path.iterdir() if path not in (shot, receipt)]
+    assert all(path.name.startswith(".") and ".partial" in path.name for path in left)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 200 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=200k", "none", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("cannot mount a file system here")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@posix
+def test_a_full_disk_is_named_and_leaves_no_trace(shot, small_disk, capfd):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    target = small_disk / "baked.blend"
+    target.write_bytes(b"old")
+    assert cli.run_in_blender(["bake", "--progress=none", f"--save={target}"]) == 2
+    assert "saved" in capfd.readouterr().err
+    assert [(path.name, path.read_bytes()) for path in small_disk.iterdir()] == [("baked.blend", b"old")]
+
+
+@posix
+def test_a_disk_that_fills_up_while_the_report_is_written_leaves_no_trace(shot, small_disk, tmp_path, capfd):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    report, target = small_disk / "report.json", tmp_path / "baked.blend"
+    options = ["--set=keep_forces=true", f"--report={report}", f"--save={target}"]
+    (small_disk / "filler").write_bytes(bytes(196 * 1024))
+    assert cli.run_in_blender(["bake", "--progress=none", *options]) == 2
+    assert "report.json' could not be written" in capfd.readouterr().err
+    assert [path.name for path in small_disk.iterdir()] == ["filler"]
+    assert not target.exists()
+
+
+@posix
+def test_a_limit_on_the_size_of_files_leaves_the_old_one(shot):
+    old = shot.read_bytes()
+    done = subprocess.run(
+        bake(shot, "--in-place"), cwd=ROOT, capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert shot.read_bytes() == old
+    assert [path.name for path in shot.parent.iterdir()] == ["shot.blend"]
+
+
+@posix
+@pytest.mark.parametrize("option", ["--save", "--report", "--receipt"])
+def test_a_folder_that_cannot_be_written_is_named(shot, option, capfd):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    options = [f"{option}=/proc/softground.blend", "--dry-run" if option != "--save" else "--progress=none"]
+    assert cli.run_in_blender(["bake", *options]) == 2
+    assert "/proc" in capfd.readouterr().err
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_a_bake_cleanly_at_any_moment(shot, number):
+    old = shot.read_bytes()
+    process = subprocess.Popen(
+        [*bake(shot, "--in-place"), "--progress=json"],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        if '"simulate"' in line:
+            break
+    for _ in range(5):  # an impatient user
+        process.send_signal(number)
+        time.sleep(0.02)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert shot.read_bytes() == old
+    assert [path.name for path in shot.parent.iterdir()] == ["shot.blend"]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.99])
+def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
+    broken = tmp_path / "broken.blend"
+    content = shot.read_bytes()
+    broken.write_bytes(content[: int(len(content) * share)])
+    done = subprocess.run(bake(broken, "--in-place"), cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert broken.read_bytes() == content[: int(len(content) * share)]
+
+
+NAMES = [
+    "it's",
+    'say "hi"',
+    "two\nlines",
+    "❄ Schnee",
+    "-rf",
+    "--save",
+    "a b  c",
+    "%s{0}$HOME`x`",
+    "#####",
+    "ä" * 70,
+    ".dot",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hostile_file_name_is_only_a_name(shot, name, tmp_path, capfd):
+    folder = tmp_path / name
+    folder.mkdir()
+    path = folder / f"{name}.blend"
+    shutil.move(shot, path)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    options = ["--progress=none", f"--save={folder / (name + ' baked.blend')}", f"--report={folder / (name + '.json')}"]
+    assert cli.run_in_blender(["bake", *options]) == 0, capfd.readouterr().err
+    assert {entry.name for entry in folder.iterdir()} == {f"{name}.blend", f"{name} baked.blend", f"{name}.json"}
+    manifest = tmp_path / "night.json"
+    manifest.write_text(json.dumps({"shots": [{"file": f"{name}/{name}.blend", "in_place": True}]}))
+    assert cli.run_in_blender(["batch", str(manifest), "--progress=plain"]) == 0, capfd.readouterr().out
+    assert "1 done" in capfd.readouterr().out
