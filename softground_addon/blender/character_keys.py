@@ -59,10 +59,16 @@ def response_curves(
     poses = yield from sample_poses(scene, armature, frames, controls.bones)
     moved = _parts_in_armature(response, motion, poses, scene.unit_settings.scale_length)
     curves: list[LayerCurve] = []
+    times = motion.frames * time_stretch(scene)
     for control in controls.controls:
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
-            curves += _bone_curves(armature, control, poses, moved, motion.frames, scene.unit_settings.scale_length)
+            curves += _bone_curves(armature, control, poses, moved, times, scene.unit_settings.scale_length)
     return curves
+
+
+def time_stretch(scene: bpy.types.Scene) -> float:
+    """Frames of the animation per frame of the scene: 1 unless its time is remapped."""
+    return float(scene.render.frame_map_old / scene.render.frame_map_new)
 
 
 def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> RigControls:

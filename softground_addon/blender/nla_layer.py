@@ -79,7 +79,7 @@ def check_layerable(thing: bpy.types.Object) -> None:
 def add_layer(
     thing: bpy.types.Object,
     curves: Sequence[LayerCurve],
-    frames: tuple[int, int],
+    frames: tuple[float, float],
     notes: Mapping[str, str] | None = None,
 ) -> None:
     """Put curves above the object's animation; a layer that is there already goes first.
@@ -89,8 +89,8 @@ def add_layer(
     thing : bpy.types.Object
         Local or overridden.
     curves : sequence of LayerCurve
-    frames : (int, int)
-        First and last frame; the layer acts between them only.
+    frames : (float, float)
+        First and last frame, as the animation counts them; the layer acts between them only.
     notes : mapping of str to str, optional
         Kept with the layer's action, for `notes_of`.
 
@@ -225,18 +225,19 @@ def _add_strip(
     name: str,
     action: bpy.types.Action,
     slot: Any,
-    span: tuple[int, int],
+    span: tuple[float, float],
     *,
     bottom: bool = False,
 ) -> bpy.types.NlaStrip:
     """A strip on a new track that plays the action at its own frames throughout the span."""
     track = animation.nla_tracks.new(prev=None) if bottom else _new_top_track(animation)
     track.name = name
-    strip = track.strips.new(name, span[0], action)
+    strip = track.strips.new(name, int(span[0]), action)
     set_slot(strip, slot)
     strip.use_sync_length = False
-    strip.action_frame_end, strip.action_frame_start = float(max(span[1], span[0] + 1)), float(span[0])
-    strip.frame_start, strip.frame_end = float(span[0]), float(max(span[1], span[0] + 1))
+    start, end = float(span[0]), float(max(span[1], span[0] + 1))
+    strip.action_frame_end, strip.action_frame_start = end, start
+    strip.frame_start, strip.frame_end = start, end
     strip.scale = 1.0
     return strip
 
@@ -265,7 +266,7 @@ def _new_top_track(animation: bpy.types.AnimData) -> bpy.types.NlaTrack:
     return tracks.new(prev=tracks[-1]) if len(tracks) else tracks.new()
 
 
-def _whole_span(thing: bpy.types.Object, frames: tuple[int, int]) -> tuple[int, int]:
+def _whole_span(thing: bpy.types.Object, frames: tuple[float, float]) -> tuple[int, int]:
     """Every frame at which the shot may be played, so that the user's action goes on as before beyond its keys."""
     starts, ends = [float(frames[0])], [float(frames[1])]
     animation = thing.animation_data

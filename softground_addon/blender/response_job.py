@@ -27,7 +27,7 @@ from ..core.response import (
 from ..core.simulation import CharacterLoads
 from ..core.tilt import TiltGains
 from . import nla_layer, settings
-from .character_keys import controls_of, response_curves
+from .character_keys import controls_of, response_curves, time_stretch
 from .character_setup import mapping_of
 from .properties import SoftGroundCharacter
 
@@ -64,12 +64,15 @@ class Answer:
         The source, at scene frames.
     response : Response
     before, after : Gaps
+    sinkage : float
+        Mean depth of the character's prints [m].
     """
 
     motion: CharacterMotion
     response: Response
     before: Gaps
     after: Gaps
+    sinkage: float
 
 
 def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
@@ -140,7 +143,7 @@ def answers_of(
         response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
         before = gaps(motion, touching, terrain, footprints)
         after = gaps(responding(motion, response), touching, terrain, footprints)
-        answers.append(Answer(motion, response, before, after))
+        answers.append(Answer(motion, response, before, after, mean_sinkage(footprints, motion.name)))
     return answers
 
 
@@ -163,13 +166,19 @@ def layers_of(
 
 CARRIER = "softground_carrier"
 """Note of the bone that carries the body."""
+SPEED = "softground_suggested_speed"
+"""Note of the speed that people would choose on this ground, over that on hard ground."""
 WORST = "softground_worst_gaps"
 """Note of the frames where a gap is left, as JSON."""
 
 
 def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: Answer) -> dict[str, str]:
     controls = controls_of(scene, character.armature, mapping_of(character))
-    return {CARRIER: controls.bones[0], WORST: json.dumps(worst_gaps([answer]))}
+    return {
+        CARRIER: controls.bones[0],
+        WORST: json.dumps(worst_gaps([answer])),
+        SPEED: f"{suggested_speed(answer.sinkage):.3f}",
+    }
 
 
 def put_layers(
@@ -178,7 +187,8 @@ def put_layers(
     layers: Sequence[Layer],
 ) -> None:
     """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
-    span = scene.softground.frame_start, scene.softground.frame_end
+    stretch = time_stretch(scene)
+    span = scene.softground.frame_start * stretch, scene.softground.frame_end * stretch
     for number, character in enumerate(characters):
         if number < len(layers) and layers[number].curves:
             nla_layer.add_layer(character.armature, layers[number].curves, span, layers[number].notes)

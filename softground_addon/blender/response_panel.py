@@ -67,6 +67,28 @@ class SOFTGROUND_OT_show_frame(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_slow_down(bpy.types.Operator):
+    """Stretch the scene's time to the speed that people would choose on this ground. Bake again after it"""
+
+    bl_idname = "softground.slow_down"
+    bl_label = "Slow Down"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a bake has told the speed."""
+        character = active_character(settings.scene_of(context))
+        return bool(character and character.armature and nla_layer.has_layer(character.armature))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        character = active_character(scene)
+        assert character is not None
+        speed = float(nla_layer.notes_of(character.armature).get(response_job.SPEED, "1"))
+        scene.render.frame_map_old, scene.render.frame_map_new = 100, round(100 / speed)
+        return {"FINISHED"}
+
+
 class SOFTGROUND_PT_response(bpy.types.Panel):
     """How the character answers the ground that gives way"""
 
@@ -118,6 +140,10 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")
     row.label(text=notes.get(response_job.CARRIER, ""), translate=False)
+    row = box.row()
+    row.label(text="Suggested Speed", icon="TIME")
+    row.label(text=f"{float(notes.get(response_job.SPEED, '1')):.0%}", translate=False)
+    row.operator("softground.slow_down", text="Apply")
     for gap in json.loads(notes.get(response_job.WORST, "[]"))[:_SHOWN]:
         if abs(gap["gap_mm"]) >= response_job.NOTICEABLE_GAP_MM:
             text = iface_("Frame {frame}: {gap} mm under {sole}")
@@ -125,4 +151,9 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
             box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = gap["frame"]
 
 
-CLASSES = (SOFTGROUND_OT_tilt_preset, SOFTGROUND_OT_show_frame, SOFTGROUND_PT_response)
+CLASSES = (
+    SOFTGROUND_OT_tilt_preset,
+    SOFTGROUND_OT_show_frame,
+    SOFTGROUND_OT_slow_down,
+    SOFTGROUND_PT_response,
+)

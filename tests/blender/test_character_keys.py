@@ -287,3 +287,15 @@ def test_acting_raises_the_arms_and_the_knees_on_the_rig(scene):
     assert acted[:, 2:] == pytest.approx(plain[:, 2:], abs=0.03)
     assert responders.knee_angles(scene).max() > knees
     assert 0.8 < result.report["suggested_speed"]["Walker"] < 0.95
+
+
+def test_slowing_down_stretches_time_and_the_response_still_fits(scene):
+    set_up(shots.walker(scene))
+    result = responders.bake(scene)
+    bpy.ops.softground.slow_down()
+    stretch = scene.render.frame_map_new / scene.render.frame_map_old
+    assert stretch == pytest.approx(1 / result.report["suggested_speed"]["Walker"], abs=0.01)
+    result = responders.bake(scene)
+    gaps = np.abs(responders.gaps_on_the_rig(scene, result, flat(scene))) * 1e3
+    assert np.percentile(gaps, 95) < 2.0
+    assert gaps.max() < 5.0
