@@ -26,7 +26,7 @@ POINTS_ALONG = 9
 """Points along a sole at which the ground is read."""
 ALIGN_TIME = 0.05
 """Standard deviation of the smoothing of a foot's turn over time [s], for an adult."""
-STEEPEST_LIFT = 2.5
+STEEPEST_LIFT = 3.0
 """A standing foot is let down no faster than this [m/s], for an adult: one that slides over the edge of an old print
 does not fall into it."""
 CLEAR_TIME = 0.10

@@ -1,0 +1,164 @@
+"""The figures of docs/response.md: `python -m tests.validation.response_figures`.
+
+Needs matplotlib for the curves, and Blender's Cycles for the strips.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+import softground_addon
+from softground_addon.core.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains, lean
+from tests.blender import shots
+
+IMAGES = Path(__file__).parents[2] / "docs" / "images"
+WIDTH, HEIGHT = 300, 420
+
+
+def tilt_curves() -> None:
+    """What the two gains do, and that neither the frame rate nor the size of the body matters."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, 3, figsize=(12, 3.4), sharey=True)
+
+    def run(gains: TiltGains, rate: float = 120.0, seconds: float = 8.0) -> tuple[np.ndarray, np.ndarray]:
+        times = np.arange(round(seconds * rate) + 1) / rate
+        slope = np.radians(12.0) * np.clip((times - 0.5) / 0.4, 0, 1)
+        slope -= np.radians(24.0) * np.clip((times - 4.5) / 0.4, 0, 1)
+        return times, np.degrees(lean(np.stack([slope, 0 * slope], axis=-1), frame_rate=rate, gains=gains)[:, 0])
+
+    for frequency in (0.3, 0.6, 1.2):
+        axes[0].plot(*run(TiltGains(frequency, 0.85)), label=f"{frequency} Hz")
+    axes[0].set_title("frequency, at damping 0.85")
+    for damping in (0.2, 0.5, 0.85, 1.5):
+        axes[1].plot(*run(TiltGains(0.6, damping)), label=f"damping {damping}")
+    axes[1].set_title("damping, at 0.6 Hz")
+    for label, mass, arm in (("mouse", 0.03, 0.03), ("adult", 77.5, 1.0), ("giant", 2000.0, 3.0)):
+        gains = TiltGains()
+        alpha, beta = gains.torques(inertia=mass * arm**2, arm=arm)
+        axes[2].plot(*run(TiltGains.from_torques(alpha, beta, inertia=mass * arm**2, arm=arm)), label=label)
+    axes[2].plot(*run(TiltGains(), rate=24), "k:", label="24 fps")
+    axes[2].plot(*run(body_gains(*AUTHORS_TORQUES, mass=77.5, arm=1.0)), "--", label="paper's scene")
+    axes[2].plot(*run(body_gains(*PAPER_TORQUES, mass=77.5, arm=1.0)), "--", label="paper as printed")
+    axes[2].set_title("size, frame rate, the paper's gains")
+    for axis in axes:
+        axis.set_xlabel("time (s): level, 12° up, 12° down")
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8)
+    axes[0].set_ylabel("lean (°)")
+    figure.tight_layout()
+    figure.savefig(IMAGES / "response_tilt.png", dpi=110)
+
+
+def hill(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return 0.55 * np.exp(-(((y + 2.6) / 1.4) ** 2)) + 0 * x
+
+
+def rough(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return 0.035 * np.sin(4.1 * x + 1) * np.sin(3.3 * y) + 0.02 * np.sin(9 * x + 2 * y) * np.sin(8 * y + 2)
+
+
+def strip(name: str, shape, frames: list[int], **settings: float) -> None:
+    """Frames of a walk as it was made (above) and as it responds (below)."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    armature = shots.walker(scene, frames=96)
+    x, y = np.linspace(-1.4, 1.4, 141), np.linspace(-6.2, 1.2, 371)
+    ground = _field(scene, x, y, shape)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.ground = ground
+    options.tilt.use = options.grounding.use = True
+    options.material.youngs_modulus = 2e5
+    for setting, value in settings.items():
+        setattr(options.grounding, setting, value)
+    bpy.ops.softground.bake()
+    camera = _stage(scene)
+    rows = []
+    for strength in (0.0, 1.0):
+        options.characters[0].response_strength = strength
+        row = []
+        for frame in frames:
+            scene.frame_set(frame)
+            hips = armature.matrix_world @ armature.pose.bones["hips"].head
+            look = hips.__class__((0.0, hips.y, float(shape(np.array(hips.y), np.array(0.0))) + 0.75))
+            camera.location = look + hips.__class__((4.2, -0.6, 0.55))
+            camera.rotation_euler = (look - camera.location).to_track_quat("-Z", "Y").to_euler()
+            row.append(_rendered(scene))
+        rows.append(np.concatenate(row, axis=1))
+    picture = np.concatenate(rows[::-1], axis=0)  # Blender's rows go up
+    image = bpy.data.images.new(name, picture.shape[1], picture.shape[0])
+    image.pixels.foreach_set(picture.astype(np.float32).ravel())
+    image.filepath_raw, image.file_format = str(IMAGES / f"{name}.jpg"), "JPEG"
+    image.save()
+
+
+def _field(scene, x, y, shape):
+    across, along = np.meshgrid(x, y)
+    points = np.stack([across, along, shape(along, across)], axis=-1).reshape(-1, 3)
+    corner = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
+    mesh = bpy.data.meshes.new("Field")
+    mesh.from_pydata(points, [], (corner[:, None] + [0, 1, len(x) + 1, len(x)]).tolist())
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
+    material = bpy.data.materials.new("Soil")
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (0.42, 0.34, 0.25, 1.0)
+    shader.inputs["Roughness"].default_value = 0.9
+    mesh.materials.append(material)
+    ground = bpy.data.objects.new("Field", mesh)
+    scene.collection.objects.link(ground)
+    return ground
+
+
+def _stage(scene):
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3.5, (0.9, 0.25, 0.6)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens = 58
+    for thing in (sun, camera):
+        scene.collection.objects.link(thing)
+    scene.camera = camera
+    scene.world = bpy.data.worlds.new("Sky")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0.5, 0.6, 0.75, 1.0)
+    scene.world.node_tree.nodes["Background"].inputs[1].default_value = 0.6
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
+    return camera
+
+
+def _rendered(scene) -> np.ndarray:
+    path = Path(bpy.app.tempdir) / "frame.png"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(WIDTH * HEIGHT * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(HEIGHT, WIDTH, 4)
+
+
+def main() -> int:
+    tilt_curves()
+    softground_addon.register()
+    try:
+        strip("response_hill", hill, [24, 36, 58, 70])
+        strip("response_rough", rough, [20, 26, 32, 38])
+        strip("response_deep", lambda y, x: 0 * x * y, [20, 26, 32, 38], knee_lift=1.0, arms=1.0, crouch=1.0)
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        softground_addon.unregister()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
