@@ -201,8 +201,8 @@ class _Show:
             if quarter in ("100 %", self._shown.get(name)):
                 return
             self._shown[name] = quarter
-            left = f", {_duration(event.seconds_left)} left" if event.fraction >= FIRST_ESTIMATE else ""
-            print(f"{place} {name}: {quarter}, {event.stage}{left}", flush=True)
+            rest = f", {_duration(event.seconds_left)} left" if event.fraction >= FIRST_ESTIMATE else ""
+            print(f"{place} {name}: {quarter}, {event.stage}{rest}", flush=True)
             return
         left = self._seconds_left()
         rest = f"; {_duration(left)} for the rest" if left and self._ended < self._count else ""
