@@ -22,6 +22,8 @@ ADULT_LEG = 0.9
 """Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
 ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
+RIGID = 0.05
+"""What a thing without a side may move against the ankle and still be worn on the foot, in leg lengths."""
 LOWER_FOOT = 0.02
 """How much lower one foot must stand for the hips to follow it rather than the other, in leg lengths."""
 HIPS_TIME = 0.10
@@ -83,23 +85,14 @@ class Response:
 
 
 def leg_soles(motion: CharacterMotion) -> dict[str, int]:
-    """For each side with a whole leg, the sole that it stands on."""
+    """For each side with a whole leg, the sole that it stands on: the lowest of those that go with the foot."""
     found: dict[str, int] = {}
     for side in "lr":
         if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee", "ankle")):
             continue
-        ankle = motion.joints[f"ankle_{side}"]
-        distances = [
-            float(np.linalg.norm(sole.landmark_positions().mean(axis=1) - ankle, axis=-1).mean())
-            for sole in motion.soles
-        ]
-        near = [
-            index
-            for index, sole in enumerate(motion.soles)
-            if sole.sole.side.lower() == side and distances[index] < ON_THE_ANKLE * motion.leg_length
-        ]
-        if near:
-            found[side] = min(near, key=lambda index: distances[index])
+        worn = [index for index, sole in enumerate(motion.soles) if _goes_with(motion, sole, side)]
+        if worn:
+            found[side] = min(worn, key=lambda index: float(motion.soles[index].landmark_positions()[..., 2].mean()))
     return found
 
 
@@ -266,7 +259,6 @@ def hips_of(motion: CharacterMotion) -> Array:
 
 def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
     """The motion with the response on top of it."""
-    feet = leg_soles(motion)
     carry_of_joint: dict[str, Array] = {
         f"{joint}_{side}": part
         for side, leg in response.legs.items()
@@ -282,18 +274,18 @@ def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
         carry_of_joint |= {f"{joint}_{side}": response.body @ arm for joint in ("shoulder", "elbow", "wrist")}
     joints = {name: carried(carry_of_joint.get(name, response.body), path) for name, path in motion.joints.items()}
     soles = []
-    for index, sole in enumerate(motion.soles):
-        worn_by = next((side for side in response.legs if feet.get(side) == index or _worn(motion, sole, side)), None)
+    for sole in motion.soles:
+        worn_by = next((side for side in response.legs if _goes_with(motion, sole, side)), None)
         carry = response.legs[worn_by].foot if worn_by else response.body
         soles.append(SoleMotion(sole.sole, carry[:, None] @ sole.transforms))
     return dataclasses.replace(motion, joints=joints, soles=tuple(soles))
 
 
-def _worn(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
-    """Whether a sole, such as a snowshoe, goes with the foot of a side."""
+def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
+    """Whether a sole is the foot of a side, or worn on it such as a snowshoe."""
     if sole.sole.side.lower() not in (side, ""):
         return False
     distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
-    return (
-        float(distance.mean()) < ON_THE_ANKLE * motion.leg_length and float(np.ptp(distance)) < 0.05 * motion.leg_length
-    )
+    if float(distance.mean()) > ON_THE_ANKLE * motion.leg_length:
+        return False
+    return bool(sole.sole.side) or float(np.ptp(distance)) < RIGID * motion.leg_length

@@ -299,3 +299,25 @@ def test_a_walk_made_for_level_ground_is_put_on_a_hill_and_one_made_for_the_hill
     gap = clearance(standing, Ground(GROUNDS["hill"]), touching)
     assert np.percentile(np.abs(gap), 90) < 0.01
     assert stood_on(standing, Hill()) is standing
+
+
+def test_a_leg_stands_on_the_snowshoe_that_it_wears_and_no_hand_is_a_foot():
+    motion, _ = walk(30)
+    below = np.eye(4)
+    below[2, 3] = -0.04
+    shoes = tuple(
+        SoleMotion(replace(s.sole, name=f"shoe {s.sole.side}", side=""), below @ s.transforms) for s in motion.soles
+    )
+    hand = motion.soles[0].transforms.copy()
+    hand[..., 2, 3] += 0.9
+    hands = (SoleMotion(replace(motion.soles[0].sole, name="hand.L"), hand),)
+    equipped = replace(motion, soles=(*motion.soles, *shoes, *hands))
+    assert leg_soles(motion) == {"l": 0, "r": 1}
+    assert leg_soles(equipped) == {"l": 2, "r": 3}
+    touching = np.ones((30, 5), bool)
+    sunk = Ground(lambda x, y, t: -0.10)
+    _, moved = grounded(equipped, touching, sunk)
+    for foot, shoe in ((0, 2), (1, 3)):
+        before = np.linalg.inv(equipped.soles[foot].transforms) @ equipped.soles[shoe].transforms
+        after = np.linalg.inv(moved.soles[foot].transforms) @ moved.soles[shoe].transforms
+        assert after == pytest.approx(before, abs=1e-6)
