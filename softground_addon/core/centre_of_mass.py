@@ -91,8 +91,9 @@ def centre_of_mass(motion: CharacterMotion) -> Array:
 def mass_points(motion: CharacterMotion) -> MassPoints:
     """The body's segments as point masses at their centres.
 
-    A joint that is not mapped is replaced by the next mapped one toward the hips, so that with only the hips mapped
-    the whole mass moves with them (the paper's choice). Without any joint, the mean of the soles stands in.
+    A neck that is not mapped is taken between the shoulders. Any other joint that is not mapped is replaced by the next
+    mapped one toward the hips, so that with only the hips mapped the whole mass moves with them (the paper's choice).
+    Without any joint, the mean of the soles stands in.
     """
     joints = _Joints(motion)
     neck, hips = joints["neck"], joints["hips"]
@@ -167,6 +168,8 @@ class _Joints:
             return self._mapped[name]
         if name == "hips":
             return self._hips
+        if name == "neck" and {"shoulder_l", "shoulder_r"} <= self._mapped.keys():
+            return (self._mapped["shoulder_l"] + self._mapped["shoulder_r"]) / 2  # the far end of a four-legged trunk
         joint, _, side = name.partition("_")
         parent = _TOWARD_HIPS[joint]
         return self[f"{parent}_{side}" if side and f"{parent}" not in ("neck", "hips") else parent]

@@ -64,6 +64,17 @@ def test_an_unmapped_end_moves_the_centre_by_centimetres_at_most(missing):
     assert np.linalg.norm(com(joints) - com(STANDING)) < 0.03
 
 
+def test_four_legs_without_a_neck_carry_the_trunk_between_hips_and_shoulders():
+    legs = {
+        f"{joint}_{side}": (x, y, 0.6)
+        for side, y in (("l", 0.1), ("r", -0.1))
+        for joint, x in (("hip", 0), ("shoulder", 0.8))
+    }
+    place = com({"hips": (0, 0, 0.6), **legs})
+    assert 0.25 < place[0] < 0.55  # near the middle, not at the hind legs
+    assert place[1] == pytest.approx(0)
+
+
 def test_with_the_hips_only_the_mass_is_in_the_hips():
     assert com({"hips": (1, 2, 3)}) == pytest.approx([1, 2, 3])
 
