@@ -299,3 +299,14 @@ def test_slowing_down_stretches_time_and_the_response_still_fits(scene):
     gaps = np.abs(responders.gaps_on_the_rig(scene, result, flat(scene))) * 1e3
     assert np.percentile(gaps, 95) < 2.0
     assert gaps.max() < 5.0
+
+
+def test_cyclic_keys_go_on_beyond_their_end_as_before(scene):
+    armature = shots.walker(scene)
+    set_up(armature)
+    for curve in nla_layer.action_curves(armature.animation_data.action):
+        curve.modifiers.new("CYCLES")
+    before = responders.world_matrices(scene, armature, ["hips", "foot.L"], [-30, 200, 500])
+    responders.bake(scene)
+    now = responders.world_matrices(scene, armature, ["hips", "foot.L"], [-30, 200, 500])
+    assert now == pytest.approx(before, abs=1e-5)
