@@ -16,7 +16,8 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
 from ..core.prediction import StanceLoad, deepest, matching_modulus, stance_loads
 from ..core.simulation import CharacterLoads, simulate
-from . import bake_job, settings
+from . import jobs, settings
+from .shots import Shot, estimate_shot, read_shot
 
 TRIALS = 4
 """Bakes that a match may compute: two are enough unless feet slide."""
@@ -34,14 +35,14 @@ class Analysis:
         What it was read from.
     terms : hashable
         What the loads depend on beside that.
-    shot : bake_job.Shot
+    shot : Shot
     loads : list of CharacterLoads
     stances : list of StanceLoad
     """
 
     source: Hashable
     terms: Hashable
-    shot: bake_job.Shot
+    shot: Shot
     loads: list[CharacterLoads]
     stances: list[StanceLoad]
 
@@ -88,7 +89,7 @@ def read(scene: bpy.types.Scene) -> Analysis:
     """
     analysis = known(scene)
     if analysis is None:
-        analysis = _estimated(scene, bake_job.run(bake_job.read_shot(scene)))
+        analysis = _estimated(scene, jobs.run(read_shot(scene)))
         _keep(scene, analysis)
     return analysis
 
@@ -136,8 +137,8 @@ def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: Groun
     return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
 
 
-def _estimated(scene: bpy.types.Scene, shot: bake_job.Shot) -> Analysis:
-    loads = bake_job.run(bake_job.estimate_shot(scene, shot))
+def _estimated(scene: bpy.types.Scene, shot: Shot) -> Analysis:
+    loads = jobs.run(estimate_shot(scene, shot))
     stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene))
     return Analysis(_source(scene), _terms(scene), shot, loads, stances)
 

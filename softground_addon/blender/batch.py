@@ -204,8 +204,8 @@ class _Show:
             rest = f", {_duration(event.seconds_left)} left" if event.fraction >= FIRST_ESTIMATE else ""
             print(f"{place} {name}: {quarter}, {event.stage}{rest}", flush=True)
             return
-        left = self._seconds_left()
-        rest = f"; {_duration(left)} for the rest" if left and self._ended < self._count else ""
+        seconds = self._seconds_left()
+        rest = f"; {_duration(seconds)} for the rest" if seconds and self._ended < self._count else ""
         message = f": {printable(event.message)}" if event.message else ""
         print(f"{place} {name}: {event.status}{message}{rest}", flush=True)
 

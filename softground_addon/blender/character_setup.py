@@ -71,6 +71,11 @@ def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
         sole.side = _SIDE_TO_ENUM[source.side]
 
 
+def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
+    """The scene's characters whose armature is still there."""
+    return [character for character in scene.softground.characters if character.armature]
+
+
 def mapping_of(character: SoftGroundCharacter) -> RigMapping:
     """The joints and soles of a character as the user left them."""
     joints = {entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone}

@@ -19,12 +19,12 @@ import bpy
 from ..core import files, presets, receipts, report
 from ..core.errors import BakeError, InputError, SoftGroundError
 from ..core.manifest import BatchShot, frame_range
-from . import bake_job, batch, settings
+from . import bake_job, batch, jobs, settings
 from .character_setup import set_up_automatically
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 
-Show = Callable[[bake_job.Progress], None]
+Show = Callable[[jobs.Progress], None]
 
 PARENT_POLL = 0.5
 """Time between two looks at whether the parent process is there [s]."""
@@ -71,7 +71,7 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         return EXIT_INTERRUPTED
     finally:
         for number, handler in previous.items():
-            signal.signal(number, handler)
+            signal.signal(number, handler or signal.SIG_DFL)  # none: Blender's own, which Python cannot name
     return EXIT_DONE
 
 
@@ -156,7 +156,7 @@ def _bake(options: argparse.Namespace) -> None:
     for path, value in options.overrides:
         settings.assign(scene.softground, path, value)
     show = _PROGRESS[options.progress]
-    result = bake_job.run(bake_job.bake(scene, write=not options.dry_run), show)
+    result = jobs.run(bake_job.bake(scene, write=not options.dry_run), show)
     _write_results(options, target, result.report, read)
     if options.progress == "json":
         said = {"stage": "done", "fraction": 1.0, "overall": 1.0, "totals": result.report["totals"]}
@@ -287,23 +287,23 @@ class _Plain:
     def __init__(self) -> None:
         self.shown = ""
 
-    def __call__(self, progress: bake_job.Progress) -> None:
+    def __call__(self, progress: jobs.Progress) -> None:
         line = f"{progress.stage} {int(progress.fraction * 10) * 10} %"
         if line != self.shown:
             self.shown = line
             print(line, flush=True)
 
 
-def _json(progress: bake_job.Progress) -> None:
+def _json(progress: jobs.Progress) -> None:
     fraction, overall = round(progress.fraction, 4), round(progress.overall, 4)
     print(json.dumps({"stage": progress.stage, "fraction": fraction, "overall": overall}), flush=True)
 
 
-def _openjd(progress: bake_job.Progress) -> None:
+def _openjd(progress: jobs.Progress) -> None:
     print(f"openjd_progress: {progress.overall * 100:.1f}\nopenjd_status: {progress.stage}", flush=True)
 
 
-def _none(_progress: bake_job.Progress) -> None:
+def _none(_progress: jobs.Progress) -> None:
     pass
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import analysis, bake_job, live, modal_bake, overlay, session
+from . import analysis, bake_report, live, modal_bake, overlay, session
+from .compat import remove_scene
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does."""
@@ -43,7 +44,7 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
 def compare_bake() -> None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
     for window in bpy.context.window_manager.windows:
-        session.current().stale = "\n".join(bake_job.stale_reasons(window.scene))
+        session.current().stale = "\n".join(bake_report.stale_reasons(window.scene))
         session.redraw()
         return
 
@@ -65,6 +66,12 @@ def begin_render(*_: Any) -> None:
 def end_render(*_: Any) -> None:
     """Live mode may go on."""
     live.rendering(False)
+
+
+@persistent
+def before_save(*_: Any) -> None:
+    """What is saved in live mode is whole."""
+    live.before_save()
 
 
 @persistent
@@ -99,7 +106,7 @@ def after_load(*_: Any) -> None:
 
 def _remove_left_over_scenes() -> None:
     for scene in [scene for scene in bpy.data.scenes if scene.name.split(".")[0] == LEFT_OVER]:
-        bpy.data.scenes.remove(scene)
+        remove_scene(scene)
 
 
 _HANDLERS = (
@@ -108,6 +115,7 @@ _HANDLERS = (
     ("render_init", begin_render),
     ("render_complete", end_render),
     ("render_cancel", end_render),
+    ("save_pre", before_save),
     ("undo_pre", before_undo),
     ("redo_pre", before_undo),
     ("undo_post", after_undo),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -13,10 +14,40 @@ from ..core import record
 from ..core.heightfield import TILE, HeightField, Window
 from ..core.pressed_ground import GroundSample
 from ..core.smoothing import blurred_window, gaussian_kernel
-from . import bake_job, ground_mesh
+from . import ground_mesh
+from .shots import Shot
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Tile = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _TileVertices:
+    """The vertices over a tile of cells, and where they lie between the centres of the cells.
+
+    Attributes
+    ----------
+    index : (N,) int array
+        Vertices of the mesh.
+    corner : (N, 2) int array
+        Column and row of the cell before each of them, in the tile with a margin of one cell.
+    u, v : (N,) float arrays
+        How far they are from its centre to the next one's, 0 to 1.
+    """
+
+    index: Indices
+    corner: Indices
+    u: Array
+    v: Array
+
+    def interpolate(self, values: Array) -> Array:
+        """Values (channels, rows, columns) of the tile with its margin, at the vertices."""
+        column, row = self.corner.T
+        low = values[:, row, column] * (1 - self.u) + values[:, row, column + 1] * self.u
+        high = values[:, row + 1, column] * (1 - self.u) + values[:, row + 1, column + 1] * self.u
+        result: Array = low * (1 - self.v) + high * self.v
+        return result
 
 
 class LiveGround:
@@ -29,13 +60,13 @@ class LiveGround:
     ----------
     ground : bpy.types.Object
         Carries no bake.
-    shot : bake_job.Shot
+    shot : Shot
         Read from that ground.
     unit_scale : float
         Metres per Blender unit.
     """
 
-    def __init__(self, ground: bpy.types.Object, shot: bake_job.Shot, unit_scale: float) -> None:
+    def __init__(self, ground: bpy.types.Object, shot: Shot, unit_scale: float) -> None:
         self.uid = ground.session_uid
         self.name = ground.name
         vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
@@ -46,7 +77,8 @@ class LiveGround:
         self._vertices = near[on_top]
         self._place = vertices[self._vertices, :2]
         self._up = ground_mesh.up_of(ground, unit_scale)
-        self._by_tile: dict[tuple[int, int], Indices] | None = None
+        self._by_tile: dict[Tile, Indices] | None = None
+        self._known: dict[Tile, _TileVertices] = {}
         nothing = GroundSample(*np.empty((5, 0)))
         ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale)
         self.take_from(ground)
@@ -67,7 +99,7 @@ class LiveGround:
             return None
         self.name = found.name
         mesh: Any = found.data
-        intact = ground_mesh.is_baked(found) and mesh.shape_keys and len(mesh.vertices) == len(self._rest)
+        intact = found.type == "MESH" and mesh.shape_keys and len(mesh.vertices) == len(self._rest)
         return found if intact else None
 
     def show(self, ground: bpy.types.Object, field: HeightField, windows: Sequence[Window], sigma: float) -> None:
@@ -83,37 +115,33 @@ class LiveGround:
             Standard deviation of the display blur [m].
         """
         margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
-        for window in _without_repeats(windows):
-            around = window.expanded(margin)
-            self._update(field, around, self._inside(around, field.cell_size), sigma)
+        for tile in _tiles_of(windows, margin):
+            vertices = self._vertices_of(tile, field.cell_size)
+            if len(vertices.index):
+                self._update(field, tile, vertices, sigma)
         self._write(ground)
 
-    def _inside(self, window: Window, cell_size: float) -> Indices:
-        """Places that lie in a window, as numbers among those that may move."""
+    def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
+        """The vertices over a tile, looked up once."""
         if self._by_tile is None:
             self._by_tile = _grouped(np.floor(self._place / (TILE * cell_size)).astype(np.int64))
-        columns = range(window.column // TILE, (window.column + window.columns - 1) // TILE + 1)
-        rows = range(window.row // TILE, (window.row + window.rows - 1) // TILE + 1)
-        none = np.empty(0, np.intp)
-        found = np.concatenate([none, *(self._by_tile.get((i, j), none) for i in columns for j in rows)])
-        low = np.array([window.column, window.row]) * cell_size
-        high = low + np.array([window.columns, window.rows]) * cell_size
-        place = self._place[found]
-        return found[((place >= low) & (place <= high)).all(axis=1)]
+        if tile not in self._known:
+            inside = self._by_tile.get(tile, np.empty(0, np.intp))
+            at = self._place[inside] / cell_size - np.array(tile) * TILE + 0.5  # from the centre of the cell before it
+            corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
+            self._known[tile] = _TileVertices(self._vertices[inside], corner, *(at - corner).T)
+        return self._known[tile]
 
-    def _update(self, field: HeightField, window: Window, places: Indices, sigma: float) -> None:
-        if not len(places):
-            return
-        larger = window.expanded(1)
-        raw, smooth = field.read(larger), blurred_window(field, larger, sigma)
-        at = self._place[places] / field.cell_size - (larger.column + 0.5, larger.row + 0.5)
-        compression, rim = _bilinear(raw, at)
-        smooth_compression, smooth_rim = _bilinear(smooth, at)
-        vertices = self._vertices[places]
-        rest, up = self._rest[vertices], self._up
-        self._raw[vertices] = rest + (rim - compression)[:, None] * up
-        self._display[vertices] = rest + (smooth_rim - smooth_compression)[:, None] * up
-        self._shading[:, vertices] = smooth_compression, smooth_rim
+    def _update(self, field: HeightField, tile: Tile, vertices: _TileVertices, sigma: float) -> None:
+        # Whole tiles, so that the rounding of a height does not depend on what else has changed.
+        window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE).expanded(1)
+        compression, rim = vertices.interpolate(field.read(window))
+        smooth_compression, smooth_rim = vertices.interpolate(blurred_window(field, window, sigma))
+        index = vertices.index
+        rest, up = self._rest[index], self._up
+        self._raw[index] = rest + (rim - compression)[:, None] * up
+        self._display[index] = rest + (smooth_rim - smooth_compression)[:, None] * up
+        self._shading[:, index] = smooth_compression, smooth_rim
 
     def _write(self, ground: bpy.types.Object) -> None:
         mesh = ground_mesh.mesh_of(ground)
@@ -122,10 +150,14 @@ class LiveGround:
         keys.key_blocks[ground_mesh.DISPLAY_KEY].points.foreach_set("co", self._display.ravel())
         for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
             mesh.attributes[name].data.foreach_set("value", values)
-        ground_mesh.write_positions(mesh, self._raw)
+        mesh.update_tag()
+
+    def settle(self, ground: bpy.types.Object) -> None:
+        """Bring the mesh's own positions up to date, which nothing shows while there are shape keys."""
+        ground_mesh.write_positions(ground_mesh.mesh_of(ground), self._raw)
 
 
-def _grouped(tiles: NDArray[np.int64]) -> dict[tuple[int, int], Indices]:
+def _grouped(tiles: NDArray[np.int64]) -> dict[Tile, Indices]:
     """Numbers of the places in each tile."""
     order = np.lexsort(tiles.T)
     ordered = tiles[order]
@@ -134,24 +166,12 @@ def _grouped(tiles: NDArray[np.int64]) -> dict[tuple[int, int], Indices]:
     return {(int(tiles[part[0], 0]), int(tiles[part[0], 1])): part for part in parts}
 
 
-def _without_repeats(windows: Sequence[Window]) -> list[Window]:
-    """The windows, with those that overlap joined into one."""
-    joined: list[Window] = []
+def _tiles_of(windows: Sequence[Window], margin: int) -> list[Tile]:
+    """The tiles that windows with a margin around them reach into."""
+    tiles = set()
     for window in windows:
-        united = window
-        while other := next((other for other in joined if other.intersects(united)), None):
-            joined.remove(other)
-            united = united.union(other)
-        joined.append(united)
-    return joined
-
-
-def _bilinear(values: Array, at: Array) -> Array:
-    """Values (channels, rows, columns) between cells, at places (N, 2) in columns and rows."""
-    left = np.clip(np.floor(at).astype(np.intp), 0, (values.shape[2] - 2, values.shape[1] - 2))
-    u, v = (at - left).T
-    column, row = left.T
-    low = values[:, row, column] * (1 - u) + values[:, row, column + 1] * u
-    high = values[:, row + 1, column] * (1 - u) + values[:, row + 1, column + 1] * u
-    result: Array = low * (1 - v) + high * v
-    return result
+        around = window.expanded(margin)
+        columns = range(around.column // TILE, (around.column + around.columns - 1) // TILE + 1)
+        rows = range(around.row // TILE, (around.row + around.rows - 1) // TILE + 1)
+        tiles |= {(column, row) for column in columns for row in rows}
+    return sorted(tiles)

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import SoftGroundError
-from . import bake_job, session, settings
+from . import bake_job, jobs, session, settings
 from .operators import reports_errors
 from .translation import iface_, rpt_
 
@@ -55,7 +55,7 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        self._show(bake_job.run(bake_job.bake(settings.scene_of(context))))
+        self._show(jobs.run(bake_job.bake(settings.scene_of(context))))
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -112,7 +112,7 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
         self._show_progress(progress)
         return {"PASS_THROUGH"}
 
-    def _show_progress(self, progress: bake_job.Progress) -> None:
+    def _show_progress(self, progress: jobs.Progress) -> None:
         state = session.current()
         state.progress = max(state.progress, progress.overall)
         passed = time.perf_counter() - self._started

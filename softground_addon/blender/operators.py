@@ -10,7 +10,7 @@ from typing import TypeVar
 import bpy
 
 from ..core.errors import InputError, SoftGroundError
-from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, response_job, settings
+from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, jobs, response_job, settings
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -70,7 +70,7 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
             settings.scene_of(context).softground.ground = chosen
             self.report({"INFO"}, f"'{chosen.name}' is the ground")
             return {"FINISHED"}
-        plan = bake_job.run(bake_job.fit_ground(settings.scene_of(context)))
+        plan = jobs.run(bake_job.fit_ground(settings.scene_of(context)))
         ground = bake_job.create_ground(settings.scene_of(context), plan)
         self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
         return {"FINISHED"}

@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core import record
@@ -114,7 +115,7 @@ def draw_numbers() -> None:
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
     for number, outline in enumerate(_footfalls(_ById(known)), start=1):
-        place = location_3d_to_region_2d(context.region, context.region_data, outline.middle * metre)
+        place = location_3d_to_region_2d(context.region, context.region_data, Vector((outline.middle * metre).tolist()))
         if place is None:
             continue
         text = f"{number}"
@@ -149,7 +150,8 @@ def _line(points: Array, colour: Colour, width: float) -> None:
     from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
 
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    viewport: Any = gpu.state.viewport_get()
+    shader.uniform_float("viewportSize", viewport[2:])
     shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
     shader.uniform_float("color", colour)
     content: Any = {"pos": points.astype(np.float32)}

@@ -88,6 +88,11 @@ class Sole:
         x, y = self.outline.T
         return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
+    @property
+    def length(self) -> float:
+        """Length of the flat sole from heel to toe tip [m]."""
+        return float(np.ptp(self.outline[:, 0]))
+
 
 @dataclass(frozen=True)
 class SoleMotion:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import softground_addon
-from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, playback
+from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, jobs, playback
 from tests.blender import shots
 
 pytestmark = pytest.mark.benchmark
@@ -117,7 +117,7 @@ def bake(scene, ground, *, detail, cell_size=0.01, shape_keys=False):
     options.ground, options.cell_size, options.detail, options.shape_keys = ground, cell_size, detail, shape_keys
     options.frame_start, options.frame_end = scene.frame_start, scene.frame_end
     bpy.context.view_layer.update()
-    result = bake_job.run(bake_job.bake(scene))
+    result = jobs.run(bake_job.bake(scene))
     return baked_ground.carrier_of(ground), result.report
 
 

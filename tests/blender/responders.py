@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from sample_scenes.body import BONES
-from softground_addon.blender import bake_job
+from softground_addon.blender import bake_job, jobs
 from softground_addon.blender.character_setup import mapping_of
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.rig_sampling import sample_character_now
@@ -37,7 +37,7 @@ def bake(scene, *, tilt=True, grounding=True, **values):
     scene.softground.tilt.use, scene.softground.grounding.use = tilt, grounding
     for name, value in values.items():
         setattr(scene.softground, name, value)
-    return bake_job.run(bake_job.bake(scene))
+    return jobs.run(bake_job.bake(scene))
 
 
 def as_mixamo(armature):

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, ground_mesh
+from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
 from softground_addon.core import record
 from softground_addon.core.presets import FOLDER
 from tests.blender import fingerprints, shots
@@ -33,7 +33,7 @@ def rest(ground):
 def bake(scene, **values):
     for name, value in values.items():
         setattr(scene.softground, name, value)
-    return bake_job.run(bake_job.bake(scene))
+    return jobs.run(bake_job.bake(scene))
 
 
 def plane(scene, size=7.0, vertices=240, height=lambda x, y: 0.0 * x):

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, playback
+from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, jobs, playback
 from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround
@@ -26,7 +26,7 @@ def ground(scene):
     layer.uv.foreach_set("vector", (corners / 7.0 + 0.5).astype(np.float32).ravel())
     scene.softground.frame_end = 72
     bpy.context.view_layer.update()
-    bake_job.run(bake_job.bake(scene))
+    jobs.run(bake_job.bake(scene))
     return ground
 
 
@@ -194,7 +194,7 @@ def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, t
 def test_a_shorter_bake_leaves_nothing_of_the_longer_record(scene, ground):
     longer, _ = baked_ground.load(ground)
     scene.softground.frame_end = 30
-    bake_job.run(bake_job.bake(scene))
+    jobs.run(bake_job.bake(scene))
     shorter, _ = baked_ground.load(ground)
     assert 0 < len(shorter) < len(longer)
     assert max(print_.end_frame for print_ in shorter) <= 30

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, painted_ground, settings
+from softground_addon.blender import bake_job, jobs, painted_ground, settings
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import MATERIAL_RANGES, find
@@ -80,15 +80,15 @@ def test_sand_with_an_angle_of_repose_bakes_within_its_checks_and_leaves_no_stee
 
 
 def test_rolling_pressure_changes_the_prints_and_all_options_bake_within_the_checks(walk):
-    even = bake_job.run(bake_job.bake(walk, write=False)).report
+    even = jobs.run(bake_job.bake(walk, write=False)).report
     walk.softground.pressure = "CENTRE_OF_PRESSURE"
-    rolling = bake_job.run(bake_job.bake(walk, write=False)).report
+    rolling = jobs.run(bake_job.bake(walk, write=False)).report
     assert rolling["totals"]["max_depth_m"] > 1.1 * even["totals"]["max_depth_m"]
     assert rolling["inputs"]["pressure"] == "CENTRE_OF_PRESSURE"
     material = walk.softground.material
     material.rim_bias, material.repose_angle, material.shortest_time = 0.8, 0.6, 0.02
     material.hardening, material.crust_stress, material.firm_depth = 10.0, 5e3, 0.02
-    everything = bake_job.run(bake_job.bake(walk, write=False)).report
+    everything = jobs.run(bake_job.bake(walk, write=False)).report
     assert 0 < everything["totals"]["max_depth_m"] < rolling["totals"]["max_depth_m"]
 
 

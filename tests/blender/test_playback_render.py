@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job
+from softground_addon.blender import bake_job, jobs
 from tests.blender import shots
 from tests.blender.test_bake import plane
 
@@ -59,7 +59,7 @@ def test_pixels_are_the_same_without_the_add_on_and_in_any_order(scene, tmp_path
     bpy.ops.softground.add_character()
     scene.softground.ground, scene.softground.frame_end = plane(scene, vertices=2), 48
     bpy.context.view_layer.update()
-    bake_job.run(bake_job.bake(scene))
+    jobs.run(bake_job.bake(scene))
     set_up_render(scene)
     blend = tmp_path / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))

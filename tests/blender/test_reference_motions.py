@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from softground_addon.blender import bake_job
+from softground_addon.blender import bake_job, jobs
 from softground_addon.blender.character_setup import mapping_of
 from softground_addon.blender.rig_sampling import sample_character_now
 from tests.blender import shots
@@ -25,7 +25,7 @@ UNDER_THE_FOOT = 0.01
 def baked(scene, request):
     shots.import_motion(request.param)
     bpy.ops.softground.add_character()
-    result = bake_job.run(bake_job.bake(scene))
+    result = jobs.run(bake_job.bake(scene))
     options = scene.softground
     character = options.characters[0]
     motion = sample_character_now(

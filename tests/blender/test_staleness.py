@@ -3,7 +3,7 @@
 import bpy
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground
+from softground_addon.blender import bake_report, baked_ground
 from tests.blender import shots
 from tests.blender.test_bake import plane
 
@@ -20,12 +20,12 @@ def baked(scene, request):
 
 
 def test_a_fresh_bake_is_up_to_date_also_after_a_reload(baked, tmp_path):
-    assert bake_job.stale_reasons(baked) == ()
+    assert bake_report.stale_reasons(baked) == ()
     baked.frame_set(17)
-    assert bake_job.stale_reasons(baked) == ()
+    assert bake_report.stale_reasons(baked) == ()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
-    assert bake_job.stale_reasons(bpy.context.scene) == ()
+    assert bake_report.stale_reasons(bpy.context.scene) == ()
 
 
 def change_setting(scene):
@@ -79,14 +79,14 @@ def add_strip(scene):
 def test_every_change_of_the_inputs_makes_it_stale_until_the_next_bake(baked, change, message):
     change(baked)
     bpy.context.view_layer.update()
-    reasons = bake_job.stale_reasons(baked)
+    reasons = bake_report.stale_reasons(baked)
     assert any(message in reason for reason in reasons)
     if change is not delete_vertex or baked.softground.detail == "ALWAYS":
         bpy.ops.softground.bake()
-        assert bake_job.stale_reasons(baked) == ()
+        assert bake_report.stale_reasons(baked) == ()
 
 
 def test_a_cleared_ground_is_not_stale(baked):
     bpy.ops.softground.clear_bake()
     change_setting(baked)
-    assert bake_job.stale_reasons(baked) == ()
+    assert bake_report.stale_reasons(baked) == ()

@@ -1,0 +1,96 @@
+"""What is said of a bake: its inputs, tables for the report, and what no longer fits it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.footprints import Footprint
+from ..core.simulation import CharacterLoads
+from . import response_job, settings, staleness
+from .character_setup import characters_of, mapping_of
+from .jobs import STAGES
+
+Array = NDArray[np.float64]
+
+
+def warnings(footprints: Sequence[Footprint]) -> list[str]:
+    """What the user should know of the footprints."""
+    unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
+    if unplaced <= 0:
+        return []
+    return [f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."]
+
+
+def summary(result: dict[str, Any]) -> dict[str, float]:
+    """What the panel shows of a bake."""
+    totals, timings = result["totals"], result["timings"]
+    seconds = sum(timings[stage] for stage in STAGES)
+    return {key: totals[key] for key in ("steps", "max_depth_m", "peak_force_n")} | {"seconds": seconds}
+
+
+def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
+    """Constant float (positive) or sink of the source animation, by character and sole [mm]."""
+    return {
+        character.motion.name: {
+            sole.sole.name: round(float(offset) * 1e3, 3)
+            for sole, offset in zip(character.motion.soles, character.contacts.offset, strict=True)
+        }
+        for character in loads
+    }
+
+
+def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
+    options = scene.softground
+    if options.ground is None:
+        return ()
+    armatures = [character.armature for character in characters_of(scene)]
+    return staleness.reasons(inputs_of(scene), options.ground, armatures)
+
+
+def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
+    """The settings that a bake of the scene depends on, in SI units."""
+    options = scene.softground
+    return {
+        "file": bpy.data.filepath,
+        "scene": scene.name,
+        "ground": options.ground.name if options.ground else None,
+        "characters": [
+            {
+                "armature": character.armature.name,
+                "mass_kg": settings.typed(character.mass),
+                "force_model": character.force_model,
+                "joints": {joint: list(place) for joint, place in mapping_of(character).joints.items()},
+                "soles": [asdict(source) for source in mapping_of(character).soles],
+            }
+            for character in characters_of(scene)
+        ],
+        "preset": options.material.preset,
+        "material": asdict(settings.material_of(scene)),
+        "pressure": options.pressure,
+        "painted": [options.painted.stiffness, options.painted.layer_depth, options.painted.rim],
+        "cell_size_m": settings.cell_size_of(scene),
+        "frames": [options.frame_start, options.frame_end],
+        "frame_rate": scene.render.fps / scene.render.fps_base,
+        "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
+    }
+
+
+def force_table(
+    loads: Sequence[CharacterLoads], frames: list[float], forces: list[tuple[Array, ...]]
+) -> dict[str, object]:
+    """The force on each sole at each frame [N], by character and sole."""
+    characters: dict[str, dict[str, list[list[float]]]] = {}
+    for number, character in enumerate(loads):
+        of_character = np.array([at_frame[number] for at_frame in forces])
+        names = [sole.sole.name for sole in character.motion.soles]
+        characters[character.motion.name] = {
+            name: np.round(of_character[:, sole], 3).tolist() for sole, name in enumerate(names)
+        }
+    return {"frames": frames, "characters": characters}

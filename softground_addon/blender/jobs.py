@@ -1,0 +1,63 @@
+"""Long work in small steps: a job is a generator that yields its progress and returns its result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+STAGES = {"sample": 0.6, "simulate": 0.3, "write": 0.1}
+"""Stages in their order, and the share of the whole time that each takes about."""
+
+PATIENCE = 0.005
+"""Longest wait for a computation that runs aside before its driver gets to do something else [s]."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a bake is.
+
+    Attributes
+    ----------
+    stage : str
+        One of `STAGES`.
+    fraction : float
+        Of this stage, 0 to 1.
+    """
+
+    stage: str
+    fraction: float
+
+    @property
+    def overall(self) -> float:
+        """Of the whole bake, 0 to 1."""
+        stages = list(STAGES)
+        before = sum(STAGES[stage] for stage in stages[: stages.index(self.stage)])
+        return before + STAGES[self.stage] * self.fraction
+
+
+Job = Generator[Progress, None, Result]
+
+
+def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Result:
+    """Drive a job to its end."""
+    while True:
+        try:
+            progress = next(job)
+        except StopIteration as finished:
+            result: Result = finished.value
+            return result
+        if show:
+            show(progress)
+
+
+def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
+    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering."""
+    with ThreadPoolExecutor(1) as thread:
+        outcome = thread.submit(function, *arguments)
+        while not wait([outcome], timeout=PATIENCE).done:
+            yield Progress(stage, fraction)
+    return outcome.result()

@@ -1,0 +1,152 @@
+"""A shot as it is read from the scene: what its characters do, and the ground that they do it on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.contacts import detect_contacts
+from ..core.errors import InputError
+from ..core.heightfield import FlatTerrain, Terrain
+from ..core.motion import CharacterMotion
+from ..core.simulation import CharacterLoads, estimate_loads
+from ..core.terrain import MeshTerrain
+from ..core.variation import PaintedSurface
+from . import ground_mesh, painted_ground, settings
+from .bake_checks import check_contacts
+from .character_setup import characters_of, mapping_of
+from .ground_mesh import GroundPlan, GroundSurface
+from .jobs import Job, Progress, aside
+from .properties import SoftGroundCharacter
+from .rig_sampling import sample_character
+
+Array = NDArray[np.float64]
+
+GROUND_MARGIN = 2.0
+"""How far a created ground reaches beyond the feet, in lengths of the longest sole."""
+
+LOW_PERCENTILE = 10.0
+"""A sole is on its ground for at least this share of a shot, so that its lowest points tell the ground's height."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A shot as it was read from the scene.
+
+    Attributes
+    ----------
+    motions : tuple of CharacterMotion
+        At scene frames.
+    plan : GroundPlan
+        Area and height of the walk.
+    surface : GroundSurface or None
+        The scene's ground, if it has one.
+    terrain : Terrain
+        The undisturbed ground.
+    """
+
+    motions: tuple[CharacterMotion, ...]
+    plan: GroundPlan
+    surface: GroundSurface | None
+    terrain: Terrain
+
+    @property
+    def variation(self) -> PaintedSurface | None:
+        """How the ground varies from place to place, where it is painted."""
+        painted = self.surface is not None and self.surface.factors is not None
+        return PaintedSurface(self.terrain) if painted and isinstance(self.terrain, MeshTerrain) else None
+
+
+def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
+    """What the scene's characters do, and the ground that they do it on.
+
+    Raises
+    ------
+    InputError
+        If the settings, a character or the ground cannot be used; names it and the remedy.
+    """
+    options = scene.softground
+    characters = characters_of(scene)
+    check_settings(scene, characters)
+    motions = yield from sample_characters(scene, characters)
+    plan = yield from aside("sample", 1.0, plan_ground, motions)
+    if options.ground is None:
+        return Shot(tuple(motions), plan, None, FlatTerrain(plan.height))
+    painted = painted_ground.names_of(scene)
+    surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
+    yield Progress("sample", 1.0)
+    terrain = yield from aside("sample", 1.0, surface.terrain, np.stack([plan.lower, plan.upper]))
+    return Shot(tuple(motions), plan, surface, terrain)
+
+
+def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads]]:
+    """The loads of all characters of a shot, with the masses and force models that the scene has now.
+
+    Raises
+    ------
+    InputError
+        If nobody touches the ground.
+    """
+    material = settings.material_of(scene)
+    characters = characters_of(scene)
+    loads = []
+    for motion, character in zip(shot.motions, characters, strict=True):
+        moved = replace(motion, mass=settings.typed(character.mass))
+        estimate = partial(estimate_loads, force_model=character.force_model, material=material)
+        loads.append((yield from aside("sample", 1.0, estimate, moved, shot.terrain)))
+    check_contacts(loads, shot.terrain, scene.softground.ground)
+    return loads
+
+
+def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
+    """The flat ground under the lowest positions of the soles, with a margin around all of their paths."""
+    paths = [sole.landmark_positions() for motion in motions for sole in motion.soles]
+    lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
+    upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
+    margin = GROUND_MARGIN * max(sole.sole.length for motion in motions for sole in motion.soles)
+    low = float(np.median([np.percentile(path[..., 2].min(axis=1), LOW_PERCENTILE) for path in paths]))
+    floats = [detect_contacts(motion, FlatTerrain(low)).offset for motion in motions]
+    return GroundPlan(lower - margin, upper + margin, low + float(np.median(np.concatenate(floats))))
+
+
+def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
+    """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
+    options = scene.softground
+    if not characters:
+        raise InputError("No character is set up: select an animated armature and press Add Character.")
+    if options.frame_end <= options.frame_start:
+        raise InputError(
+            f"The frame range {options.frame_start}-{options.frame_end} is empty: set End after Start in the Bake "
+            "panel."
+        )
+    if options.ground is not None:
+        ground_mesh.check_usable(options.ground)
+
+
+def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> Job[list[CharacterMotion]]:
+    """The motion of each character."""
+    motions = []
+    options = scene.softground
+    count = options.frame_end - options.frame_start + 1
+    for number, character in enumerate(characters):
+        job = sample_character(
+            scene,
+            character.armature,
+            mapping_of(character),
+            frame_start=options.frame_start,
+            frame_end=options.frame_end,
+            mass=settings.typed(character.mass),
+        )
+        while True:
+            try:
+                read = next(job)
+            except StopIteration as finished:
+                motions.append(finished.value)
+                break
+            yield Progress("sample", (number + read / count) / len(characters))
+    return motions
