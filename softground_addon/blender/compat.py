@@ -51,3 +51,8 @@ def set_slot(owner: Any, slot: Any) -> None:
     """Let animation data or a strip use a slot; nothing before slots."""
     if HAS_SLOTS and slot is not None:
         owner.action_slot = slot
+
+
+def remove_scene(scene: bpy.types.Scene) -> None:
+    """Remove a scene. `bpy.data.scenes.remove` crashes Blender where it has no window: in `--background --command`."""
+    bpy.data.batch_remove([scene])

@@ -22,6 +22,7 @@ from ..core.heightfield import Terrain
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.terrain import MeshTerrain
 from . import painted_ground, playback
+from .compat import remove_scene
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -207,7 +208,7 @@ def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> I
         yield copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph))
     finally:
         bpy.data.objects.remove(copy)
-        bpy.data.scenes.remove(scene)
+        remove_scene(scene)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import InputError
 from ..core.motion import CharacterMotion
+from .compat import remove_scene
 from .motion_assembly import Recording, assemble_motion
 from .nla_layer import without_layer
 from .rig_mapping import RigMapping, SoleSource, require_armature
@@ -182,10 +183,10 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
         yield names[0]
     finally:
         with handlers_silent():
-            for blocks, name in zip((bpy.data.scenes, bpy.data.objects), names, strict=True):
-                left_over = blocks.get(name)
-                if left_over is not None:
-                    blocks.remove(left_over)
+            if (left_scene := bpy.data.scenes.get(names[0])) is not None:
+                remove_scene(left_scene)
+            if (left_probe := bpy.data.objects.get(names[1])) is not None:
+                bpy.data.objects.remove(left_probe)
 
 
 def object_named(name: str) -> bpy.types.Object:
