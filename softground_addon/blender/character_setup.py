@@ -121,6 +121,12 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
         return
     armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
     if not armatures:
+        inside = next((thing for thing in scene.objects if _instances_armature(thing)), None)
+        if inside:
+            raise InputError(
+                f"The armature of '{inside.name}' is in a collection instance and cannot be read there: make it real "
+                "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
+            )
         raise InputError(f"Scene '{scene.name}' has no armature: open a shot with an animated character.")
     if len(armatures) > 1:
         names = ", ".join(f"'{armature.name}'" for armature in armatures)
@@ -129,3 +135,8 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             "SoftGround panel and save the file."
         )
     add_character(scene, armatures[0])
+
+
+def _instances_armature(thing: bpy.types.Object) -> bool:
+    collection = thing.instance_collection
+    return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)

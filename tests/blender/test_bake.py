@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
+from softground_addon.blender.character_setup import set_up_automatically
 from softground_addon.core import record
+from softground_addon.core.errors import InputError
 from softground_addon.core.presets import FOLDER
 from tests.blender import fingerprints, shots
 
@@ -291,6 +293,19 @@ def test_bad_input_is_named_with_its_remedy_and_changes_nothing(walk, spoil, mes
 def test_an_armature_is_needed_to_add_a_character(scene):
     with pytest.raises(RuntimeError, match="armature"):
         bpy.ops.softground.add_character()
+
+
+def test_an_armature_in_a_collection_instance_is_named_with_its_remedy(scene):
+    armature = shots.walker(scene)
+    collection = bpy.data.collections.new("Linked")
+    for thing in (armature, *armature.children):
+        scene.collection.objects.unlink(thing)
+        collection.objects.link(thing)
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", collection
+    scene.collection.objects.link(instance)
+    with pytest.raises(InputError, match=r"'Instance'.*Library Override"):
+        set_up_automatically(scene)
 
 
 def test_clicking_the_characters_mesh_adds_its_armature(scene):
