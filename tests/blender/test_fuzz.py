@@ -2,7 +2,6 @@
 
 import io
 import json
-import os
 import string
 import zipfile
 
@@ -17,10 +16,11 @@ from softground_addon.core.errors import InputError
 from tests.blender import shots
 
 QUICK = 40
-SLOW = int(os.environ.get("SOFTGROUND_FUZZ", "5000"))
-"""Inputs of each kind; four kinds make 20,000."""
 
-counts = pytest.mark.parametrize("count", [QUICK, pytest.param(SLOW, marks=[pytest.mark.slow])])
+
+def counts(slow):
+    """Few inputs in the quick tests, many in the slow ones; the four kinds make 20,000."""
+    return pytest.mark.parametrize("count", [QUICK, pytest.param(slow, marks=[pytest.mark.slow])])
 
 
 def each(strategy, count, check):
@@ -46,7 +46,7 @@ def mutated(content):
     )
 
 
-@counts
+@counts(8000)
 def test_no_preset_file_makes_a_traceback(count, tmp_path):
     path = tmp_path / "fuzz.json"
     valid = (presets.FOLDER / "snow.json").read_bytes()
@@ -61,7 +61,7 @@ def test_no_preset_file_makes_a_traceback(count, tmp_path):
     each(mutated(valid) | st.binary(max_size=64), count, check)
 
 
-@counts
+@counts(8000)
 def test_no_manifest_file_makes_a_traceback(count, tmp_path):
     (tmp_path / "a.blend").touch()
     valid = (
@@ -103,7 +103,7 @@ def rezipped(content, name, change):
     return buffer.getvalue()
 
 
-@counts
+@counts(3500)
 def test_no_record_makes_a_traceback(count, stored):
     with zipfile.ZipFile(io.BytesIO(stored)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
@@ -143,7 +143,7 @@ VALUES = st.one_of(
 )
 
 
-@counts
+@counts(500)
 @pytest.mark.timeout(3600)
 def test_no_command_line_makes_a_traceback_or_changes_the_shot(count, addon, tmp_path, monkeypatch, capfd):
     shot = tmp_path / "shot.blend"
