@@ -124,6 +124,12 @@ class LiveMode:
         over_time = histories(footprints, *place.position[:, :2].T, blur_sigma=sigma)
         baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale)
 
+    def settle(self) -> None:
+        """Make the mesh what a bake would have made of it, as it is about to be saved."""
+        ground = self._ground.object()
+        if ground is not None:
+            self._ground.settle(ground)
+
     def discard(self) -> None:
         """Leave the ground as it was before."""
         ground = self._ground.object()
@@ -161,6 +167,12 @@ def rendering(active: bool) -> None:
     """Handle the begin or the end of a render."""
     if _mode is not None:
         _mode.rendering = active
+
+
+def before_save() -> None:
+    """Handle that the file is about to be saved."""
+    if _mode is not None:
+        _mode.settle()
 
 
 def after_undo() -> None:

@@ -28,7 +28,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.key("ESC")
     yield from hand.choose_in_menu(menu, "MUD"[0])
     facts["preset"] = scene().softground.material.preset
-    bpy.ops.softground.load_preset(name="Fresh Snow")
+    bpy.ops.softground.load_preset(name="Snow")
     yield 0.3
 
     yield from hand.press_button("softground.live")
@@ -43,6 +43,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["played: deepest"] = float(heights().min())
     for _ in range(3):
         yield from hand.key("RIGHT_ARROW")
+    yield 0.7
     stopped = scene().frame_current
     here = heights()
     facts["scrubbed back"] = []
