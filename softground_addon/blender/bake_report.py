@@ -12,19 +12,44 @@ from numpy.typing import NDArray
 
 from ..core.footprints import Footprint
 from ..core.simulation import CharacterLoads
-from . import response_job, settings, staleness
+from . import properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of
 from .jobs import STAGES
 
 Array = NDArray[np.float64]
 
+FEW_CELLS, ENOUGH_CELLS = 8, 27
+"""Cells along a sole below which its outline is lost, and those that an adult's has at the default cell size."""
 
-def warnings(footprints: Sequence[Footprint]) -> list[str]:
-    """What the user should know of the footprints."""
+ADULT_LEG = 0.87
+"""Length of the legs of a person of 77.5 kg and 1.78 m, hip to ground [m] (0.491 of stature; Drillis and Contini)."""
+
+MASS_RANGE = 4.0
+"""Ratio of mass to that of a person of the same leg length beyond which it is asked about."""
+
+
+def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads]) -> list[str]:
+    """What the user should know of the footprints, with the remedy."""
+    found = []
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
-    if unplaced <= 0:
-        return []
-    return [f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."]
+    if unplaced > 0:
+        found.append(
+            f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."
+        )
+    for motion in (character.motion for character in loads):
+        cell_size, length = footprints[0].cell_size, min(sole.sole.length for sole in motion.soles)
+        if length < FEW_CELLS * cell_size:
+            found.append(
+                f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long: set the cell size to "
+                f"{length / ENOUGH_CELLS:.2g} m to see their shape."
+            )
+        likely = properties.DEFAULT_MASS * (motion.leg_length / ADULT_LEG) ** 3
+        if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
+            found.append(
+                f"'{motion.name}' weighs {motion.mass:.3g} kg on legs of {motion.leg_length:.2g} m: a person of that "
+                f"size weighs about {likely:.2g} kg. Set Mass in the Character panel."
+            )
+    return found
 
 
 def summary(result: dict[str, Any]) -> dict[str, float]:

@@ -125,6 +125,15 @@ def test_a_bake_on_the_users_mesh_moves_nothing_else_and_clears_to_the_same_byte
     assert fingerprints.of_file() == before
 
 
+def test_a_mass_or_cells_that_do_not_suit_the_size_of_the_body_are_pointed_out(walk):
+    assert bake(walk).report["warnings"] == []
+    walk.softground.characters[0].mass = 3.0
+    walk.softground.cell_size = 0.05
+    mass, cells = sorted(bake(walk).report["warnings"])
+    assert "weighs 3 kg" in mass
+    assert "cells long: set the cell size to 0.01" in cells
+
+
 def test_baking_again_gives_the_same_ground_and_not_twice_the_depth(walk):
     bpy.ops.softground.bake()
     first = heights(walk.softground.ground)
