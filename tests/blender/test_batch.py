@@ -79,6 +79,7 @@ def test_shots_baked_side_by_side_are_those_baked_one_by_one(night, capfd):
     assert results(manifest.parent / "baked") == side_by_side
 
 
+@pytest.mark.slow
 def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night):
     manifest = night(3, frames=60)
     process = subprocess.Popen(
@@ -102,6 +103,7 @@ def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night)
     assert "2 done, 1 skipped" in again.stdout
 
 
+@pytest.mark.slow
 def test_a_worker_ends_by_itself_when_its_batch_is_killed(night):
     manifest = night(1, frames=1500)
     process = subprocess.Popen(command(manifest, "--progress", "json"), cwd=ROOT, stdout=subprocess.PIPE, text=True)
@@ -119,6 +121,7 @@ def test_a_worker_ends_by_itself_when_its_batch_is_killed(night):
     assert not list((manifest.parent / "baked").iterdir())
 
 
+@pytest.mark.slow
 def test_a_bad_shot_does_not_keep_the_others_from_being_baked(night):
     manifest = night(2)
     (manifest.parent / "0bad.blend").write_bytes(b"BLENDER-v405" + b"\0" * 100)
@@ -132,6 +135,7 @@ def test_a_bad_shot_does_not_keep_the_others_from_being_baked(night):
     assert "no setting 'material.density'" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_shot_baked_in_place_is_baked_once(night):
     manifest = night(1)
     manifest.write_text("shots = [{ file = '000.blend', in_place = true }]")
@@ -141,6 +145,7 @@ def test_a_shot_baked_in_place_is_baked_once(night):
     assert (manifest.parent / "000.blend").read_bytes() == baked
 
 
+@pytest.mark.slow
 def test_a_changed_library_bakes_the_shot_again(night):
     manifest = night(1)
     rig = manifest.parent / "rig.blend"

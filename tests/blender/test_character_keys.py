@@ -45,7 +45,10 @@ MAKE = {
 }
 
 
-@pytest.mark.parametrize("rig", MAKE)
+QUICK_AND_SLOW = [rig if rig in ("walker", "ik") else pytest.param(rig, marks=pytest.mark.slow) for rig in MAKE]
+
+
+@pytest.mark.parametrize("rig", QUICK_AND_SLOW)
 def test_soles_stand_on_the_ground_that_they_pressed(scene, tmp_path, rig):
     armature = MAKE[rig](scene, tmp_path)
     scene = bpy.context.scene

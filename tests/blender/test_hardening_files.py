@@ -52,6 +52,7 @@ def kill_at(moment, command):
 
 
 @posix
+@pytest.mark.slow
 @pytest.mark.parametrize("kills", [5, pytest.param(200, marks=pytest.mark.slow)])
 def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, kills):
     """Kill -9 at random moments, most of them around the saving."""
@@ -138,6 +139,7 @@ def test_a_folder_that_cannot_be_written_is_named(shot, option, capfd):
 
 
 @posix
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_a_bake_cleanly_at_any_moment(shot, number):
     old = shot.read_bytes()

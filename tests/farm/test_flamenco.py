@@ -82,6 +82,7 @@ def test_the_settings_are_those_that_flamenco_knows():
         }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_compiled_commands_bake_and_render(shot, blender):
     renders = shot.parent / "renders"
     settings = SETTINGS | {"blendfile": str(shot), "frames": "23-24", "render_output_root": str(renders)}

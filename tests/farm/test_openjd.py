@@ -84,6 +84,7 @@ def test_what_cannot_be_rendered_is_named(night, capsys, options, says):
     assert re.search(says, capsys.readouterr().err)
 
 
+@pytest.mark.slow
 def test_openjd_runs_the_job_to_baked_and_rendered_shots(shot, blender):
     night = shot.parent / "night.toml"
     night.write_text('[[shots]]\nfile = "shot.blend"\nsave = "baked/{name}.blend"\nframes = [1, 24]')
