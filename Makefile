@@ -12,7 +12,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: demo test slow bench validate gui pictures package lint types clean
+.PHONY: demo test slow marathon bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -27,6 +27,9 @@ test: $(READY)
 
 slow: $(READY)
 	$(BIN)/python -m pytest -m slow $(TESTS)
+
+marathon: $(READY)
+	$(BIN)/python -m pytest -m marathon $(TESTS)
 
 bench: $(READY)
 	$(BIN)/python -m pytest -s -m benchmark $(TESTS)

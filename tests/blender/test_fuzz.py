@@ -20,7 +20,7 @@ QUICK = 40
 
 def counts(slow):
     """Few inputs in the quick tests, many in the slow ones; the four kinds make 20,000."""
-    return pytest.mark.parametrize("count", [QUICK, pytest.param(slow, marks=[pytest.mark.slow])])
+    return pytest.mark.parametrize("count", [QUICK, pytest.param(slow, marks=[pytest.mark.marathon])])
 
 
 def each(strategy, count, check):

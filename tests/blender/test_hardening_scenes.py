@@ -106,7 +106,7 @@ def test_a_rig_of_2000_bones_is_baked(walker):
     assert dry_run() == 0
 
 
-@pytest.mark.slow
+@pytest.mark.marathon
 @pytest.mark.timeout(1800)
 def test_an_action_of_100000_frames_is_baked(scene, tmp_path):
     shots.walker(scene, frames=100_000)
@@ -238,7 +238,7 @@ def random_scene(chance):
     bpy.context.view_layer.objects.active = armature
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(500, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
+@pytest.mark.parametrize("count", [8, pytest.param(500, marks=[pytest.mark.marathon, pytest.mark.timeout(3600)])])
 def test_a_random_scene_is_baked_or_refused_and_the_ground_is_finite(addon, capfd, count):
     codes = {0: 0, 2: 0}
     for number in range(count):
