@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Tile = tuple[int, int]
 
+ON_CENTRE = 1e-4
+"""Vertices this near to the centres of their cells, in cells, take the cells' values as they are."""
+
 
 @dataclass(frozen=True)
 class _TileVertices:
@@ -44,6 +47,9 @@ class _TileVertices:
     def interpolate(self, values: Array) -> Array:
         """Values (channels, rows, columns) of the tile with its margin, at the vertices."""
         column, row = self.corner.T
+        if not (self.u.any() or self.v.any()):
+            on_centres: Array = values[:, row, column]
+            return on_centres
         low = values[:, row, column] * (1 - self.u) + values[:, row, column + 1] * self.u
         high = values[:, row + 1, column] * (1 - self.u) + values[:, row + 1, column + 1] * self.u
         result: Array = low * (1 - self.v) + high * self.v
@@ -128,6 +134,8 @@ class LiveGround:
         if tile not in self._known:
             inside = self._by_tile.get(tile, np.empty(0, np.intp))
             at = self._place[inside] / cell_size - np.array(tile) * TILE + 0.5  # from the centre of the cell before it
+            if np.abs(at - np.rint(at)).max(initial=0.0) < ON_CENTRE:
+                at = np.rint(at)
             corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
             self._known[tile] = _TileVertices(self._vertices[inside], corner, *(at - corner).T)
         return self._known[tile]
@@ -135,8 +143,8 @@ class LiveGround:
     def _update(self, field: HeightField, tile: Tile, vertices: _TileVertices, sigma: float) -> None:
         # Whole tiles, so that the rounding of a height does not depend on what else has changed.
         window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE).expanded(1)
-        compression, rim = vertices.interpolate(field.read(window))
-        smooth_compression, smooth_rim = vertices.interpolate(blurred_window(field, window, sigma))
+        values = np.concatenate([field.read(window), blurred_window(field, window, sigma)])
+        compression, rim, smooth_compression, smooth_rim = vertices.interpolate(values)
         index = vertices.index
         rest, up = self._rest[index], self._up
         self._raw[index] = rest + (rim - compression)[:, None] * up
