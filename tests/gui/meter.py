@@ -9,7 +9,7 @@ import bpy
 
 
 class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
-    """Notes the time of every event until it is told to stop."""
+    """Notes the time of every event during a bake, until it is told to stop."""
 
     bl_idname = "test.pauses"
     bl_label = "Measure Pauses"
@@ -28,7 +28,8 @@ class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
         if not type(self).running:
             context.window_manager.event_timer_remove(self.timer)
             return {"FINISHED"}
-        type(self).times.append(time.perf_counter())
+        if context.window_manager.softground.is_baking:
+            type(self).times.append(time.perf_counter())
         return {"PASS_THROUGH"}
 
 

@@ -64,8 +64,9 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
         (name, key)
         for name, mesh in baked["meshes"].items()
         for key in mesh
-        if again["meshes"].get(name, {}).get(key) != mesh[key]
+        if key != "properties" and again["meshes"].get(name, {}).get(key) != mesh[key]
     ]
+    facts["redo: prints"] = summary()
 
     path = str(hand.pictures / "walk.blend")
     with bpy.context.temp_override(window=hand.window):
