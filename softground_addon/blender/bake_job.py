@@ -108,17 +108,19 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
     inputs = bake_report.inputs_of(scene)
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
-    input_hash = yield from aside("write", 0.3, report.hash_inputs, inputs, motions, vertices)
+    created = surface is None and write_ground
+    input_hash = yield from aside("write", 0.3, report.hash_inputs, inputs, motions, vertices, written=created)
     playback_error: float | None = None
     if write_ground and ground and vertices is not None:
         about = {"inputs": inputs, "input_hash": input_hash}
-        stored = yield from aside("write", 0.4, record.dump, footprints, about)
+        stored = yield from aside("write", 0.4, record.dump, footprints, about, written=created)
+        fitting = partial(histories, footprints, blur_sigma=material.blur_sigma)
         if refine:
             place = baked_ground.on_detail(ground, pressed, terrain, cell_size, unit_scale)
+            over_time = fitting(*place.position[:, :2].T)
         else:
+            over_time = yield from aside("write", 0.6, fitting, *vertices[index, :2].T, written=created)
             place = baked_ground.on_itself(ground, index, vertices)
-        fitting = partial(histories, footprints, *place.position[:, :2].T, blur_sigma=material.blur_sigma)
-        over_time = yield from aside("write", 0.6, fitting)
         baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale, shape_keys=options.shape_keys)
         playback_error = over_time.error
     if write and options.output != "PRINTS":

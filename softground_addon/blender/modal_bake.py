@@ -95,7 +95,8 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
     def _tick(self) -> set[str]:
         until = time.perf_counter() + TICK
         try:
-            while time.perf_counter() < until:
+            progress = next(self._job)
+            while time.perf_counter() < until or progress.overall >= 1.0:  # what is written is not to be cancelled
                 progress = next(self._job)
         except StopIteration as finished:
             self._end()
