@@ -139,7 +139,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=playback_error,
-        warnings=bake_report.warnings(footprints, loads) + response_job.warnings(answers),
+        warnings=bake_report.warnings(footprints, loads, cell_size) + response_job.warnings(answers),
         forces=forces if options.keep_forces else None,
         gaps_mm=response_job.gap_table(answers),
         worst_gaps=response_job.worst_gaps(answers),

@@ -28,7 +28,7 @@ MASS_RANGE = 4.0
 """Ratio of mass to that of a person of the same leg length beyond which it is asked about."""
 
 
-def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads]) -> list[str]:
+def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads], cell_size: float) -> list[str]:
     """What the user should know of the footprints, with the remedy."""
     found = []
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
@@ -37,7 +37,7 @@ def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads]) -
             f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."
         )
     for motion in (character.motion for character in loads):
-        cell_size, length = footprints[0].cell_size, min(sole.sole.length for sole in motion.soles)
+        length = min(sole.sole.length for sole in motion.soles)
         if length < FEW_CELLS * cell_size:
             found.append(
                 f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long: set the cell size to "
