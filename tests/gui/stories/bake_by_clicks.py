@@ -11,6 +11,10 @@ from tests.gui.shot import open_walk
 
 FRAMES = 250
 
+CELLS = 0.01
+SLOW_CELLS = 0.002
+"""Cells of a bake that lasts until a hand has found its Cancel button, beside those of the bake that counts [m]."""
+
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
     bpy.utils.register_class(meter.TEST_OT_pauses)
@@ -26,6 +30,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 
     button = yield from hand.find_button("softground.bake")
     before = fingerprints.of_file()
+    scene().softground.cell_size = SLOW_CELLS
     for way_out in ("escape", "cancel"):
         yield from hand.click(*button)
         yield from hand.wait_for(lambda: session().progress > 0.1, 30)
@@ -37,6 +42,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
             yield from hand.press_button("softground.cancel_bake", below=button[1])
         yield from hand.wait_for(lambda: not session().is_baking, 5)
         facts[f"{way_out}: as before"] = fingerprints.of_file() == before
+    scene().softground.cell_size = CELLS
 
     with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region("WINDOW")):
         bpy.ops.test.pauses("INVOKE_DEFAULT")
