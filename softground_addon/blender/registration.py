@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from typing import Any
+
 import bpy
 
 from . import (
@@ -22,6 +25,12 @@ from . import (
     session,
 )
 
+_SETTINGS: tuple[tuple[Any, type], ...] = (
+    (bpy.types.Scene, properties.SoftGroundSettings),
+    (bpy.types.WindowManager, session.SoftGroundSession),
+)
+"""Where the settings and the session are kept, each as `softground`."""
+
 CLASSES = (
     *session.CLASSES,
     *properties.CLASSES,
@@ -38,33 +47,27 @@ CLASSES = (
     *response_panel.CLASSES,
 )
 
-_command: object | None = None
-"""Handle of the registered command, which Blender wants back to take it away."""
+_registered = ExitStack()
+"""What takes each registered thing back; lives between register and unregister."""
 
 
 def register() -> None:
-    """Register classes, `scene.softground` and the command `softground`."""
-    global _command  # noqa: PLW0603  (the handle has to live between register and unregister)
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    bpy.types.Scene.softground = bpy.props.PointerProperty(name="SoftGround", type=properties.SoftGroundSettings)
-    bpy.types.WindowManager.softground = bpy.props.PointerProperty(type=session.SoftGroundSession)
-    handlers.register()
-    overlay.register()
-    menus.register()
-    _command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
+    """Register classes, `scene.softground` and the command `softground`: all of it, or on an error nothing."""
+    with ExitStack() as undo:
+        for cls in CLASSES:
+            bpy.utils.register_class(cls)
+            undo.callback(bpy.utils.unregister_class, cls)
+        for owner, group in _SETTINGS:
+            owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
+            undo.callback(delattr, owner, "softground")
+        for part in (handlers, overlay, menus):
+            part.register()
+            undo.callback(part.unregister)
+        command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
+        undo.callback(bpy.utils.unregister_cli_command, command)
+        _registered.enter_context(undo.pop_all())
 
 
 def unregister() -> None:
-    """Undo `register()`."""
-    global _command  # noqa: PLW0603
-    if _command is not None:
-        bpy.utils.unregister_cli_command(_command)
-        _command = None
-    menus.unregister()
-    overlay.unregister()
-    handlers.unregister()
-    del bpy.types.WindowManager.softground
-    del bpy.types.Scene.softground
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    """Undo `register()`, in the reverse order."""
+    _registered.close()
