@@ -37,7 +37,7 @@ def scattered(seed, count=60, size=3.0):
     place = np.concatenate([rng.uniform(-size / 2, size / 2, (count, 2)), around])
     triangles = Delaunay(place).simplices
     side = place[triangles]
-    turned = np.cross(side[:, 1] - side[:, 0], side[:, 2] - side[:, 0]) < 0
+    turned = np.linalg.det(side[:, 1:] - side[:, :1]) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return surface_of(np.column_stack([place, rng.uniform(-0.3, 0.3, len(place))]), triangles)
 

@@ -13,7 +13,7 @@ from softground_addon.core.terrain import MeshTerrain
 
 def counter_clockwise(vertices, triangles):
     a, b, c = (vertices[triangles[:, k], :2] for k in range(3))
-    turned = np.cross(b - a, c - a) < 0
+    turned = np.linalg.det(np.stack([b - a, c - a], axis=1)) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
 
