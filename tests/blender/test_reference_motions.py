@@ -1,5 +1,6 @@
 """Motion-capture files as users bring them, baked with the automatic set-up: prints where the feet were."""
 
+from functools import cache
 from itertools import pairwise
 
 import bpy
@@ -21,9 +22,11 @@ UNDER_THE_FOOT = 0.01
 """Every print lies under its foot to this distance [m]."""
 
 
-@pytest.fixture
-def baked(scene, request):
-    shots.import_motion(request.param)
+@cache
+def bake_of(name):
+    """The bake of a motion file and the motion that it was made from: plain values, made once."""
+    shots.import_motion(name)
+    scene = bpy.context.scene
     bpy.ops.softground.add_character()
     result = jobs.run(bake_job.bake(scene))
     options = scene.softground
@@ -36,7 +39,12 @@ def baked(scene, request):
         frame_start=options.frame_start,
         frame_end=options.frame_end,
     )
-    return request.param, result, motion
+    return name, result, motion
+
+
+@pytest.fixture
+def baked(scene, request):
+    return bake_of(request.param)
 
 
 every_file = pytest.mark.parametrize("baked", sorted(shots.MOTION_FILES), indirect=True)
