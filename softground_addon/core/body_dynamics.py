@@ -50,7 +50,7 @@ class BodyDynamics:
     moment : (N, 3) float array
         Rate of the angular momentum about the centre of mass, per weight [m].
     points : MassPoints
-        The body that this holds for.
+        The body that this holds for, at the scene frames among the steps.
     cutoff : float
         Cut-off of the low-pass that suits the motion [Hz].
     """
@@ -61,18 +61,22 @@ class BodyDynamics:
     points: MassPoints
     cutoff: float
 
-    def point_of_action(self, ground: Array, steps: slice = slice(None)) -> Array:
-        """Where the total force meets the level `ground` (M,) [m] at M steps, (M, 2) [m]: the zero moment point.
+    def point_of_action(self, ground: Array, steps: slice | NDArray[np.intp] = slice(None)) -> Array:
+        """Where the total force meets the level `ground` (...,) [m] at steps (...,): the zero moment point.
 
         Where the force is too small to have one, the projection of the centre of mass.
+
+        Returns
+        -------
+        (..., 2) float array [m]
         """
         centre, force, moment = self.centre[steps], self.force[steps], self.moment[steps]
-        up = np.maximum(force[:, 2], LIGHT)
-        height = centre[:, 2] - ground
-        x = centre[:, 0] - (height * force[:, 0] + moment[:, 1]) / up
-        y = centre[:, 1] - (height * force[:, 1] - moment[:, 0]) / up
-        known = force[:, 2] > LIGHT
-        return np.where(known[:, None], np.stack([x, y], axis=1), centre[:, :2])
+        up = np.maximum(force[..., 2], LIGHT)
+        height = centre[..., 2] - ground
+        x = centre[..., 0] - (height * force[..., 0] + moment[..., 1]) / up
+        y = centre[..., 1] - (height * force[..., 1] - moment[..., 0]) / up
+        known = force[..., 2, None] > LIGHT
+        return np.where(known, np.stack([x, y], axis=-1), centre[..., :2])
 
 
 def body_dynamics(motion: CharacterMotion) -> BodyDynamics:
@@ -84,13 +88,13 @@ def body_dynamics(motion: CharacterMotion) -> BodyDynamics:
         On the simulation's time grid.
     """
     step, gravity = motion.time_step, motion.gravity
-    points = mass_points(motion)
-    sampled = _at_frames(motion)
-    frame_step = step * len(sampled) / sampled.sum()
+    sampled = motion.on_frames
+    points, frame_step = mass_points(motion.at_frames()), step * len(sampled) / sampled.sum()
     pendulum = np.sqrt(gravity / motion.leg_length) / (2 * np.pi)
     highest = min(CUTOFF * pendulum, HIGHEST_CUTOFF / frame_step)
-    cutoff = _suited_cutoff(points.centre[sampled], frame_step, highest)
-    path = np.concatenate([_angular_momentum(points, step), points.centre], axis=1)
+    cutoff = _suited_cutoff(points.centre, frame_step, highest)
+    path = np.zeros((len(sampled), 6))
+    path[sampled] = np.concatenate([_angular_momentum(points, frame_step), points.centre], axis=1)
     smooth, rate, acceleration = smooth_path(path, step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS)
     force = acceleration[:, 3:] / gravity + (0.0, 0.0, 1.0)
     return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / gravity, points, cutoff)
@@ -105,24 +109,21 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     flying = _flights(airborne, body.force[:, 2])
     if not flying.any():
         return body
-    step, sampled = motion.time_step, _at_frames(motion)
+    step, sampled = motion.time_step, motion.on_frames
     frame_step = step * len(sampled) / sampled.sum()
-    parts = body.points.part_centres()[sampled]
+    parts = body.points.part_centres()
     _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), frame_step, body.cutoff)
     fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * step)))
     falling = acceleration.reshape(parts.shape)[flying[sampled]]
     points = fitted_to_free_fall(body.points, falling, fall, independent=min(2 * body.cutoff * frame_step, 1.0))
+    path = np.zeros((len(sampled), 3))
+    path[sampled] = points.centre
     centre, _, acceleration = smooth_path(
-        points.centre, step, body.cutoff, sampled=sampled, falling=flying, fall=fall, steady_ends=STEADY_ENDS
+        path, step, body.cutoff, sampled=sampled, falling=flying, fall=fall, steady_ends=STEADY_ENDS
     )
     force = acceleration / fall + (0.0, 0.0, 1.0)
     force[flying] = 0.0
     return BodyDynamics(centre, force, body.moment, points, body.cutoff)
-
-
-def _at_frames(motion: CharacterMotion) -> Mask:
-    """Which steps are scene frames: between them the motion is interpolated."""
-    return np.abs((motion.frames - motion.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
 
 
 def _suited_cutoff(path: Array, step: float, highest: float) -> float:
@@ -162,7 +163,6 @@ def _angular_momentum(points: MassPoints, step: float) -> Array:
     """Angular momentum of the point masses about their centre, per body mass, (N, 3) [m²/s]."""
     if len(points.positions) < 2:
         return np.zeros((len(points.positions), 3))
-    arm = points.positions - points.centre[:, None]
-    x, y, z = np.moveaxis(arm, -1, 0)
-    u, v, w = np.moveaxis(np.gradient(arm, step, axis=0), -1, 0)
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1).swapaxes(1, 2) @ points.fractions
+    x, y, z = arm = (points.positions - points.centre[:, None]).transpose(2, 0, 1)
+    u, v, w = np.gradient(arm, step, axis=1)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u]).dot(points.fractions).T

@@ -50,6 +50,8 @@ QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
 
 COARSE_STRIDE = 3
 """Steps between the times that are tried first."""
+WINDOW_UNIT = 8
+"""Steps to a whole number of which a transition's window is extended, so that many are fitted at once."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +89,13 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
     lowest = lowest_points(motion)
-    for change in transitions(touching, round(SEARCH * unit)):
-        gap = body.force[change.leave : change.strike, 2]
-        if len(gap) and gap.min() < FREE_FALL:
-            continue  # flight: the feet are right, there is no double support
-        strike, leave = _fit_overlap(change, lowest, body, unit)
+    changes = [
+        change
+        for change in transitions(touching, round(SEARCH * unit))
+        # In flight the feet are right, there is no double support.
+        if body.force[change.leave : change.strike, 2].min(initial=np.inf) >= FREE_FALL
+    ]
+    for change, (strike, leave) in zip(changes, _fit_overlaps(changes, lowest, body, unit), strict=True):
         touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
         touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
     for first, sole in _landings(touching):
@@ -121,17 +125,20 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
     overlap = round(SEARCH * unit)
     same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
-    clearance, speed = contacts.clearance, _sole_speeds(motion)
-    lowest = clearance.min(axis=1, keepdims=True)
-    about_as_low = clearance < lowest + same_height
+    clearance, touching = contacts.clearance, contacts.touching.copy()
+    unsupported = [
+        (first, last)
+        for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True)
+        if last - first >= round(SHORTEST_SUPPORT * unit) and clearance[first:last].min() <= highest
+    ]
+    if not unsupported:
+        return touching
+    speed = _sole_speeds(motion)
+    about_as_low = clearance < clearance.min(axis=1, keepdims=True) + same_height
     slowest = np.where(about_as_low, speed, np.inf).min(axis=1, keepdims=True)
     about_as_slow = speed < slowest + TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length)
     bearing = about_as_low & about_as_slow & (force > 0)[:, None]
-
-    touching = contacts.touching.copy()
-    for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True):
-        if last - first < round(SHORTEST_SUPPORT * unit) or lowest[first:last].min() > highest:
-            continue
+    for first, last in unsupported:
         begin, end = max(first - overlap, 0), last + overlap
         for sole in range(touching.shape[1]):
             for start, stop in zip(*runs(bearing[begin:end, sole]), strict=True):
@@ -144,12 +151,13 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
 def _sole_speeds(motion: CharacterMotion) -> Array:
     """Horizontal speed of each sole's slowest landmark, (N, S) [m/s]."""
     cutoff = EDGE_CUTOFF * np.sqrt(motion.gravity / motion.leg_length) / (2 * np.pi)
-    speeds = []
-    for sole in motion.soles:
-        points = sole.landmark_positions()[..., :2]
-        _, velocity, _ = smooth_path(points.reshape(len(points), -1), motion.time_step, cutoff)
-        speeds.append(np.linalg.norm(velocity.reshape(points.shape), axis=-1).min(axis=1))
-    return np.stack(speeds, axis=1)
+    frames = motion.at_frames()
+    points = [sole.landmark_positions()[..., :2] for sole in frames.soles]
+    path = np.concatenate(points, axis=1)
+    _, velocity, _ = smooth_path(path.reshape(len(path), -1), frames.time_step, cutoff)
+    first = np.cumsum([0, *(place.shape[1] for place in points)])[:-1]
+    slowest = np.minimum.reduceat(np.linalg.norm(velocity.reshape(path.shape), axis=-1), first, axis=1)
+    return np.stack([np.interp(motion.frames, frames.frames, speed) for speed in slowest.T], axis=1)
 
 
 def _landings(touching: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -217,34 +225,64 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
     return found
 
 
-def _fit_overlap(change: Transition, lowest: Array, body: BodyDynamics, unit: float) -> tuple[int, int]:
-    """Strike and leave whose cosine ramp fits the point of action best, near those of the transition."""
+def _fit_overlaps(changes: list[Transition], lowest: Array, body: BodyDynamics, unit: float) -> NDArray[np.intp]:
+    """Strike and leave of each transition whose cosine ramp fits the point of action best, (T, 2)."""
     search = max(round(SEARCH * unit), 1)
-    first = max(min(change.strike, change.leave) - search, 0)
-    last = min(max(change.strike, change.leave) + search, len(lowest))
-    window = slice(first, last)
-    back, front = lowest[window, change.trailing], lowest[window, change.leading]
-    target = body.point_of_action((back[:, 2] + front[:, 2]) / 2, window)
-    along = (front - back)[:, :2]
-    length = (along**2).sum(axis=1)
-    share = ((target - back[:, :2]) * along).sum(axis=1) / np.maximum(length, 1e-12)
+    found = np.array([(change.strike, change.leave) for change in changes]).reshape(-1, 2)
+    begin = np.maximum(found.min(axis=1) - search, 0)
+    end = np.minimum(found.max(axis=1) + search, len(lowest))
+    fitted = found.copy()
+    # Those whose windows are about as long are fitted together.
+    width = -(-(end - begin) // WINDOW_UNIT) * WINDOW_UNIT
+    for steps in np.unique(width):
+        some = np.flatnonzero(width == steps)
+        step = begin[some, None] + np.arange(steps)
+        feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
+        share, telling = _shares_told(step, end[some], feet, lowest, body, unit)
+        fitted[some] = _best_ramps(found[some], step, end[some], share, telling, unit)
+    return fitted
+
+
+def _shares_told(
+    step: NDArray[np.intp],
+    end: NDArray[np.intp],
+    feet: NDArray[np.intp],
+    lowest: Array,
+    body: BodyDynamics,
+    unit: float,
+) -> tuple[Array, Array]:
+    """The leading foot's share at steps (T, W) as the point of action tells it, and how much that says, both (T, W)."""
+    within = np.minimum(step, end[:, None] - 1)
+    back, front = lowest[within, feet[:, :1]], lowest[within, feet[:, 1:]]
+    target = body.point_of_action((back[..., 2] + front[..., 2]) / 2, within)
+    along = (front - back)[..., :2]
+    length = (along**2).sum(axis=-1)
+    share = ((target - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
     share = np.clip(share, 0.0, 1.0)
     # Where one sole bears all, the point of action wanders under that sole and tells nothing about the other.
     telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * SHARE_DEVIATION**2)
+    return share, np.where(step < end[:, None], telling, 0.0)
 
-    step = np.arange(first, last)
-    found = np.array([change.strike, change.leave])
+
+def _best_ramps(
+    found: NDArray[np.intp], step: NDArray[np.intp], end: NDArray[np.intp], share: Array, telling: Array, unit: float
+) -> NDArray[np.intp]:
+    """The pairs of strike and leave near those `found` (T, 2) whose ramps fit the shares (T, W) best, (T, 2)."""
+    search = max(round(SEARCH * unit), 1)
     best = found
     for stride in (COARSE_STRIDE, 1):
         reach = search // stride * stride if stride > 1 else COARSE_STRIDE - 1
         offset = np.arange(-reach, reach + 1, stride)
-        pairs = best + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
-        strike, leave = pairs.T
-        pairs = pairs[(leave - strike >= SHORTEST_OVERLAP * unit) & (strike > first) & (leave < last)]
-        if not len(pairs):
-            break
-        phase = np.clip((step - pairs[:, :1]) / (pairs[:, 1:] - pairs[:, :1]), 0.0, 1.0)
-        misfit = (0.5 - 0.5 * np.cos(np.pi * phase) - share) ** 2 @ telling
-        moved = (pairs - found) / unit
-        best = pairs[np.argmin(misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=1))]
-    return int(best[0]), int(best[1])
+        pairs = best[:, None] + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
+        strike, leave = pairs[..., 0], pairs[..., 1]
+        possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > step[:, :1]) & (leave < end[:, None])
+        overlap = np.where(possible, leave - strike, 1)[..., None]
+        phase = (step[:, None] - strike[..., None]) / overlap
+        ramp = np.cos(np.pi * np.clip(phase, 0.0, 1.0, out=phase), out=phase)
+        ramp += 2 * share[:, None] - 1  # minus twice the misfit of a ramp (1 - cos)/2
+        misfit = (np.square(ramp, out=ramp) @ (telling[..., None] / 4))[..., 0]
+        moved = (pairs - found[:, None]) / unit
+        cost = np.where(possible, misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=-1), np.inf)
+        least = np.take_along_axis(pairs, cost.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+        best = np.where(possible.any(axis=1, keepdims=True), least, best)
+    return best

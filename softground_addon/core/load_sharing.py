@@ -94,39 +94,48 @@ def share_through_transitions(points: Array, target: Array, touching: Mask, *, d
     (N, S) float array, not negative; rows sum to 1, or are 0 where nothing touches. Continuous in time while
     something touches.
     """
-    readiness = _ramps(touching, longest)
+    share = touching.astype(float)
+    several = touching.sum(axis=1) > 1
+    readiness, touching = _ramps(touching, longest)[several], touching[several]
     prior = _normalised(readiness)
     variance = (SHARE_DEVIATION * np.maximum(readiness, 1e-3)) ** 2
-    arm = np.where(touching[..., None], points - target[:, None, :], 0.0) / deviation[:, None, None]
+    arm = np.where(touching[..., None], points[several] - target[several, None], 0.0) / deviation[several, None, None]
     gram = arm @ np.swapaxes(arm, 1, 2) + _SUM_WEIGHT
     gram += np.eye(touching.shape[1]) / variance[:, None, :]
     right = prior / variance + _SUM_WEIGHT
-    return _normalised(solve_non_negative(gram, right, touching))
+    share[several] = _normalised(solve_non_negative(gram, right, touching))
+    return share
 
 
 def _ramps(touching: Mask, longest: int) -> Array:
     """How far each contact is from its ends: 0 at an end that others bridge, 1 away from it, (N, S)."""
     count, soles = touching.shape
     ramps = touching.astype(float)
-    intervals = [[(int(a), int(b)) for a, b in zip(*runs(touching[:, sole]), strict=True)] for sole in range(soles)]
-    for sole in range(soles):
-        others = [interval for other in range(soles) if other != sole for interval in intervals[other]]
-        for first, last in intervals[sole]:
-            step = np.arange(first, last)
-            ends = [b for a, b in others if a < first < b]
-            if first > 0 and ends:
-                rise = min(max(min(ends) - first, 1), last - first, longest)
-                ramps[first:last, sole] *= _cosine((step - first + 0.5) / rise)
-            starts = [a for a, b in others if a < last < b]
-            if last < count and starts:
-                fall = min(max(last - max(starts), 1), last - first, longest)
-                ramps[first:last, sole] *= _cosine((last - step - 0.5) / fall)
+    contacts = [np.stack(runs(touching[:, sole])) for sole in range(soles)]
+    for sole, (first, last) in enumerate(contacts):
+        start, end = np.concatenate([np.zeros((2, 0), int), *contacts[:sole], *contacts[sole + 1 :]], axis=1)
+        # Each ramp lasts while the others that bridge the end do; infinite where none does.
+        rises = np.where(_within(first, start, end), end, np.inf).min(axis=1, initial=np.inf) - first
+        falls = last - np.where(_within(last, start, end), start, -np.inf).max(axis=1, initial=-np.inf)
+        for begin, stop, rise, fall in zip(first, last, rises, falls, strict=True):
+            most = min(stop - begin, longest)
+            if begin > 0 and np.isfinite(rise):
+                ramp = _cosine_ramp(int(min(rise, most)))
+                ramps[begin : begin + len(ramp), sole] *= ramp
+            if stop < count and np.isfinite(fall):
+                ramp = _cosine_ramp(int(min(fall, most)))
+                ramps[stop - len(ramp) : stop, sole] *= ramp[::-1]
     return ramps
 
 
-def _cosine(phase: Array) -> Array:
-    """A ramp from 0 at phase 0 to 1 at phase 1, without corners."""
-    return 0.5 - 0.5 * np.cos(np.pi * np.clip(phase, 0.0, 1.0))
+def _within(step: NDArray[np.intp], start: NDArray[np.intp], end: NDArray[np.intp]) -> Mask:
+    """Which intervals (J,) hold which steps (I,) inside, (I, J)."""
+    return (start < step[:, None]) & (step[:, None] < end)
+
+
+def _cosine_ramp(length: int) -> Array:
+    """A ramp from 0 to 1 without corners, at the middles of so many steps."""
+    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(length) + 0.5) / length)
 
 
 def _normalised(shares: Array) -> Array:

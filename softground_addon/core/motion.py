@@ -110,8 +110,8 @@ class SoleMotion:
 
     def landmark_positions(self) -> Array:
         """World positions of the sole's landmarks, (F, L, 3) [m]."""
-        pose = self.transforms[:, self.sole.landmark_patch]
-        return np.einsum("flij,lj->fli", pose[..., :3, :3], self.sole.landmarks) + pose[..., :3, 3]
+        pose, (x, y, z) = self.transforms[:, self.sole.landmark_patch, :3], self.sole.landmarks.T[..., None]
+        return pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3]
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,21 @@ class CharacterMotion:
     def time_step(self) -> float:
         """Time between samples [s]."""
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
+
+    @property
+    def on_frames(self) -> NDArray[np.bool_]:
+        """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
+        return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
+
+    def at_frames(self) -> CharacterMotion:
+        """The samples at scene frames alone."""
+        samples = self.on_frames
+        return dataclasses.replace(
+            self,
+            frames=self.frames[samples],
+            soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[samples]) for sole in self.soles),
+            joints={name: path[samples] for name, path in self.joints.items()},
+        )
 
     def resampled(self, steps_per_frame: int) -> CharacterMotion:
         """The same motion with `steps_per_frame` samples per frame, through C1 cubic interpolation.

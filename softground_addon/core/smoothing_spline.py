@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .banded import solve_banded
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _ORDER = 3
 """The penalty is on the third derivative, so the bandwidth of the normal equations is 3."""
-_BLOCK = 32
-"""Rows of a block of the banded solver: the fastest among powers of two."""
 _FALL_WEIGHT = 1e4
 """How much more a known fall counts than the samples near the cut-off frequency."""
 
@@ -72,7 +72,7 @@ def smooth_path(
         pull = -fall * step**2 * rows
         for offset, coefficient in enumerate((1.0, -2.0, 1.0)):
             right[offset : offset + count - 2, -1] += coefficient * pull
-    position = _solve_banded(band, right)
+    position = solve_banded(band, right)
     velocity = np.gradient(position, step, axis=0)
     acceleration = np.empty_like(position)
     acceleration[1:-1] = np.diff(position, 2, axis=0) / step**2
@@ -92,36 +92,3 @@ def _add_difference(band: Array, weight: Array, order: int) -> None:
     for i, a in enumerate(stencil):
         for j in range(i, order + 1):
             band[j - i, i : i + len(weight)] += a * stencil[j] * weight
-
-
-def _solve_banded(band: Array, right: Array) -> Array:
-    """Solve a symmetric positive definite banded system by block elimination, (N, C)."""
-    reach, count = len(band) - 1, band.shape[1]
-    blocks = -(-count // _BLOCK)
-    padded = np.zeros((reach + 1, blocks * _BLOCK))
-    padded[:, :count] = band
-    padded[0, count:] = 1.0
-    diagonal = np.zeros((blocks, _BLOCK, _BLOCK))
-    coupling = np.zeros((blocks, _BLOCK, _BLOCK))  # from each block's rows to the next block's columns
-    for k in range(reach + 1):
-        elements = padded[k].reshape(blocks, _BLOCK)
-        row = np.arange(_BLOCK - k)
-        diagonal[:, row, row + k] = elements[:, : _BLOCK - k]
-        diagonal[:, row + k, row] = elements[:, : _BLOCK - k]
-        if k:
-            over = np.arange(_BLOCK - k, _BLOCK)
-            coupling[:, over, over + k - _BLOCK] = elements[:, _BLOCK - k :]
-    unknown = np.zeros((blocks, _BLOCK, right.shape[1]))
-    unknown.reshape(-1, right.shape[1])[:count] = right
-    carried = np.empty((blocks, _BLOCK, reach + right.shape[1]))
-    for block in range(blocks):
-        if block:
-            link = coupling[block - 1, :, :reach].T
-            diagonal[block, :reach, :reach] -= link @ carried[block - 1, :, :reach]
-            unknown[block, :reach] -= link @ carried[block - 1, :, reach:]
-        carried[block] = np.linalg.solve(
-            diagonal[block], np.concatenate([coupling[block, :, :reach], unknown[block]], axis=1)
-        )
-    for block in range(blocks - 2, -1, -1):
-        carried[block, :, reach:] -= carried[block, :, :reach] @ carried[block + 1, :reach, reach:]
-    return carried[:, :, reach:].reshape(-1, right.shape[1])[:count]
