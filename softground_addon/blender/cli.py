@@ -100,6 +100,7 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
     bake = commands.add_parser("bake", help="bake the footprints of a shot")
     if standalone:
         bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
+    bake.add_argument("--scene", metavar="NAME", help="scene to bake, if it is not the one that the file opens with")
     bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
     bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
     bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
@@ -144,7 +145,7 @@ def _bake(options: argparse.Namespace) -> None:
     if options.blend is not None:
         _open(options.blend)
     read = receipts.checksums(_files_read(options)) if options.receipt else {}
-    scene = settings.scene_of(bpy.context)
+    scene = _scene(options.scene)
     target = _save_target(options)
     set_up_automatically(scene)
     if options.preset:
@@ -229,6 +230,16 @@ def _open(path: Path) -> None:
         raise InputError(f"'{path}' could not be opened as a .blend file: {str(error).strip()}") from None
 
 
+def _scene(name: str | None) -> bpy.types.Scene:
+    if not name:
+        return settings.scene_of(bpy.context)
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        known = ", ".join(f"'{scene.name}'" for scene in bpy.data.scenes)
+        raise InputError(f"There is no scene '{name}' in the shot. There are: {known}.")
+    return scene
+
+
 def _preset(name_or_path: str) -> presets.Preset:
     path = Path(name_or_path)
     return presets.load(path) if path.suffix.lower() == ".json" else presets.find(name_or_path)
@@ -250,6 +261,7 @@ def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
     return BatchShot(
         name="",
         file=Path(bpy.data.filepath),
+        scene=options.scene or "",
         preset=options.preset or "",
         frames=options.frames,
         cell_size=options.cell_size,

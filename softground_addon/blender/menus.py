@@ -28,6 +28,8 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator("softground.force_curves", icon="GRAPH")
         layout.operator("softground.export_forces", icon="EXPORT")
+        layout.separator()
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 
 def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:

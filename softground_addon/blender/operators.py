@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from functools import wraps
+from pathlib import Path
 from typing import TypeVar
 
 import bpy
 
 from ..core.errors import InputError, SoftGroundError
-from . import analysis, bake_job, baked_ground, character_setup, ground_mesh, jobs, response_job, settings
+from ..core.manifest import BatchShot
+from ..core.shell import command_line
+from . import analysis, bake_job, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, settings
+from .translation import rpt_
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 
@@ -110,8 +115,52 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
+    """Copy the command line that bakes this shot as it is saved, into a new file beside it. For a terminal or a farm"""
+
+    bl_idname = "softground.copy_bake_command"
+    bl_label = "Copy Bake Command"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether the file on disk is the one that is open."""
+        if not bpy.data.filepath:
+            cls.poll_message_set("Save the file first: the command bakes it from there")
+            return False
+        if bpy.data.is_dirty and not bpy.app.background:  # in background it always is
+            cls.poll_message_set("Save your changes first: the command bakes the file as it is saved")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = bake_command(settings.scene_of(context))
+        self.report({"INFO"}, rpt_("Copied the command that bakes this shot"))
+        return {"FINISHED"}
+
+
+def bake_command(scene: bpy.types.Scene) -> str:
+    """The command line that bakes a scene of the saved file into `NAME-baked.blend` beside it.
+
+    Raises
+    ------
+    InputError
+        If a name in it cannot be typed.
+    """
+    shot = Path(bpy.data.filepath)
+    bake = BatchShot(
+        name=shot.stem,
+        file=shot,
+        scene=scene.name if len(bpy.data.scenes) > 1 else "",
+        save=shot.with_name(f"{shot.stem}-baked.blend"),
+    )
+    return command_line(batch.worker_command(shot, bake.options), windows=os.name == "nt")
+
+
 CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_create_ground,
     SOFTGROUND_OT_clear_bake,
+    SOFTGROUND_OT_copy_bake_command,
 )

@@ -297,6 +297,7 @@ class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("softground.force_curves", icon="GRAPH")
         column.operator("softground.export_forces", icon="EXPORT")
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 
 def _result(layout: Any, summary: Any) -> None:

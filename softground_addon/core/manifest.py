@@ -35,7 +35,7 @@ LONGEST_NAME = 150
 FRAME_LIMIT = 1_048_574
 """Largest frame number that Blender takes, and minus the smallest."""
 
-_FROM_DEFAULTS = ("preset", "frames", "cell_size", "set", "save", "in_place", "report")
+_FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report")
 _OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
 
 
@@ -49,6 +49,8 @@ class BatchShot:
         Unique in its manifest, whatever the case of its letters.
     file : Path
         The .blend file, absolute.
+    scene : str
+        The scene in it to bake, or "" for the one that it opens with.
     preset : str
         Name of a preset, absolute path of a preset file, or "" for what the shot has.
     frames : (int, int) or None
@@ -67,6 +69,7 @@ class BatchShot:
 
     name: str
     file: Path
+    scene: str = ""
     preset: str = ""
     frames: tuple[int, int] | None = None
     cell_size: float | None = None
@@ -84,7 +87,9 @@ class BatchShot:
     @property
     def options(self) -> list[str]:
         """The bake as options of `softground bake`."""
-        options = [f"--preset={self.preset}"] if self.preset else []
+        options = [f"--scene={self.scene}"] if self.scene else []
+        if self.preset:
+            options.append(f"--preset={self.preset}")
         if self.frames:
             options.append(f"--frames={self.frames[0]}-{self.frames[1]}")
         if self.cell_size is not None:
@@ -248,6 +253,7 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
     return BatchShot(
         name=name,
         file=file,
+        scene=_text(values["scene"], f"{where}: 'scene'") if "scene" in values else "",
         preset=_preset(values.get("preset", ""), folder, where),
         frames=_frames(values["frames"], where) if "frames" in values else None,
         cell_size=None if cell_size is None else float(cell_size),

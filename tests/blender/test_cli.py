@@ -104,6 +104,7 @@ def test_a_dry_run_saves_nothing(shot, tmp_path):
     ("options", "says"),
     [
         ((), "Nothing would be kept"),
+        (("--dry-run", "--scene", "Gone"), "no scene 'Gone'.*'Scene'"),
         (("--dry-run", "--preset", "lava"), "no preset 'lava'"),
         (("--dry-run", "--preset", "gone.json"), "gone.json"),
         (("--dry-run", "--frames", "all"), "no frame range"),

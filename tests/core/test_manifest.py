@@ -36,6 +36,7 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
         [[shots]]
         file = "020.blend"
         name = "twenty"
+        scene = "Layout"
         preset = "grounds/bog.json"
         frames = [-5, 1120]
         set.material.layer_depth = 0.5
@@ -51,6 +52,7 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
         report=FOLDER / "baked/010.json",
     )
     assert second.options == [
+        "--scene=Layout",
         f"--preset={FOLDER / 'grounds/bog.json'}",
         "--frames=-5-1120",
         "--cell-size=0.02",
@@ -107,6 +109,7 @@ def test_a_pattern_is_a_shot_for_each_file(tmp_path):
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nframes = [1, 99999999]", "'frames' is"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\ncell_size = nan", "number of metres"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\npreset = 1", "'preset' is 1"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nscene = ''", "'scene' is ''"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = 1", "must be a table"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = inf }", "'a' is inf"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = [1] }", r"'a' is \[1\]"),
@@ -160,7 +163,7 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
-KEYS = ("name", "file", "files", "preset", "frames", "cell_size", "set", "save", "in_place", "report", "other")
+KEYS = ("name", "file", "files", "scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report", "other")
 SHOTS = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 LIKELY = st.fixed_dictionaries({"shots": st.lists(SHOTS, max_size=3)}, optional={"defaults": SHOTS})
 
