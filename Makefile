@@ -12,7 +12,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: demo test slow marathon bench validate gui pictures package lint types clean
+.PHONY: demo scenes test slow marathon bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -21,6 +21,10 @@ $(READY): requirements/test.txt
 
 demo: $(READY)
 	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
+
+# The scenes of docs/gallery.md with their pictures, from nothing, into build/scenes.
+scenes: $(READY)
+	$(BIN)/python -m sample_scenes.make_all
 
 test: $(READY)
 	$(BIN)/python -m pytest $(TESTS)

@@ -10,8 +10,6 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from math import cos, pi, radians, sin
 from pathlib import Path
@@ -19,12 +17,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-import softground_addon
 from sample_scenes import stage
 from sample_scenes.body import Body
 from sample_scenes.character import copy_character, create_character
+from sample_scenes.four_grounds import close_up_of
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
+from sample_scenes.production import addon
 from sample_scenes.stick_figure import add_stick_figure
 from softground_addon.blender import ground_mesh
 from softground_addon.core import record
@@ -94,18 +93,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--samples", type=int, default=20, metavar="N", help="render samples of the pictures")
     parser.add_argument("--no-pictures", action="store_true", help="bake and save only")
     return parser
-
-
-@contextmanager
-def addon() -> Iterator[None]:
-    """An empty file with SoftGround switched on; off again at the end, or the bpy module would hang on exit."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    softground_addon.register()
-    try:
-        yield
-    finally:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        softground_addon.unregister()
 
 
 def build(motion: Path | None, scale: float, up: str | None, cell_size: float) -> list[Lane]:
@@ -231,7 +218,7 @@ def take_pictures(lanes: list[Lane], folder: Path, samples: int) -> list[Path]:
         body.hide_render = True  # their long shadows would fall on the prints
     camera = stage.add_camera(scene, "Close-up", lens=50.0)
     for lane in lanes:
-        step = show_print(lane.footprints)
+        step = close_up_of(lane.footprints)
         ahead = _looking(step.heading, 0.0)
         aside = _looking(step.heading - pi / 2, 0.0)
         reach = np.sqrt(step.area_m2) * 2.0  # length of the foot, about
@@ -242,20 +229,6 @@ def take_pictures(lanes: list[Lane], folder: Path, samples: int) -> list[Path]:
         stage.render(scene, camera, pictures[-1], _CLOSE_UP, samples)
         bpy.data.objects.remove(scale)
     return pictures
-
-
-def show_print(footprints: tuple[Footprint, ...]) -> Footprint:
-    """A print to look at from close by: whole, from the middle of the walk, and clear of all others."""
-    quarter = len(footprints) // 4
-    middle = footprints[quarter : len(footprints) - quarter] or footprints
-    largest = max(step.area_m2 for step in middle)
-    whole = [step for step in middle if step.area_m2 > 0.8 * largest]
-
-    def clearance(step: Footprint) -> float:
-        others = [np.linalg.norm(step.position - other.position) for other in footprints if other is not step]
-        return float(min(others, default=np.inf))
-
-    return max(whole, key=clearance)
 
 
 def _looking(heading: float, pitch: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import atan2, cos, pi, radians, sin
 from pathlib import Path
@@ -43,12 +43,12 @@ def set_up_rendering(scene: bpy.types.Scene) -> None:
     scene.render.image_settings.file_format = "PNG"
 
 
-def add_sun(scene: bpy.types.Scene, toward: float) -> None:
+def add_sun(scene: bpy.types.Scene, toward: float, elevation: float = SUN_ELEVATION) -> None:
     """A low warm sun with its sky. `toward` is the direction in the plane in which the light travels [rad]."""
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.color, light.angle = _SUN_STRENGTH, (1.0, 0.86, 0.70), radians(1.0)
     sun = bpy.data.objects.new("Sun", light)
-    ray = Vector((cos(SUN_ELEVATION) * cos(toward), cos(SUN_ELEVATION) * sin(toward), -sin(SUN_ELEVATION)))
+    ray = Vector((cos(elevation) * cos(toward), cos(elevation) * sin(toward), -sin(elevation)))
     sun.rotation_euler = ray.to_track_quat("-Z", "Y").to_euler()
     sun.location = -6.0 * ray
     scene.collection.objects.link(sun)
@@ -63,7 +63,7 @@ def add_sun(scene: bpy.types.Scene, toward: float) -> None:
     known = sky.bl_rna.properties["sky_type"].enum_items.keys()
     sky.sky_type = next(kind for kind in _SKIES if kind in known)
     sky.sun_disc = False
-    sky.sun_elevation = SUN_ELEVATION
+    sky.sun_elevation = elevation
     sky.sun_rotation = pi / 2 - (toward + pi)  # clockwise from +Y
     world.node_tree.links.new(sky.outputs[0], background.inputs[0])
     background.inputs[1].default_value = _SKY_STRENGTH
@@ -182,6 +182,32 @@ def render(scene: bpy.types.Scene, camera: bpy.types.Object, path: Path, size: t
     scene.render.filepath = str(path)
     with _quiet():
         bpy.ops.render.render(write_still=True)
+
+
+def contact_sheet(pictures: Sequence[Path], columns: int, path: Path) -> Path:
+    """Put pictures of one size side by side, row by row, into a JPEG."""
+    tiles = [_pixels(picture) for picture in pictures]
+    rows = [np.concatenate(tiles[i : i + columns], axis=1) for i in range(0, len(tiles), columns)]
+    sheet = np.concatenate(rows[::-1], axis=0)  # Blender counts rows from the bottom
+    image = bpy.data.images.new("Sheet", sheet.shape[1], sheet.shape[0])
+    try:
+        image.pixels.foreach_set(sheet.ravel())
+        image.filepath_raw, image.file_format = str(path), "JPEG"
+        image.save(quality=90)
+    finally:
+        bpy.data.images.remove(image)
+    return path
+
+
+def _pixels(path: Path) -> NDArray[np.float32]:
+    """A picture as (rows, columns, 4) from the bottom up."""
+    image = bpy.data.images.load(str(path))
+    try:
+        values = np.empty(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(values)
+        return values.reshape(image.size[1], image.size[0], 4)
+    finally:
+        bpy.data.images.remove(image)
 
 
 @contextmanager

@@ -108,11 +108,28 @@ def _input(node: Any, key: str | int) -> Any:
 
 @dataclass(frozen=True)
 class Ground:
-    """What every surface is made from: world place [m], how pressed it is (0-1), how risen (0-1)."""
+    """What every surface is made from.
+
+    Attributes
+    ----------
+    place : Socket
+        World place [m].
+    pressed, deep, risen : Socket
+        From 0 to 1: whether a foot was here, whether it left a hollow, whether the ground stands up as a rim.
+    edge : Socket
+        1 halfway down the wall of a print, 0 on level ground.
+    """
 
     place: Socket
     pressed: Socket
+    deep: Socket
     risen: Socket
+
+    @property
+    def edge(self) -> Socket:
+        """1 halfway down the wall of a print, 0 inside and outside."""
+        graph = self.pressed.graph
+        return self.pressed * graph.math("SUBTRACT", 1.0, self.pressed) * 4.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +146,7 @@ def ensure_material(surface: str) -> bpy.types.Material:
     Parameters
     ----------
     surface : str
-        "snow", "sand", "mud" or "soil".
+        One of `core.presets.SURFACES`.
 
     Raises
     ------
@@ -141,7 +158,7 @@ def ensure_material(surface: str) -> bpy.types.Material:
     for material in bpy.data.materials:
         if material.get(MARK) == surface and material.library is None:
             return material
-    material = bpy.data.materials.new(f"SoftGround {surface.capitalize()}")
+    material = bpy.data.materials.new(f"SoftGround {surface.replace('_', ' ').title()}")
     material[MARK] = surface
     look_of, preview = _SURFACES[surface]
     material.diffuse_color = (*preview, 1.0)
@@ -155,83 +172,114 @@ def ensure_material(surface: str) -> bpy.types.Material:
 
 def _build(graph: Graph, look_of: Callable[[Graph, Ground], Look]) -> None:
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    compression = graph.attribute(COMPRESSION)
     ground = Ground(
         place=place,
-        pressed=graph.ramp(graph.attribute(COMPRESSION), 0.0004, 0.004),
+        pressed=graph.ramp(compression, 0.0004, 0.004),
+        deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
     )
     look = look_of(graph, ground)
-    bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": 1.0, "Height": look.relief})
     # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
-    shader = graph.node(
-        "ShaderNodeBsdfPrincipled", {**look.inputs, "Normal": graph.out(bump)}, subsurface_method="BURLEY"
-    )
-    graph.node("ShaderNodeOutputMaterial", {"Surface": graph.out(shader)})
+    shader = graph.node("ShaderNodeBsdfPrincipled", look.inputs, subsurface_method="BURLEY")
+    # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
+    relief = graph.node("ShaderNodeDisplacement", {"Height": look.relief, "Midlevel": 0.0, "Scale": 1.0})
+    outputs = {"Surface": graph.out(shader), "Displacement": graph.out(relief)}
+    graph.node("ShaderNodeOutputMaterial", outputs)
 
 
 def _snow(graph: Graph, ground: Ground) -> Look:
-    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish."""
-    drifts = graph.noise(ground.place, 0.13, 2.0) * 0.016
-    clumps = graph.noise(ground.place, 0.016, 2.0) * graph.blend(ground.pressed, 0.0042, 0.0010)
-    crystals = graph.noise(ground.place, 0.0035, 3.0, 0.65) * graph.blend(ground.pressed, 0.0022, 0.0012)
+    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish, its edge breaks."""
+    drifts = graph.noise(ground.place, 0.13, 2.0) * 0.012
+    clumps = graph.noise(ground.place, 0.014, 3.0, 0.6) * graph.blend(ground.pressed, 0.0045, 0.0012)
+    crystals = graph.noise(ground.place, 0.0030, 3.0, 0.65) * graph.blend(ground.pressed, 0.0018, 0.0008)
+    broken = graph.noise(ground.place, 0.009, 3.0, 0.7) * ground.edge * 0.009
 
-    glints = graph.cells(ground.place, 0.0030)
+    glints = graph.cells(ground.place, 0.0016)
     random = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(glints, 1)}))
     tilt = graph.node("ShaderNodeVectorMath", {0: graph.out(glints, 1), 1: (0.5, 0.5, 0.0)}, operation="SUBTRACT")
     facet = graph.node("ShaderNodeVectorMath", {0: graph.out(tilt)}, operation="NORMALIZE")
     return Look(
-        drifts + clumps + crystals,
+        drifts + clumps + crystals + broken,
         {
-            "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.62, 0.76, 0.92)),
+            "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.74, 0.84, 0.94)),
             "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
             "Subsurface Weight": 0.5,
             "Subsurface Radius": (0.7, 0.9, 1.0),
             "Subsurface Scale": 0.010,
-            "Coat Weight": graph.ramp(random, 0.92, 0.93) * graph.blend(ground.pressed, 0.8, 0.0),
-            "Coat Roughness": 0.15,
+            "Coat Weight": graph.ramp(random, 0.90, 0.91) * graph.blend(ground.pressed, 1.0, 0.2),
+            "Coat Roughness": 0.10,
             "Coat Normal": graph.out(facet),
         },
     )
 
 
-def _sand(graph: Graph, ground: Ground) -> Look:
-    """Dry: fine grains of several colours over soft undulations; nothing shines."""
-    grain = graph.cells(ground.place, 0.0016)
+def _grains(graph: Graph, ground: Ground) -> tuple[Socket, Socket]:
+    """Relief [m] and tint (0-1) of sand: fine grains over soft undulations; a foot leaves it even, its rim loose."""
+    grain = graph.cells(ground.place, 0.0011)
     tint = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(grain, 1)}))
+    relief = graph.noise(ground.place, 0.16, 1.0) * 0.012
+    relief = relief + graph.noise(ground.place, 0.0022, 2.0, 0.7) * graph.blend(ground.pressed, 0.0010, 0.0008)
+    relief = relief + graph.noise(ground.place, 0.024, 3.0, 0.6) * graph.blend(ground.pressed, 0.0034, 0.0012)
+    loose = graph.noise(ground.place, 0.011, 3.0, 0.65) * graph.math("MAXIMUM", ground.risen, ground.edge)
+    return relief + loose * 0.0040, tint
+
+
+def _dry_sand(graph: Graph, ground: Ground) -> Look:
+    """Fine grains of several colours; nothing shines."""
+    relief, tint = _grains(graph, ground)
     patches = graph.noise(ground.place, 0.25, 3.0)
-    relief = graph.noise(ground.place, 0.16, 1.0) * 0.014
-    relief = relief + graph.noise(ground.place, 0.0030, 2.0, 0.7) * graph.blend(ground.pressed, 0.0016, 0.0012)
-    relief = relief + graph.noise(ground.place, 0.024, 2.0) * graph.blend(ground.pressed, 0.0024, 0.0010)
-    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.58, 0.37, 0.17), (0.90, 0.67, 0.40))
-    colour = graph.mix(graph.ramp(patches, 0.35, 0.75, 0.0, 0.35), colour, (0.66, 0.42, 0.21))
-    colour = graph.mix(ground.pressed * 0.25, colour, (0.45, 0.28, 0.13))
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))
+    colour = graph.mix(graph.ramp(patches, 0.35, 0.75, 0.0, 0.35), colour, (0.60, 0.37, 0.18))
+    colour = graph.mix(ground.pressed * 0.35, colour, (0.40, 0.24, 0.11))
     return Look(relief, {"Base Color": colour, "Roughness": 0.92, "Specular IOR Level": 0.2})
 
 
-def _mud(graph: Graph, ground: Ground) -> Look:
-    """Dark, smooth and sticky; wet in patches, wettest in the prints, where water films over it."""
-    lumps = graph.noise(ground.place, 0.06, 2.0, 0.45)
-    bits = graph.noise(ground.place, 0.009, 2.0, 0.5)
-    relief = lumps * graph.blend(ground.pressed, 0.007, 0.004) + bits * graph.blend(ground.pressed, 0.0014, 0.0008)
-    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.20, 0.75)
-    wet = graph.math("MAXIMUM", ground.pressed, damp)
-    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.078, 0.046, 0.026), (0.130, 0.082, 0.050))
-    colour = graph.mix(wet, colour, (0.034, 0.018, 0.009))
+def _wet_sand(graph: Graph, ground: Ground) -> Look:
+    """Dark and firm; the rims dry first, and the hollows hold the water that shines."""
+    relief, tint = _grains(graph, ground)
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.16, 0.095, 0.045), (0.30, 0.20, 0.115))
+    colour = graph.mix(ground.risen * 0.6, colour, (0.42, 0.29, 0.16))
+    colour = graph.mix(ground.pressed * 0.5, colour, (0.12, 0.072, 0.036))
     return Look(
         relief,
         {
             "Base Color": colour,
-            "Roughness": graph.blend(wet, 0.62, 0.26),
+            "Roughness": graph.blend(ground.pressed, 0.62, 0.36),
             "Specular IOR Level": 0.5,
-            "Coat Weight": ground.pressed * 0.6,
-            "Coat Roughness": 0.07,
+            "Coat Weight": ground.deep * 0.6,
+            "Coat Roughness": 0.12,
+            "Coat IOR": 1.33,
+        },
+    )
+
+
+def _mud(graph: Graph, ground: Ground) -> Look:
+    """Dark, smooth and sticky; damp in patches, its rims in lumps; in the hollow of a print a film of water shines."""
+    lumps = graph.noise(ground.place, 0.06, 2.0, 0.45)
+    bits = graph.noise(ground.place, 0.008, 3.0, 0.6)
+    squeezed = graph.noise(ground.place, 0.020, 2.0, 0.5) * graph.math("MAXIMUM", ground.risen, ground.edge)
+    relief = lumps * graph.blend(ground.pressed, 0.008, 0.003) + bits * graph.blend(ground.pressed, 0.0020, 0.0006)
+    relief = relief + squeezed * 0.008
+    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
+    wet = graph.math("MAXIMUM", ground.pressed, damp)
+    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.105, 0.064, 0.036), (0.170, 0.110, 0.066))
+    colour = graph.mix(wet, colour, (0.062, 0.035, 0.019))
+    return Look(
+        relief,
+        {
+            "Base Color": colour,
+            "Roughness": graph.blend(wet, 0.68, 0.34),
+            "Specular IOR Level": 0.5,
+            "Coat Weight": ground.deep,
+            "Coat Roughness": 0.06,
             "Coat IOR": 1.33,
         },
     )
 
 
 def _soil(graph: Graph, ground: Ground) -> Look:
-    """Dark dry crumbs of all sizes, dull; under the foot they are crushed to a firm, even surface."""
+    """Dark dry crumbs of all sizes, dull; crushed even under the foot, pushed up in clods around it."""
     loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
     stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
     stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
@@ -239,18 +287,20 @@ def _soil(graph: Graph, ground: Ground) -> Look:
     large = graph.ramp(graph.out(graph.cells(wavy, 0.030)), 0.1, 0.7, 1.0, 0.0)
     small = graph.ramp(graph.out(graph.cells(wavy, 0.009)), 0.1, 0.8, 1.0, 0.0)
     dust = graph.noise(ground.place, 0.0035, 3.0, 0.7)
-    spread = graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.46, 0.62)
-    crumbs = large * spread * 0.012 + small * 0.0040
-    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0026, 0.0012)
+    clods = graph.math("MAXIMUM", graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.46, 0.62), ground.risen)
+    crumbs = large * clods * 0.014 + small * graph.blend(ground.risen, 0.0045, 0.0075)
+    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0026, 0.0014)
+    relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008
     tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
-    colour = graph.mix(tint, (0.036, 0.021, 0.013), (0.135, 0.082, 0.050))
-    colour = graph.mix(ground.pressed * 0.5, colour, (0.075, 0.045, 0.027))
+    colour = graph.mix(tint, (0.050, 0.029, 0.018), (0.190, 0.118, 0.074))
+    colour = graph.mix(ground.pressed * 0.5, colour, (0.095, 0.057, 0.034))
     return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
 
 
 _SURFACES: dict[str, tuple[Callable[[Graph, Ground], Look], Colour]] = {
     "snow": (_snow, (0.85, 0.89, 0.95)),
-    "sand": (_sand, (0.66, 0.48, 0.29)),
+    "sand": (_dry_sand, (0.66, 0.48, 0.29)),
+    "wet_sand": (_wet_sand, (0.24, 0.16, 0.09)),
     "mud": (_mud, (0.07, 0.04, 0.02)),
     "soil": (_soil, (0.12, 0.07, 0.04)),
 }

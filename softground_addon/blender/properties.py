@@ -141,7 +141,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     surface: EnumProperty(
         name="Look",
         description="Render material that a created ground gets",
-        items=[(name, name.capitalize(), "") for name in SURFACES],
+        items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
         default="snow",
     )
     youngs_modulus: FloatProperty(

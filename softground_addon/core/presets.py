@@ -32,7 +32,7 @@ MATERIAL_RANGES: Mapping[str, tuple[float, float]] = {
 }
 """Smallest and largest value that is accepted for each field of `GroundMaterial`, in its SI unit (angles in rad)."""
 
-SURFACES = ("snow", "sand", "mud", "soil")
+SURFACES = ("snow", "sand", "wet_sand", "mud", "soil")
 """Looks that a preset may ask for; each is a procedural render material."""
 
 

@@ -71,7 +71,7 @@ def test_no_preset_lets_a_standing_person_through_the_layer(path):
     [
         ({"schema_version": 99}, "schema_version 1"),
         ({"name": ""}, "no 'name'"),
-        ({"surface": "lava"}, "snow, sand, mud, soil"),
+        ({"surface": "lava"}, "snow, sand, wet_sand, mud, soil"),
         ({"material": None}, "no 'material'"),
         ({"material": {"youngs_modulus": -1}}, "'youngs_modulus' is -1"),
         ({"material": {"youngs_modulus": "stiff"}}, "'youngs_modulus' is 'stiff'"),

@@ -33,11 +33,11 @@ def principled(material):
 @pytest.mark.parametrize("surface", SURFACES)
 def test_the_output_is_shaded_from_the_compression_of_the_bake(ensure_material, surface):
     shader = principled(ensure_material(surface))
-    for name in ("Base Color", "Normal"):
-        attributes = {node.attribute_name for node in upstream(shader.inputs[name]) if node.type == "ATTRIBUTE"}
-        assert "softground_compression" in attributes
     output = next(node for node in shader.id_data.nodes if node.type == "OUTPUT_MATERIAL")
     assert output.inputs["Surface"].links[0].from_node == shader
+    for socket in (shader.inputs["Base Color"], output.inputs["Displacement"]):
+        attributes = {node.attribute_name for node in upstream(socket) if node.type == "ATTRIBUTE"}
+        assert "softground_compression" in attributes
     assert all(link.is_valid for link in shader.id_data.links)
 
 
@@ -67,7 +67,7 @@ def test_a_users_material_of_the_same_name_is_left_alone(ensure_material):
 
 
 def test_an_unknown_surface_is_refused_with_the_known_ones(ensure_material):
-    with pytest.raises(InputError, match="snow, sand, mud, soil"):
+    with pytest.raises(InputError, match="snow, sand, wet_sand, mud, soil"):
         ensure_material("lava")
 
 

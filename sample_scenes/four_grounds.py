@@ -1,0 +1,132 @@
+"""Fig. 8, the four materials: the same step in snow, dry sand, mud and soil, seen from close by.
+
+The rims lean ahead, dry sand lies at its angle of repose, and the pressure rolls from the heel to the toes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from sample_scenes import production, stage
+from sample_scenes.body import Body
+from sample_scenes.character import copy_character, create_character
+from sample_scenes.gait import Gait, walk
+from sample_scenes.keys import write_action
+from sample_scenes.production import Bake, Claim, Options, Walker
+from softground_addon.core.footprints import Footprint
+
+PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
+
+CELL_SIZE = 0.004  # m
+FRAMES = 48  # 2 s: four steps
+SPACING = 1.2  # m from ground to ground
+PICTURE = (640, 480)
+SUN_ELEVATION = radians(22)
+"""Low, but the bottom of a print still sees the sun."""
+
+_LOOKS: dict[str, Options] = {
+    "Snow": {"pressure": "UNIFORM"},
+    "Dry Sand": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.6", "material.repose_angle": "0.5585"},
+    "Mud": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.3"},
+    "Soil": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.3"},
+}
+"""What is switched on beside the preset."""
+
+
+@dataclass(frozen=True)
+class FourGrounds:
+    """One bake per preset, and who walked there."""
+
+    bakes: dict[str, Bake]
+    walkers: list[bpy.types.Object]
+
+
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> FourGrounds:
+    """The same short walk on each preset."""
+    body = Body()
+    first = create_character("Hiker", body, scene.collection)
+    write_action(first, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
+    scene.frame_start, scene.frame_end = 1, FRAMES
+    bakes, walkers = {}, []
+    for number, preset in enumerate(PRESETS):
+        walker = copy_character(first, f"Hiker {preset}", scene.collection)
+        walker.location.x = number * SPACING
+        chosen = {"shape_keys": "false"} | _LOOKS[preset] | (options or {})
+        bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], preset, cell_size, options=chosen)
+        bakes[preset].ground.name = f"{preset} Ground"
+        walkers.append(walker)
+    production.remove_character(first)
+    return FourGrounds(bakes, walkers)
+
+
+def claims(built: FourGrounds) -> list[Claim]:
+    """The softer the deeper; the rim is 2·nu of what was pressed."""
+    depth = {
+        preset: float(np.mean([step.compressed_m3 / step.area_m2 for step in bake.footprints]))
+        for preset, bake in built.bakes.items()
+    }
+    raised = {
+        preset: sum(step.rim_m3 for step in bake.footprints) / sum(step.compressed_m3 for step in bake.footprints)
+        for preset, bake in built.bakes.items()
+    }
+    return [
+        Claim("Snow's prints over mud's, in mean depth", depth["Snow"] / depth["Mud"], 1.05, 2.5),
+        Claim("Mud's prints over soil's, in mean depth", depth["Mud"] / depth["Soil"], 1.3, 2.5),
+        Claim("Soil's prints over sand's, in mean depth", depth["Soil"] / depth["Dry Sand"], 1.3, 2.5),
+        Claim("Part of the pressed snow that stands up as a rim", raised["Snow"], 0.099, 0.101),
+        Claim("Part of the pressed sand that stands up as a rim", raised["Dry Sand"], 0.99, 1.01),
+    ]
+
+
+def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
+    """One print on each ground under a low sun, and all of them on one sheet."""
+    scene = bpy.context.scene
+    scene.frame_set(scene.frame_end)
+    for walker in built.walkers:
+        for child in walker.children:
+            child.hide_render = True  # their long shadows would fall on the prints
+    light(scene, close_up_of(built.bakes["Snow"].footprints))
+    camera = stage.add_camera(scene, "Close-up", lens=50.0)
+    pictures = []
+    for preset, bake in built.bakes.items():
+        aim_at_print(camera, close_up_of(bake.footprints))
+        pictures.append(folder / f"four_grounds_{preset.lower().replace(' ', '_')}.png")
+        stage.render(scene, camera, pictures[-1], PICTURE, samples)
+    return [*pictures, stage.contact_sheet(pictures, 2, folder / "four_grounds.jpg")]
+
+
+def light(scene: bpy.types.Scene, step: Footprint) -> None:
+    """A low sun from ahead and aside: walls throw shadows, wet ground shines toward the camera."""
+    stage.add_sun(scene, step.heading - radians(125), SUN_ELEVATION)
+    scene.view_settings.exposure = -0.5
+
+
+def aim_at_print(camera: bpy.types.Object, step: Footprint) -> None:
+    """From behind and above, the toes pointing up in the picture."""
+    reach = 2.0 * np.sqrt(step.area_m2)  # length of the foot, about
+    ahead = np.array((cos(step.heading), sin(step.heading), 0.0))
+    aside = np.array((ahead[1], -ahead[0], 0.0))
+    stage.aim(camera, step.position + reach * (-1.45 * ahead + 0.35 * aside + (0.0, 0.0, 1.25)), step.position)
+
+
+def close_up_of(footprints: tuple[Footprint, ...]) -> Footprint:
+    """A print to look at from close by: whole, from the middle of the walk, and clear of all others."""
+    quarter = len(footprints) // 4
+    middle = footprints[quarter : len(footprints) - quarter] or footprints
+    largest = max(step.area_m2 for step in middle)
+    whole = [step for step in middle if step.area_m2 > 0.8 * largest]
+
+    def clearance(step: Footprint) -> float:
+        others = [np.linalg.norm(step.position - other.position) for other in footprints if other is not step]
+        return float(min(others, default=np.inf))
+
+    return max(whole, key=clearance)
+
+
+if __name__ == "__main__":
+    production.main(__name__)

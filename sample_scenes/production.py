@@ -1,0 +1,227 @@
+"""What all sample scenes have in common: SoftGround switched on, a bake as a user makes it, claims, and the command.
+
+A scene is a module with three functions, called in this order:
+
+- `build(scene, cell_size, options)` makes characters and grounds in the open file, bakes, and returns what it made;
+- `claims(built)` measures what the paper's figure promises;
+- `shoot(built, folder, samples)` lights it and takes its pictures.
+
+    python -m sample_scenes.NAME [--output DIR] [--set PATH=VALUE ...] [--samples N] [--no-pictures]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import bpy
+import numpy as np
+
+import softground_addon
+from sample_scenes import stage
+from softground_addon.blender import baked_ground, settings
+from softground_addon.core.footprints import Footprint, recompose
+
+OUTPUT = Path("build/scenes")
+
+Options = Mapping[str, str]
+"""Settings below `scene.softground` by their path, as `--set` takes them."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A number that a figure promises, and the range in which it is what the figure says.
+
+    Attributes
+    ----------
+    text : str
+    value, low, high : float
+    """
+
+    text: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number is in its range."""
+        return self.low <= self.value <= self.high
+
+    def __str__(self) -> str:
+        verdict = "ok  " if self.holds else "FAIL"
+        return f"{verdict} {self.text}: {self.value:.4g} ({self.low:.4g} to {self.high:.4g})"
+
+
+@dataclass(frozen=True)
+class Walker:
+    """Somebody who walks.
+
+    Attributes
+    ----------
+    armature : bpy.types.Object
+    mass : float
+        [kg].
+    """
+
+    armature: bpy.types.Object
+    mass: float
+
+
+@dataclass(frozen=True)
+class Bake:
+    """A baked ground and its record.
+
+    Attributes
+    ----------
+    ground : bpy.types.Object
+        What the user chose as the ground.
+    footprints : tuple of Footprint
+        In the order of their first contact.
+    poisson_ratio, layer_depth : float
+        Of its material; [m].
+    """
+
+    ground: bpy.types.Object
+    footprints: tuple[Footprint, ...]
+    poisson_ratio: float
+    layer_depth: float
+
+    @property
+    def carrier(self) -> bpy.types.Object:
+        """The object that shows the prints: the ground itself or the detail along the trail."""
+        return baked_ground.carrier_of(self.ground)
+
+    def of(self, name: str) -> tuple[Footprint, ...]:
+        """The footprints of one character."""
+        return tuple(step for step in self.footprints if step.character == name)
+
+
+@contextmanager
+def addon() -> Iterator[None]:
+    """An empty file with SoftGround switched on; off again at the end, or the bpy module would hang on exit."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    softground_addon.register()
+    try:
+        yield
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        softground_addon.unregister()
+
+
+def bake(
+    scene: bpy.types.Scene,
+    walkers: Sequence[Walker],
+    preset: str,
+    cell_size: float,
+    *,
+    ground: bpy.types.Object | None = None,
+    options: Options | None = None,
+) -> Bake:
+    """Bake walkers into a ground as a user does it in the panel; without a ground, one is made that fits the walk."""
+    shot = scene.softground
+    shot.ground = ground
+    shot.characters.clear()
+    shot.cell_size = cell_size
+    for walker in walkers:
+        make_active(walker.armature)
+        bpy.ops.softground.add_character()
+        shot.characters[-1].mass = walker.mass
+    bpy.ops.softground.load_preset(name=preset)
+    for path, value in (options or {}).items():
+        settings.assign(shot, path, value)
+    if ground is None:
+        bpy.ops.softground.create_ground()
+    bpy.ops.softground.bake()
+    return result_of(scene)
+
+
+def make_active(thing: bpy.types.Object) -> None:
+    """Select an object alone."""
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    thing.select_set(True)
+    bpy.context.view_layer.objects.active = thing
+
+
+def remove_character(armature: bpy.types.Object) -> None:
+    """Take an armature and what hangs on it out of the file."""
+    for thing in (*armature.children_recursive, armature):
+        bpy.data.objects.remove(thing)
+
+
+def result_of(scene: bpy.types.Scene) -> Bake:
+    """The bake that is on the scene's ground."""
+    shot = scene.softground
+    footprints, _ = baked_ground.load(shot.ground)
+    return Bake(shot.ground, tuple(footprints), shot.material.poisson_ratio, shot.material.layer_depth)
+
+
+def invariants(bake: Bake) -> list[Claim]:
+    """What holds on every ground, whatever is switched on."""
+    ground = recompose(bake.footprints)
+    compressed, raised = ground.volumes()
+    placed = raised + sum(step.unplaced_rim_m3 for step in bake.footprints)
+    smallest = min((int(step.compression.amounts.min(initial=0)) for step in bake.footprints), default=0)
+    deepest = max((float(tile[0].max()) for tile in ground.tiles.values()), default=0.0)
+    return [
+        Claim("Rim volume over 2·nu times the compressed volume", _share(placed, bake, compressed), 1 - 1e-6, 1 + 1e-6),
+        Claim("Smallest change of compression [nm]", float(smallest), 0, np.inf),
+        Claim("Deepest compression over the layer's depth", deepest / bake.layer_depth, 0, 1 + 1e-6),
+    ]
+
+
+def _share(raised: float, bake: Bake, compressed: float) -> float:
+    displaced = 2 * bake.poisson_ratio * compressed
+    return raised / displaced if displaced else 1.0
+
+
+def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
+    """Build a scene, check its claims, save it and take its pictures; returns the exit code of the process."""
+    name = Path(str(module.__file__)).stem
+    options = _parser(name, str(module.__doc__)).parse_args(arguments)
+    started = time.perf_counter()
+    folder: Path = options.output
+    folder.mkdir(parents=True, exist_ok=True)
+    given: dict[str, Any] = {"options": dict(pair.split("=", 1) for pair in options.set)}
+    if options.cell_size:
+        given["cell_size"] = options.cell_size
+    pictures: list[Path] = []
+    with addon():
+        built = module.build(bpy.context.scene, **given)
+        claims: list[Claim] = module.claims(built)
+        for claim in claims:
+            print(claim)
+        if not options.no_pictures:
+            stage.set_up_rendering(bpy.context.scene)
+            pictures = module.shoot(built, folder.resolve(), options.samples)
+        blend = folder / f"{name}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()), compress=True)
+    for path in (blend, *pictures):
+        print(path)
+    print(f"{name}: {time.perf_counter() - started:.0f} s")
+    return 0 if all(claim.holds for claim in claims) else 3
+
+
+def _parser(name: str, description: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=f"python -m sample_scenes.{name}", description=description.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=OUTPUT, metavar="DIR")
+    parser.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of SoftGround")
+    parser.add_argument("--samples", type=int, default=12, metavar="N", help="render samples of the pictures")
+    parser.add_argument("--no-pictures", action="store_true", help="build, bake and check only")
+    return parser
+
+
+def main(module_name: str) -> None:
+    """Run the scene that is the main module."""
+    code = run(sys.modules[module_name])
+    sys.stdout.flush()
+    sys.exit(code)

@@ -1,0 +1,67 @@
+"""Every sample scene keeps what its figure promises, and the ground's invariants with every option on."""
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from sample_scenes.make_all import SCENES
+
+ROOT = Path(__file__).parents[2]
+
+EVERY_OPTION = {
+    "pressure": "CENTRE_OF_PRESSURE",
+    "material.rim_bias": "0.5",
+    "material.repose_angle": "0.5585",
+    "material.shortest_time": "0.02",
+    "material.hardening": "10",
+    "material.crust_stress": "5000",
+    "material.firm_depth": "0.02",
+    "tilt.use": "true",
+    "grounding.use": "true",
+}
+COARSE = 0.015  # m
+
+QUICK = frozenset({"four_grounds"})
+"""Scenes that are built in a few seconds."""
+
+scenes = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in SCENES]
+)
+
+
+@pytest.fixture
+def production():
+    pytest.importorskip("bpy", reason="the sample scenes are built in Blender: pip install bpy==4.5.15")
+    from sample_scenes import production
+
+    with production.addon():
+        yield production
+
+
+@scenes
+def test_the_scene_keeps_what_its_figure_promises(production, name):
+    import bpy
+
+    module = import_module(f"sample_scenes.{name}")
+    built = module.build(bpy.context.scene, cell_size=module.CELL_SIZE if name not in QUICK else COARSE)
+    failed = [str(claim) for claim in module.claims(built) if not claim.holds]
+    assert not failed
+    for bake in built.bakes.values():
+        assert bake.footprints
+
+
+@scenes
+def test_volumes_are_kept_and_compression_only_grows_with_every_option_on(production, name):
+    import bpy
+
+    module = import_module(f"sample_scenes.{name}")
+    built = module.build(bpy.context.scene, cell_size=COARSE, options=EVERY_OPTION)
+    failed = [str(claim) for bake in built.bakes.values() for claim in production.invariants(bake) if not claim.holds]
+    assert not failed
+
+
+def test_every_scene_is_in_the_gallery():
+    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    for name in SCENES:
+        assert f"python -m sample_scenes.{name}" in gallery
