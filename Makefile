@@ -51,9 +51,7 @@ types: $(READY)
 
 # The extension as users install it, built and checked by Blender's own tool.
 package: $(READY)
-	mkdir -p build
-	$(BIN)/python $$(find $(VENV) -path '*/bl_pkg/cli/blender_ext.py') build --source-dir . --output-filepath build/softground.zip
-	$(BIN)/python $$(find $(VENV) -path '*/bl_pkg/cli/blender_ext.py') validate build/softground.zip
+	$(BIN)/python -m release.package build/softground.zip
 
 # Real Blenders on a virtual screen: 4.3, and the newest that Debian has. Those that cannot be had are left out.
 REAL_BLENDER := ../shared/tools/real_blender.sh

@@ -10,11 +10,12 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from functools import cache, lru_cache
 from pathlib import Path
 
 import pytest
+
+from release import package
 
 REPOSITORY = Path(__file__).parents[2]
 TOOL = REPOSITORY.parent / "shared" / "tools" / "real_blender.sh"
@@ -38,12 +39,7 @@ bpy.ops.wm.save_userpref()
 @lru_cache(maxsize=1)
 def built() -> Path:
     """The package as users get it, built and validated by Blender's own tool."""
-    builder = next(Path(sys.prefix).rglob("bl_pkg/cli/blender_ext.py"), None)
-    if builder is None:
-        pytest.skip("no bpy in this environment: run the GUI tests with `make gui`")
-    PACKAGE.parent.mkdir(exist_ok=True)
-    arguments = ["build", "--source-dir", str(REPOSITORY), "--output-filepath", str(PACKAGE)]
-    subprocess.run([sys.executable, str(builder), *arguments], check=True, capture_output=True)
+    package.build(PACKAGE)
     return PACKAGE
 
 

@@ -1,0 +1,90 @@
+"""The package: what is in it, that it is the same everywhere, and that it installs without a word."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from release import package
+
+ROOT = Path(__file__).parents[2]
+ABOUT = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    path = tmp_path_factory.mktemp("build") / "softground.zip"
+    package.build(path)
+    return path
+
+
+def sources(folder):
+    """A copy of the repository as another machine might have it."""
+    left_out = shutil.ignore_patterns(".venv*", ".git", "build", ".mypy_cache", ".ruff_cache", ".hypothesis")
+    shutil.copytree(ROOT, folder, ignore=left_out, copy_function=shutil.copyfile)
+    return folder
+
+
+def test_it_holds_the_extension_and_nothing_else(built):
+    code = [path for kind in ("*.py", "*.json") for path in (ROOT / "softground_addon").rglob(kind)]
+    about = ("blender_manifest.toml", "__init__.py", "README.md", "LICENSE", "CHANGELOG.md")
+    with zipfile.ZipFile(built) as archive:
+        assert archive.namelist() == sorted([*about, *(path.relative_to(ROOT).as_posix() for path in code)])
+        assert all(archive.read(name) == (ROOT / name).read_bytes() for name in archive.namelist())
+
+
+def test_the_same_sources_give_the_same_bytes_whatever_their_times_and_rights(built, tmp_path):
+    copy = sources(tmp_path / "copy")
+    for number, path in enumerate(sorted(copy.rglob("*.py"), reverse=True)):
+        path.chmod(0o600)
+        os.utime(path, (10**9 + number, 10**9 + number))
+    (copy / "softground_addon" / "__pycache__").mkdir(exist_ok=True)
+    (copy / "softground_addon" / "__pycache__" / "x.pyc").touch()
+    (copy / ".hidden").touch()
+    package.build(tmp_path / "again.zip", copy)
+    assert (tmp_path / "again.zip").read_bytes() == built.read_bytes()
+
+
+def test_a_version_without_a_section_in_the_changelog_is_not_built(tmp_path):
+    copy = sources(tmp_path / "copy")
+    about = copy / "blender_manifest.toml"
+    about.write_text(re.sub(r'(?m)^version = ".*"$', 'version = "98.7.6"', about.read_text()))
+    with pytest.raises(SystemExit, match=r"no section '## 98\.7\.6'"):
+        package.build(tmp_path / "x.zip", copy)
+    assert not (tmp_path / "x.zip").exists()
+
+
+def test_the_version_stands_in_the_manifest_only():
+    files = [ROOT / "pyproject.toml", ROOT / "__init__.py", *(ROOT / "softground_addon").rglob("*.py")]
+    assert ABOUT["version"] not in "".join(path.read_text(encoding="utf-8") for path in files)
+
+
+INSTALL = """
+import sys
+import bpy
+import addon_utils
+assert bpy.ops.extensions.package_install_files(
+    filepath=sys.argv[1], repo="user_default", enable_on_install=True) == {"FINISHED"}
+assert "bl_ext.user_default.softground" in bpy.context.preferences.addons
+assert bpy.context.scene.softground is not None
+addon_utils.disable("bl_ext.user_default.softground", default_set=True)
+assert not hasattr(bpy.types.Scene, "softground")
+addon_utils.enable("bl_ext.user_default.softground", default_set=True)
+assert bpy.context.scene.softground is not None
+addon_utils.disable("bl_ext.user_default.softground", default_set=True)
+"""
+
+
+def test_installing_enabling_and_disabling_it_prints_nothing(built, tmp_path):
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path), "PYTHONWARNINGS": "default"}
+    command = [sys.executable, "-c", INSTALL, str(built)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.replace('STATUS Installed "softground"\n', "") == ""  # Blender's own word
+    assert done.stderr == ""
