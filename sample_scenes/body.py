@@ -10,14 +10,13 @@ from functools import cached_property
 from math import cos, radians, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sample_scenes.motion import Array, Bones
 
 SIDES = {"L": 1.0, "R": -1.0}
 """Suffix of a side's bones, and the sign of y on that side."""
 
-BONES: dict[str, tuple[str, str, str | None]] = {
+BONES: Bones = {
     "hips": ("hips", "spine", None),
     "spine": ("spine", "chest", "hips"),
     "chest": ("chest", "neck", "spine"),
@@ -132,6 +131,11 @@ class Body:
     def hip_half_width(self) -> float:
         """Middle of the pelvis to a hip joint [m]."""
         return 0.049 * self.stature
+
+    @property
+    def bones(self) -> Bones:
+        """The bones and how they hang together: `BONES`."""
+        return BONES
 
     @cached_property
     def joints(self) -> dict[str, Array]:

@@ -42,3 +42,31 @@ def quintic(u: ArrayLike, start: ArrayLike, end: ArrayLike, start_slope: ArrayLi
     leave = u - u**3 * (6 - 8 * u + 3 * u**2)
     arrive = -(u**3) * (4 - 7 * u + 3 * u**2)
     return (1 - rise) * start + rise * end + leave * start_slope + arrive * end_slope
+
+
+def clamped_spline(
+    u: ArrayLike, knots: ArrayLike, values: ArrayLike, start_slope: ArrayLike, end_slope: ArrayLike
+) -> Array:
+    """Cubic spline with continuous curvature through values (K, ...) at increasing knots, with given end slopes.
+
+    Outside the knots the end values continue.
+    """
+    u, knots, values = np.asarray(u, float), np.asarray(knots, float), np.asarray(values, float)
+    shape = values.shape[1:]
+    flat = values.reshape(len(knots), -1)
+    width = np.diff(knots)
+    secant = np.diff(flat, axis=0) / width[:, None]
+    system, right = np.eye(len(knots)), np.empty_like(flat)
+    right[0], right[-1] = np.ravel(start_slope), np.ravel(end_slope)
+    for i in range(1, len(knots) - 1):
+        before, after = width[i - 1], width[i]
+        system[i, i - 1 : i + 2] = after, 2 * (before + after), before
+        right[i] = 3 * (after * secant[i - 1] + before * secant[i])
+    slope = np.linalg.solve(system, right)
+    u = np.clip(u, knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(width) - 1)
+    w = width[i][..., None]
+    s = (u - knots[i])[..., None] / w
+    a, b, da, db = flat[i], flat[i + 1], slope[i] * w, slope[i + 1] * w
+    result = a + s * (da + s * (3 * (b - a) - 2 * da - db + s * (2 * (a - b) + da + db)))
+    return result.reshape(*u.shape, *shape)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from sample_scenes.body import BONES, Array
 from sample_scenes.character import TO_BLENDER
-from sample_scenes.gait import BodyMotion
+from sample_scenes.motion import Array, BodyMotion
 
 
 def write_action(armature: bpy.types.Object, motion: BodyMotion, name: str, first_frame: int = 1) -> bpy.types.Action:
@@ -17,9 +16,10 @@ def write_action(armature: bpy.types.Object, motion: BodyMotion, name: str, firs
     curves = _curves_of(action, armature)
     frames = first_frame + np.arange(len(motion.hips), dtype=float)
     turns = {bone: TO_BLENDER @ turn @ TO_BLENDER.T for bone, turn in motion.turns.items()}
-    for bone, (_, _, parent) in BONES.items():
+    for bone, turn in turns.items():
+        parent = armature.data.bones[bone].parent
         rest = np.array(armature.data.bones[bone].matrix_local)[:3, :3]
-        local = turns[bone] if parent is None else np.swapaxes(turns[parent], 1, 2) @ turns[bone]
+        local = turn if parent is None else np.swapaxes(turns[parent.name], 1, 2) @ turn
         path = f'pose.bones["{bone}"].'
         armature.pose.bones[bone].rotation_mode = "QUATERNION"
         for index, values in enumerate(quaternions(rest.T @ local @ rest).T):

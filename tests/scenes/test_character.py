@@ -5,7 +5,8 @@ import pytest
 
 from sample_scenes.body import BONES, SIDES, Body, Foot
 from sample_scenes.figure import PARTS, hiker
-from sample_scenes.gait import Gait, joint_paths, walk
+from sample_scenes.gait import Gait, walk
+from sample_scenes.motion import joint_paths
 from sample_scenes.shoe import outline_width, shoe_mesh
 
 BODIES = [

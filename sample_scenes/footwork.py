@@ -1,0 +1,219 @@
+"""The course of a foot: rolling on the ground in stance, flying from footfall to footfall in swing.
+
+Planted feet stay where they are and the legs are solved to reach them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sample_scenes.body import SIDES, Array, Body, Foot
+from sample_scenes.course import Course
+from sample_scenes.curves import monotone_cubic, periodic_cubic
+from sample_scenes.limbs import bend_to_reach, hanging
+from sample_scenes.motion import Footfall, rotation
+
+_INSTANT = 1e-5
+"""Part of a stance over which the foot's velocity at its ends is taken."""
+
+
+@dataclass(frozen=True)
+class FootPoses:
+    """A foot over time: ankle (F, 3) [m]; turns of foot and toes (F, 3, 3); heading (F,) [rad]."""
+
+    ankle: Array
+    foot: Array
+    toe: Array
+    heading: Array
+
+
+@dataclass(frozen=True)
+class Swing:
+    """Where a swing begins and ends, and with which velocity times duration, (3,) each [m]."""
+
+    before: Footfall
+    after: Footfall
+    start: Array
+    end: Array
+    start_slope: Array
+    end_slope: Array
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return self.after.strike - self.before.leave
+
+
+SwingPath = Callable[[Array, Swing], Array]
+"""Places of the ankle, (F, 3) [m], at parts (F,) of a swing."""
+
+
+@dataclass(frozen=True)
+class Roll:
+    """Pitch of a foot over a stride, toes up positive.
+
+    Attributes
+    ----------
+    duty_factor : float
+        Part of a stride that the foot is on the ground.
+    stance, swing : tuple of (tuple of float, tuple of float)
+        Knots as parts of stance and of swing, in [0, 1), and the pitch there [degrees].
+    toe_bend : float
+        Bend of the toes beyond which they lift too [degrees].
+    """
+
+    duty_factor: float
+    stance: tuple[tuple[float, ...], tuple[float, ...]]
+    swing: tuple[tuple[float, ...], tuple[float, ...]]
+    toe_bend: float
+
+    def pitch(self, phase: Array) -> Array:
+        """Foot pitch at phases of the stride, 0 at heel strike [rad]."""
+        duty = self.duty_factor
+        knots = np.concatenate([duty * np.array(self.stance[0]), duty + (1 - duty) * np.array(self.swing[0])])
+        return periodic_cubic(phase, knots, np.radians(np.concatenate([self.stance[1], self.swing[1]])))
+
+    def bend(self, phase: Array) -> Array:
+        """Toes up relative to the foot [rad]: in stance they stay flat until they can bend no further."""
+        duty, landing_bend = self.duty_factor, np.radians(8.0)
+        limit, give = np.radians(self.toe_bend), np.radians(10.0)
+
+        def planted(at: Array) -> Array:
+            pitch = self.pitch(at)
+            heel_up = np.maximum(-pitch, 0.0)
+            beyond = np.maximum(heel_up - limit, 0.0)
+            flat = np.where(heel_up < limit, heel_up, limit + give * (1 - np.exp(-beyond / give)))
+            strike = max(np.radians(self.stance[1][0]), 1e-9)
+            return flat + landing_bend * np.clip(pitch / strike, 0.0, 1.0)
+
+        swing = np.clip((phase - duty) / (1 - duty), 0.0, 1.0)
+        relax = monotone_cubic(swing, (0.0, 0.12, 0.6, 1.0), (1.0, 0.95, 0.1, 0.0))
+        landing = landing_bend * (3 * swing**2 - 2 * swing**3) * (self.stance[1][0] > 0)
+        return np.where(phase < duty, planted(phase), planted(np.array([duty - 1e-9])) * relax + landing)
+
+
+class FootCourse:
+    """One foot from footfall to footfall.
+
+    Parameters
+    ----------
+    shape : Foot
+    roll : Roll
+    swing_path : callable
+    touch_down : (3,) array_like
+        Velocity of the ankle at landing beyond that of the rolling foot, in the footfall's frame [m/s].
+    """
+
+    def __init__(self, shape: Foot, roll: Roll, swing_path: SwingPath, touch_down: tuple[float, float, float]) -> None:
+        self.shape, self.roll, self.swing_path = shape, roll, swing_path
+        self.touch_down = np.array(touch_down)
+
+    def poses(self, times: Array, footfalls: Sequence[Footfall]) -> FootPoses:
+        """The foot at times from the first strike to the last of its footfalls."""
+        count = len(times)
+        phase, ankle = np.zeros(count), np.zeros((count, 3))
+        tilt = np.zeros((count, 3))  # heading, slope, bank
+        duty = self.roll.duty_factor
+        for fall, following in pairwise(footfalls):
+            here = (times >= fall.strike) & (times < following.strike)
+            stance = (times[here] - fall.strike) / (fall.leave - fall.strike)
+            swing = np.clip((times[here] - fall.leave) / (following.strike - fall.leave), 0.0, 1.0)
+            phase[here] = np.where(stance < 1, duty * stance, duty + (1 - duty) * swing)
+            ankle[here] = np.where(
+                (stance < 1)[:, None],
+                fall.place + self._rolling(duty * np.minimum(stance, 1 - 1e-9)) @ ground_frame(fall).T,
+                self.swing_path(swing, self._swing(fall, following)),
+            )
+            eased = (3 * swing**2 - 2 * swing**3)[:, None]
+            tilt[here] = (1 - eased) * _tilt(fall) + eased * _tilt(following)
+        pitch, bend = self.roll.pitch(phase), self.roll.bend(phase)
+        frame = _frame(*tilt.T)
+        foot, toe = frame @ rotation("y", -pitch), frame @ rotation("y", -pitch - bend)
+        return FootPoses(ankle, foot, toe, tilt[:, 0])
+
+    def _swing(self, fall: Footfall, following: Footfall) -> Swing:
+        duty, time = self.roll.duty_factor, following.strike - fall.leave
+        here, there = ground_frame(fall), ground_frame(following)
+        leaving = self._rolling(duty * np.array((1 - _INSTANT, 1 - 1e-9))) @ here.T
+        landing = self._rolling(duty * np.array((0.0, _INSTANT))) @ there.T
+        leave_velocity = (leaving[1] - leaving[0]) / (_INSTANT * (fall.leave - fall.strike))
+        land_velocity = (landing[1] - landing[0]) / (_INSTANT * (following.leave - following.strike))
+        land_velocity = land_velocity + there @ self.touch_down
+        return Swing(
+            fall,
+            following,
+            fall.place + leaving[1],
+            following.place + landing[0],
+            leave_velocity * time,
+            land_velocity * time,
+        )
+
+    def _rolling(self, phase: Array) -> Array:
+        """Ankle relative to the footfall's place while the foot rolls, in the footfall's frame: (F, 3) [m]."""
+        shape = self.shape
+        pitch, bend = self.roll.pitch(phase), self.roll.bend(phase)
+        height = shape.ankle_height
+        on_heel = _turned(pitch, -shape.heel, height) + np.array((shape.heel, 0.0, 0.0))
+        toe_pitch = np.minimum(pitch + bend, 0.0)
+        ball = _turned(toe_pitch, shape.ball - shape.toe, shape.ball_height) + np.array((shape.toe, 0.0, 0.0))
+        on_ball = ball + _turned(pitch, -shape.ball, height - shape.ball_height)
+        return np.where((pitch > 0)[:, None], on_heel, on_ball)
+
+
+def ground_frame(fall: Footfall) -> Array:
+    """Axes of a footfall as columns: toward the toes, to their left, off the ground."""
+    return _frame(*_tilt(fall))
+
+
+def _tilt(fall: Footfall) -> Array:
+    return np.array((fall.heading, fall.slope, fall.bank))
+
+
+def _frame(heading: Array, slope: Array, bank: Array) -> Array:
+    return rotation("z", heading) @ rotation("y", -slope) @ rotation("x", bank)
+
+
+def _turned(pitch: Array, forward: float, up: float) -> Array:
+    """A point (forward, 0, up) turned toes-up by `pitch` (F,), as (F, 3)."""
+    cos, sin = np.cos(pitch), np.sin(pitch)
+    return np.stack([forward * cos - up * sin, np.zeros_like(pitch), forward * sin + up * cos], axis=-1)
+
+
+def footfall_at(
+    course: Course, side: str, along: float, aside: float, toe_out: float, strike: float, leave: float
+) -> Footfall:
+    """A footfall beside a way, flat on its ground.
+
+    Parameters
+    ----------
+    course : Course
+    side : str
+    along, aside : float
+        Place on the way, and to its left [m].
+    toe_out : float
+        Toes turned away from the way [rad].
+    strike, leave : float
+        [s]
+    """
+    place = course.place(along, aside)
+    heading = float(course.heading(along)) + SIDES[side[-1]] * toe_out
+    slope, bank = course.slope(place, heading)
+    ground = float(course.ground(along, aside))
+    return Footfall(side, strike, leave, np.append(place, ground), heading, float(slope), float(bank))
+
+
+def leg_turns(body: Body, side: str, hips: Array, pelvis: Array, foot: FootPoses) -> dict[str, Array]:
+    """Thigh and shin that join hip and ankle, the knee pointing where foot and pelvis face."""
+    hip = hips + pelvis @ (body.joints[f"hip.{side}"] - body.joints["hips"])
+    facing = np.stack([np.cos(foot.heading), np.sin(foot.heading), np.zeros_like(foot.heading)], axis=-1)
+    knee, lateral = bend_to_reach(hip, foot.ankle, body.thigh, body.shin, pelvis[:, :, 0] + facing)
+    return {
+        f"thigh.{side}": hanging(knee - hip, lateral),
+        f"shin.{side}": hanging(foot.ankle - knee, lateral),
+        f"foot.{side}": foot.foot,
+        f"toe.{side}": foot.toe,
+    }
