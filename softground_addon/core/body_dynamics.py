@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +12,19 @@ from numpy.typing import NDArray
 from .centre_of_mass import MassPoints, fitted_to_free_fall, mass_points
 from .contacts import runs
 from .motion import CharacterMotion
-from .smoothing_spline import smooth_path
+from .smoothing_spline import share_of_noise, smooth_path
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CUTOFF = 16.0
-"""Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, above the sixth
-harmonic of running and far below the frame rate of motion capture."""
-CUTOFF_CHOICES = np.array([1.0, 0.7, 0.5])
-"""Cut-offs to choose from, as fractions of the highest."""
-PASSED_BAND = np.pi / 3
-"""Integral of the low-pass's gain over frequency in cut-offs: the share of white noise that passes."""
+"""Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, as is usual for
+gait (Winter 2009, "Biomechanics and Motor Control of Human Movement", chapter 3: 6 Hz and more). It holds where the
+motion itself does not tell better."""
+CUTOFF_RANGE = 2.0
+"""How far the motion may move the cut-off from there, down or up [octaves]."""
+CUTOFF_STEP = 0.25
+"""Steps of the search for it [octaves]."""
 HIGHEST_CUTOFF = 0.34
 """Highest cut-off as a fraction of the scene's frame rate: 8 Hz at 24 fps."""
 FREE_FALL = 0.5
@@ -79,62 +82,118 @@ class BodyDynamics:
         return np.where(known, np.stack([x, y], axis=-1), centre[..., :2])
 
 
-def body_dynamics(motion: CharacterMotion) -> BodyDynamics:
-    """Forces that the motion asks for, before anything is known about flight.
+def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> BodyDynamics:
+    """Forces that the motion asks for, so far as it goes without knowing that they are 0 in flight.
 
     Parameters
     ----------
     motion : CharacterMotion
         On the simulation's time grid.
+    airborne : (N,) bool array, optional
+        Steps at which nothing seems to touch. Where they are flights and tell that contacts are brief, the cut-off is
+        raised to suit them.
     """
-    step, gravity = motion.time_step, motion.gravity
-    sampled = motion.on_frames
-    points, frame_step = mass_points(motion.at_frames()), step * len(sampled) / sampled.sum()
-    pendulum = np.sqrt(gravity / motion.leg_length) / (2 * np.pi)
-    highest = min(CUTOFF * pendulum, HIGHEST_CUTOFF / frame_step)
-    cutoff = _suited_cutoff(points.centre, frame_step, highest)
+    sampled, frame_step = motion.on_frames, _frame_step(motion)
+    points = mass_points(motion.at_frames())
+    usual = _usual_cutoff(motion)
     path = np.zeros((len(sampled), 6))
     path[sampled] = np.concatenate([_angular_momentum(points, frame_step), points.centre], axis=1)
-    smooth, rate, acceleration = smooth_path(path, step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS)
-    force = acceleration[:, 3:] / gravity + (0.0, 0.0, 1.0)
-    return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / gravity, points, cutoff)
+
+    def smoothed(cutoff: float) -> BodyDynamics:
+        smooth, rate, acceleration = smooth_path(
+            path, motion.time_step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS
+        )
+        force = acceleration[:, 3:] / motion.gravity + (0.0, 0.0, 1.0)
+        return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
+
+    body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
+    flying = _flights(airborne, body.force[:, 2]) if airborne is not None else np.zeros(0, dtype=bool)
+    if flying.any():
+        cutoff = max(_falling_freely(motion, body, flying)[1], usual)
+        body = smoothed(cutoff) if cutoff > body.cutoff else body
+    return body
 
 
 def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
     """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,).
 
-    In flight the force is 0, and the body's mass is fitted to that; where the motion is nowhere near free fall while
-    nothing touches, it stays as it was.
+    In flight the force is 0: the body's mass is fitted to that, and the low-pass is the one that shows it best. Where
+    the motion is nowhere near free fall while nothing touches, it stays as it was.
     """
     flying = _flights(airborne, body.force[:, 2])
     if not flying.any():
         return body
-    step, sampled = motion.time_step, motion.on_frames
-    frame_step = step * len(sampled) / sampled.sum()
-    parts = body.points.part_centres()
-    _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), frame_step, body.cutoff)
-    fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * step)))
-    falling = acceleration.reshape(parts.shape)[flying[sampled]]
-    points = fitted_to_free_fall(body.points, falling, fall, independent=min(2 * body.cutoff * frame_step, 1.0))
+    points, cutoff, fall = _falling_freely(motion, body, flying)
+    sampled = motion.on_frames
     path = np.zeros((len(sampled), 3))
     path[sampled] = points.centre
     centre, _, acceleration = smooth_path(
-        path, step, body.cutoff, sampled=sampled, falling=flying, fall=fall, steady_ends=STEADY_ENDS
+        path, motion.time_step, cutoff, sampled=sampled, falling=_inner(flying), fall=fall, steady_ends=STEADY_ENDS
     )
     force = acceleration / fall + (0.0, 0.0, 1.0)
     force[flying] = 0.0
-    return BodyDynamics(centre, force, body.moment, points, body.cutoff)
+    return BodyDynamics(centre, force, body.moment, points, cutoff)
 
 
-def _suited_cutoff(path: Array, step: float, highest: float) -> float:
-    """Cut-off that predicts each sample best from the others [Hz]: lower for noise, higher for a lively motion.
+def _frame_step(motion: CharacterMotion) -> float:
+    """Time between the scene frames among the steps [s]."""
+    sampled = motion.on_frames
+    return float(motion.time_step * len(sampled) / sampled.sum())
+
+
+def _usual_cutoff(motion: CharacterMotion) -> float:
+    """Cut-off for a body of this size at this frame rate [Hz]."""
+    pendulum = np.sqrt(motion.gravity / motion.leg_length) / (2 * np.pi)
+    return float(min(CUTOFF * pendulum, HIGHEST_CUTOFF / _frame_step(motion)))
+
+
+def _falling_freely(motion: CharacterMotion, body: BodyDynamics, flying: Mask) -> tuple[MassPoints, float, float]:
+    """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and its fall [m/s²].
+
+    A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
+    the shaking of soft tissue through: both show as a force where there is none.
+    """
+    step, usual = _frame_step(motion), _usual_cutoff(motion)
+    fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * motion.time_step)))
+    parts, flying = body.points.part_centres(), flying[motion.on_frames]
+    highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
+
+    @cache
+    def fitted(octaves: float) -> tuple[MassPoints, float]:
+        _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), step, usual * 2.0**octaves)
+        falling = acceleration.reshape(parts.shape)[flying]
+        return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0))
+
+    best = _downhill(lambda octaves: fitted(octaves)[1], -CUTOFF_RANGE, min(highest, CUTOFF_RANGE))
+    return fitted(best)[0], usual * 2.0**best, fall
+
+
+def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:
+    """Cut-off that predicts each sample best from the others [Hz]: the usual one, lower for noise.
 
     Generalised cross-validation (Craven and Wahba 1979, "Smoothing noisy data with spline functions").
     """
-    cutoffs = highest * CUTOFF_CHOICES
-    unexplained = [((smooth_path(path, step, cutoff)[0] - path) ** 2).sum() for cutoff in cutoffs]
-    passed = np.minimum(2 * cutoffs * step * PASSED_BAND, 0.9)
-    return float(cutoffs[np.argmin(unexplained / (1 - passed) ** 2)])
+
+    @cache
+    def score(octaves: float) -> float:
+        cutoff = usual * 2.0**octaves
+        smooth, _, _ = smooth_path(path, step, cutoff)
+        return float(((smooth - path) ** 2).sum()) / (1 - share_of_noise(cutoff * step)) ** 2
+
+    return float(usual * 2.0 ** _downhill(score, -CUTOFF_RANGE, 0.0))
+
+
+def _downhill(score: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function with one valley is lowest: from 0 on by steps, then on the parabola through three of them."""
+    best = 0.0
+    for further in (CUTOFF_STEP, -CUTOFF_STEP):
+        while low <= best + further <= high and score(best + further) < score(best):
+            best += further
+    if low <= best - CUTOFF_STEP and best + CUTOFF_STEP <= high:
+        below, here, above = (score(best + offset) for offset in (-CUTOFF_STEP, 0.0, CUTOFF_STEP))
+        curvature = below - 2 * here + above
+        best += CUTOFF_STEP * (below - above) / (2 * curvature) if curvature > 0 else 0.0
+    return best
 
 
 def _flights(airborne: Mask, force: Array) -> Mask:
@@ -166,3 +225,8 @@ def _angular_momentum(points: MassPoints, step: float) -> Array:
     x, y, z = arm = (points.positions - points.centre[:, None]).transpose(2, 0, 1)
     u, v, w = np.gradient(arm, step, axis=1)
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u]).dot(points.fractions).T
+
+
+def _inner(state: Mask) -> Mask:
+    """Steps whose neighbours are in the same state."""
+    return state & np.append(state[1:], state[-1:]) & np.append(state[:1], state[:-1])

@@ -118,8 +118,8 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
 
 def fitted_to_free_fall(
     points: MassPoints, accelerations: Array, gravity: float, *, independent: float = 1.0
-) -> MassPoints:
-    """The same body with the mass fractions that make it fall freely when it does.
+) -> tuple[MassPoints, float]:
+    """The same body with the mass fractions that make it fall freely when it does, and how far it is from that still.
 
     In flight the centre of mass falls with g whatever the limbs do, so that what it seems to do beside tells how the
     body's mass differs from the table's. Least squares with the table as the prior.
@@ -133,6 +133,12 @@ def fitted_to_free_fall(
         [m/s²]
     independent : float
         Share of the M steps that tell something new: low-passed accelerations change slowly.
+
+    Returns
+    -------
+    points : MassPoints
+    misfit : float
+        Sum of squares, in standard deviations, of what is not free fall and of the changes of the fractions.
     """
     prior = np.bincount(points.parts, weights=points.fractions)
     deviation = _FRACTION_DEVIATION * prior
@@ -145,9 +151,10 @@ def fitted_to_free_fall(
     system[:-1, :-1] = scaled.T @ scaled + np.eye(len(prior))
     system[:-1, -1] = system[-1, :-1] = deviation
     right = np.append(-scaled.T @ (rows @ prior) / row_deviation, 0.0)
-    fitted = np.maximum(prior + deviation * np.linalg.solve(system, right)[:-1], 0.0)
-    fractions = points.fractions * (fitted / prior)[points.parts]
-    return MassPoints(points.positions, fractions / fractions.sum(), points.parts)
+    change = np.linalg.solve(system, right)[:-1]
+    misfit = (((rows @ prior) / row_deviation + scaled @ change) ** 2).sum() + (change**2).sum()
+    fractions = points.fractions * (np.maximum(prior + deviation * change, 0.0) / prior)[points.parts]
+    return MassPoints(points.positions, fractions / fractions.sum(), points.parts), float(misfit)
 
 
 def _direction(vectors: Array) -> Array:

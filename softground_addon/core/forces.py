@@ -114,7 +114,7 @@ def whole_body_forces(
         None pulls; they are 0 where nothing touches.
     """
     grounded = contacts.touching.any(axis=1)
-    body = with_flight(motion, body or body_dynamics(motion), ~grounded)
+    body = with_flight(motion, body or body_dynamics(motion, ~grounded), ~grounded)
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
     lowest = lowest_points(motion)

@@ -68,7 +68,7 @@ def estimate_loads(
     if force_model == "IMPULSE":
         forces = impulse_forces(source, contacts, material.characteristic_time)
     else:
-        body = body_dynamics(source)
+        body = body_dynamics(source, ~contacts.touching.any(axis=1))
         contacts = refine_contacts(source, contacts, body)
         forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
     shown = slice(given.start * steps, (given.stop - 1) * steps + 1)

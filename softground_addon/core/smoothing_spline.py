@@ -57,7 +57,7 @@ def smooth_path(
         return path.copy(), np.zeros_like(path), np.zeros_like(path)
     weight = np.ones(count) if sampled is None else sampled.astype(float)
     # Per step, so that the cut-off is the same however few of the steps are sampled.
-    scale = 2 * np.pi * cutoff * step
+    scale = 2 * np.sin(np.pi * min(cutoff * step, 0.5))
     density = weight.mean()
     band = np.zeros((_ORDER + 1, count))
     band[0] = weight
@@ -92,3 +92,9 @@ def _add_difference(band: Array, weight: Array, order: int) -> None:
     for i, a in enumerate(stencil):
         for j in range(i, order + 1):
             band[j - i, i : i + len(weight)] += a * stencil[j] * weight
+
+
+def share_of_noise(cutoff: float) -> float:
+    """Part of the amplitude of white noise, over all its frequencies, that a cut-off [cycles per sample] passes."""
+    frequency = (np.arange(256) + 0.5) / 512
+    return float(np.mean(1 / (1 + (np.sin(np.pi * frequency) / np.sin(np.pi * min(cutoff, 0.5))) ** (2 * _ORDER))))

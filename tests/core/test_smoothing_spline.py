@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve
 
-from softground_addon.core.smoothing_spline import smooth_path
+from softground_addon.core.smoothing_spline import share_of_noise, smooth_path
 
 RATE = 120.0
 
@@ -42,7 +42,7 @@ def test_the_banded_solution_is_the_dense_one():
     falling = np.zeros(101, dtype=bool)
     falling[40:60] = True
     smooth, _, _ = smooth_path(path, 1 / RATE, 8.0, sampled=sampled, falling=falling, fall=9.81)
-    scale, weight = 2 * np.pi * 8.0 / RATE, np.diag(sampled.astype(float))
+    scale, weight = 2 * np.sin(np.pi * 8.0 / RATE), np.diag(sampled.astype(float))
     third, second = np.diff(np.eye(101), 3, axis=0), np.diff(np.eye(101), 2, axis=0)[39:59]
     fall = 1e4 * sampled.mean() / scale**4
     system = weight + sampled.mean() / scale**6 * third.T @ third + fall * second.T @ second
@@ -65,3 +65,14 @@ def test_a_spline_through_every_fifth_step_follows_the_path_between():
 def test_a_few_steps_are_no_error():
     for count in range(1, 6):
         assert smooth_path(np.ones((count, 3)), 1 / RATE, 8.0)[2] == pytest.approx(np.zeros((count, 3)), abs=1e-8)
+
+
+@pytest.mark.parametrize("cutoff", [0.02, 0.1, 0.34])
+def test_the_share_of_noise_that_passes_is_the_mean_of_the_smoother_s_diagonal(cutoff):
+    smoother, _, _ = smooth_path(np.eye(600), 1.0, cutoff)
+    assert share_of_noise(cutoff) == pytest.approx(np.diagonal(smoother)[200:400].mean(), rel=2e-3)
+
+
+@pytest.mark.parametrize("cutoff", [0.05, 0.2, 0.34])
+def test_half_the_amplitude_passes_at_the_cutoff_up_to_the_frame_rate(cutoff):
+    assert gain(cutoff * RATE, cutoff * RATE) == pytest.approx(0.5, abs=0.02)
