@@ -14,6 +14,7 @@ Heights = Callable[[Array, Array], Array]
 """Ground height [m] at places x and y [m] in the body's frame."""
 
 _SPACING = 0.01  # m between the samples of a path
+_FORESIGHT = 1.0  # m
 _REACH = 0.12  # m over which the slope under a foot is taken: half a foot to either side
 
 
@@ -44,16 +45,22 @@ class Course:
         self._length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
         self._path = path
         tangent = np.gradient(path, self._length, axis=0)
+        tangent[0], tangent[-1] = ends[0], ends[-1]
         self._heading = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
-        self._curvature = np.gradient(self._heading, self._length)
+        # People lean into a bend before it begins: its curvature counts for a metre to either side.
+        half = round(_FORESIGHT / _SPACING)
+        self._around = np.linspace(-_FORESIGHT, knots[-1] + _FORESIGHT, len(fine) + 2 * half)
+        window = np.hanning(2 * half + 1)
+        bends = np.pad(np.gradient(self._heading, self._length), 2 * half)
+        self._curvature = np.convolve(bends, window / window.sum(), mode="valid")
 
     def heading(self, along: ArrayLike) -> Array:
         """Direction of the way about z, 0 along x, at lengths (...) [rad]."""
         return np.interp(along, self._length, self._heading)
 
     def curvature(self, along: ArrayLike) -> Array:
-        """Turn to the left per length [1/m]."""
-        return np.interp(along, self._length, self._curvature, left=0.0, right=0.0)
+        """Turn to the left per length, smoothed over a metre to either side [1/m]."""
+        return np.interp(along, self._around, self._curvature)
 
     def place(self, along: ArrayLike, aside: ArrayLike = 0.0) -> Array:
         """Points of the plane at lengths along and distances to the left of the way, (..., 2) [m]."""

@@ -15,13 +15,14 @@ import numpy as np
 from sample_scenes.body import SIDES, Array, Body
 from sample_scenes.course import Course
 from sample_scenes.curves import quintic
-from sample_scenes.footwork import FootCourse, Roll, Swing
+from sample_scenes.footwork import FootCourse, FootPoses, Roll, Swing
 from sample_scenes.motion import BodyMotion
 from sample_scenes.stride import (
     ADULT_LEG,
     Stride,
     along_course,
     assemble,
+    crouch,
     facing_along,
     foot_poses,
     inward_lean,
@@ -127,13 +128,14 @@ def walk(
     leaning = inward_lean(gait.speed, course.curvature(local[:, 0]))
     hips = along_course(course, local, leaning)
     hips[:, 2] += ride(times, footfalls)
+    foot = gait.foot_course(body)
+    feet = foot_poses(dict.fromkeys(SIDES, foot), times, footfalls)
 
     upper = {"hips": gait.pelvis(phase)} | gait.trunk(phase, gait.mid_stance(body))
     for side in SIDES:
         upper |= gait.arm(body, side, phase, upper["chest"])
     upper = facing_along(course, local[:, 0], leaning, upper)
-    foot = gait.foot_course(body)
-    feet = foot_poses(dict.fromkeys(SIDES, foot), times, footfalls)
+    hips[:, 2] -= crouch(_room(body, hips, upper["hips"], feet), frame_rate, gait.stride_time(body))
     return assemble(body, frame_rate, hips, upper, feet, footfalls)
 
 
@@ -166,4 +168,10 @@ def _hips_height(body: Body, gait: Gait) -> float:
     times = phase * stride
     feet = foot_poses(dict.fromkeys(SIDES, gait.foot_course(body)), times, gait.footfalls(body, Course(), 0.0, stride))
     path = _hips_path(body, gait, phase, times)
-    return room_above(body, path, gait.pelvis(phase), feet, MAX_STRETCH * (body.thigh + body.shin))
+    return float(_room(body, path, gait.pelvis(phase), feet).min())
+
+
+def _room(body: Body, hips: Array, pelvis: Array, feet: dict[str, FootPoses]) -> Array:
+    """How far the hips can rise before any leg, planted or not, is too long, (F,) [m]."""
+    always = dict.fromkeys(SIDES, np.ones(len(hips), dtype=bool))
+    return room_above(body, hips, pelvis, feet, MAX_STRETCH * (body.thigh + body.shin), always)

@@ -1,6 +1,6 @@
 """`make scenes`: builds every sample scene with its pictures, each in a process of its own, into build/scenes.
 
-    python -m sample_scenes.make_all [options of the scenes]
+python -m sample_scenes.make_all [options of the scenes]
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from sample_scenes.stride import (
     Stride,
     along_course,
     assemble,
+    crouch,
     facing_along,
     foot_poses,
     inward_lean,
@@ -123,6 +124,7 @@ class Run(Stride):
             bounce = _bounce(body, self)(np.array([(time - swing.before.strike) / self.stride_time(body)]))[0]
             along = self.speed * time + ahead
             ground = swing.before.place[2] + u * (swing.after.place[2] - swing.before.place[2])
+            ground = max(ground, float(course.ground(along, aside)))
             knots.append(u)
             places.append(np.append(course.place(along, aside), ground + height + bounce[2] - below))
         path = clamped_spline(part, [*knots, 1.0], [*places, swing.end], swing.start_slope, swing.end_slope)
@@ -166,9 +168,15 @@ def _run(
         reached = {side: within_reach(body, side, hips, upper["hips"], feet[side], MAX_STRETCH) for side in SIDES}
         return assemble(body, frame_rate, hips, upper, reached, footfalls)
 
+    def room(motion: BodyMotion) -> Array:
+        reach = MAX_STRETCH * (body.thigh + body.shin)
+        return room_above(body, motion.hips, upper["hips"], feet, reach, planted_at(times, footfalls))
+
     motion = balanced(body, pose, centre, centre - above_hips)
-    reach = MAX_STRETCH * (body.thigh + body.shin)
-    return motion, room_above(body, motion.hips, upper["hips"], feet, reach, planted_at(times, footfalls))
+    free = room(motion)
+    centre[:, 2] -= crouch(free, frame_rate, gait.stride_time(body))
+    motion = balanced(body, pose, centre, motion.hips)
+    return motion, float(free.min())
 
 
 @cache

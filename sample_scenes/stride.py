@@ -19,8 +19,12 @@ from sample_scenes.course import Course
 from sample_scenes.footwork import FootCourse, FootPoses, footfall_at, leg_turns
 from sample_scenes.motion import BodyMotion, Footfall, rotation
 
+Mask = NDArray[np.bool_]
+
 ADULT_LEG = 0.94
 """Leg length of the adults that gait was measured on [m]."""
+
+_TOLERANCE = 0.002  # m that a leg may be longer than asked for
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,27 +159,33 @@ def within_reach(body: Body, side: str, hips: Array, pelvis: Array, foot: FootPo
 
 
 def room_above(
-    body: Body,
-    hips: Array,
-    pelvis: Array,
-    feet: dict[str, FootPoses],
-    reach: float,
-    planted: dict[str, NDArray[np.bool_]] | None = None,
-) -> float:
-    """How far the hips can rise before a leg is longer than `reach` [m]; negative: how far they must be lowered.
+    body: Body, hips: Array, pelvis: Array, feet: dict[str, FootPoses], reach: float, planted: dict[str, Mask]
+) -> Array:
+    """How far the hips can rise before a planted leg is longer than `reach`, (F,) [m]; negative where they must sink.
 
-    Only frames at which a foot is `planted` count, by default all.
+    Infinite where no foot is planted.
     """
-    room = []
+    room = np.full(len(hips), np.inf)
     for side in SIDES:
         hip = hips + pelvis @ (body.joints[f"hip.{side}"] - body.joints["hips"])
         level = np.linalg.norm((hip - feet[side].ankle)[:, :2], axis=1)
         above = feet[side].ankle[:, 2] + np.sqrt(np.maximum(reach**2 - level**2, 0.0)) - hip[:, 2]
-        room.append(np.min(above if planted is None else above[planted[side]]))
-    return float(np.min(room))
+        room = np.minimum(room, np.where(planted[side], above, np.inf))
+    return room
 
 
-def planted_at(times: Array, footfalls: Sequence[Footfall]) -> dict[str, NDArray[np.bool_]]:
+def crouch(room: Array, frame_rate: float, stride_time: float) -> Array:
+    """How far to sink so that the legs reach slopes, (F,) [m]: as the stride around asks for, changing smoothly."""
+    missing = np.maximum(-np.where(np.isfinite(room), room, 0.0) - _TOLERANCE, 0.0)
+    half = max(1, round(0.5 * stride_time * frame_rate))
+    padded = np.pad(missing, 3 * half, mode="edge")
+    deepest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).max(axis=1)
+    window = np.hanning(2 * half + 3)[1:-1]
+    smooth = np.convolve(deepest, window / window.sum(), mode="valid")
+    return smooth[half:-half]
+
+
+def planted_at(times: Array, footfalls: Sequence[Footfall]) -> dict[str, Mask]:
     """When each foot is on the ground, (F,) each."""
     planted = {side: np.zeros(len(times), dtype=bool) for side in SIDES}
     for fall in footfalls:
