@@ -109,7 +109,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
     flying = _flights(airborne, body.force[:, 2]) if airborne is not None else np.zeros(0, dtype=bool)
     if flying.any():
-        cutoff = max(_falling_freely(motion, body, flying)[1], usual)
+        cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
     return body
 
@@ -147,7 +147,9 @@ def _usual_cutoff(motion: CharacterMotion) -> float:
     return float(min(CUTOFF * pendulum, HIGHEST_CUTOFF / _frame_step(motion)))
 
 
-def _falling_freely(motion: CharacterMotion, body: BodyDynamics, flying: Mask) -> tuple[MassPoints, float, float]:
+def _falling_freely(
+    motion: CharacterMotion, body: BodyDynamics, flying: Mask, stride: float = CUTOFF_STEP
+) -> tuple[MassPoints, float, float]:
     """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and its fall [m/s²].
 
     A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
@@ -164,7 +166,8 @@ def _falling_freely(motion: CharacterMotion, body: BodyDynamics, flying: Mask) -
         falling = acceleration.reshape(parts.shape)[flying]
         return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0))
 
-    best = _downhill(lambda octaves: fitted(octaves)[1], -CUTOFF_RANGE, min(highest, CUTOFF_RANGE))
+    start = np.log2(body.cutoff / usual)
+    best = _downhill(lambda octaves: fitted(octaves)[1], start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
     return fitted(best)[0], usual * 2.0**best, fall
 
 
@@ -180,19 +183,20 @@ def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:
         smooth, _, _ = smooth_path(path, step, cutoff)
         return float(((smooth - path) ** 2).sum()) / (1 - share_of_noise(cutoff * step)) ** 2
 
-    return float(usual * 2.0 ** _downhill(score, -CUTOFF_RANGE, 0.0))
+    return float(usual * 2.0 ** _downhill(score, 0.0, CUTOFF_STEP, (-CUTOFF_RANGE, 0.0)))
 
 
-def _downhill(score: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function with one valley is lowest: from 0 on by steps, then on the parabola through three of them."""
-    best = 0.0
-    for further in (CUTOFF_STEP, -CUTOFF_STEP):
+def _downhill(score: Callable[[float], float], start: float, stride: float, limits: tuple[float, float]) -> float:
+    """Where a function with one valley is lowest: from `start` on by strides, then on the parabola through three."""
+    low, high = limits
+    best = start
+    for further in (stride, -stride):
         while low <= best + further <= high and score(best + further) < score(best):
             best += further
-    if low <= best - CUTOFF_STEP and best + CUTOFF_STEP <= high:
-        below, here, above = (score(best + offset) for offset in (-CUTOFF_STEP, 0.0, CUTOFF_STEP))
+    if low <= best - stride and best + stride <= high:
+        below, here, above = (score(best + offset) for offset in (-stride, 0.0, stride))
         curvature = below - 2 * here + above
-        best += CUTOFF_STEP * (below - above) / (2 * curvature) if curvature > 0 else 0.0
+        best += stride * (below - above) / (2 * curvature) if curvature > 0 else 0.0
     return best
 
 
