@@ -89,6 +89,10 @@ class Foot:
         return 0.06 * self.length
 
 
+_DRAWN_STATURE, _DRAWN_MASS = 1.78, 77.5
+"""Stature [m] and mass [kg] of the adult that the figure is drawn as."""
+
+
 @dataclass(frozen=True)
 class Body:
     """A person. Segment lengths are fractions of stature (Drillis & Contini 1966; Winter 2009, Fig. 4.1).
@@ -100,8 +104,6 @@ class Body:
     mass : float
         Body mass [kg].
     foot : Foot
-    girth : float
-        Thickness of limbs and trunk relative to the slim adult that the figure is drawn as.
     arm_droop : float
         Angle of the arms below the horizontal in the rest pose [degrees].
     """
@@ -109,8 +111,13 @@ class Body:
     stature: float = 1.78
     mass: float = 77.5
     foot: Foot = Foot()
-    girth: float = 1.0
-    arm_droop: float = 48.0
+    arm_droop: float = 58.0
+
+    @property
+    def girth(self) -> float:
+        """Thickness of limbs and trunk relative to the drawn adult's: mass goes with length times girth²."""
+        size = self.stature / _DRAWN_STATURE
+        return float(np.sqrt(self.mass / _DRAWN_MASS / size**3))
 
     @property
     def thigh(self) -> float:
@@ -130,7 +137,7 @@ class Body:
     @property
     def hip_half_width(self) -> float:
         """Middle of the pelvis to a hip joint [m]."""
-        return 0.049 * self.stature
+        return 0.049 * self.stature * max(self.girth, 1.0) ** 0.5
 
     @property
     def bones(self) -> Bones:

@@ -9,6 +9,7 @@ import numpy as np
 
 from sample_scenes.body import BONES, Body
 from sample_scenes.figure import PARTS, hiker
+from sample_scenes.stage import plain_material
 
 TO_BLENDER = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 """Rotation from the body's frame (x forward) to Blender's custom (-Y forward, .L on +X)."""
@@ -108,15 +109,4 @@ def _assign_weights(skin: bpy.types.Object, weights: np.ndarray) -> None:
 
 
 def _material(part: str) -> bpy.types.Material:
-    name = f"SoftGround Sample {part}"
-    material = bpy.data.materials.get(name)
-    if material is None:
-        colour, roughness = _LOOKS[part]
-        material = bpy.data.materials.new(name)
-        if material.node_tree is None:
-            material.use_nodes = True
-        shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-        shader.inputs["Base Color"].default_value = (*colour, 1.0)
-        shader.inputs["Roughness"].default_value = roughness
-        material.diffuse_color = (*colour, 1.0)
-    return material
+    return plain_material(f"SoftGround Sample {part}", *_LOOKS[part])

@@ -84,8 +84,18 @@ def _weights(body: Body, vertices: Array, bones: tuple[str, ...]) -> Array:
     return closeness / closeness.sum(axis=1, keepdims=True)
 
 
+def _head_size(body: Body) -> float:
+    """Size of the head relative to the adult's; small people have comparatively large heads."""
+    return float((body.stature / 1.78) ** 0.55)
+
+
+def _limb_girth(body: Body) -> float:
+    """Thickness of the limbs relative to the adult's: heavy people carry more of their mass on the trunk."""
+    return body.girth**0.6
+
+
 def _head(body: Body) -> tuple:
-    s = body.stature / 1.78
+    s = _head_size(body)
     skull = body.joints["crown"] + s * np.array((0.0, 0.0, -0.115))
     neck, base = body.joints["head"], body.joints["neck"]
     parts = [
@@ -109,7 +119,7 @@ def _head(body: Body) -> tuple:
 
 
 def _cap(body: Body) -> tuple:
-    s = body.stature / 1.78
+    s = _head_size(body)
     skull = body.joints["crown"] + s * np.array((0.0, 0.0, -0.115))
     dome = union(
         [
@@ -137,12 +147,16 @@ def _cap(body: Body) -> tuple:
 
 
 def _jacket(body: Body) -> tuple:
-    s, g = body.stature / 1.78, body.girth
+    s, g, limb = body.stature / 1.78, body.girth, _limb_girth(body)
+    belly = 0.16 * max(g - 1, 0.0) * s
     j = body.joints
     hem = j["hips"][2] - 0.055 * s
     parts = [
         ellipsoid(j["chest"] + s * np.array((0.012, 0, 0.075)), s * g * np.array((0.124, 0.172, 0.195))),
-        ellipsoid(j["spine"] + s * np.array((0.012, 0, 0.02)), s * g * np.array((0.112, 0.148, 0.185))),
+        ellipsoid(
+            j["spine"] + s * np.array((0.012, 0, 0.02)) + (0.6 * belly, 0, 0),
+            s * g * np.array((0.112, 0.148, 0.185)) + (0.8 * belly, 0.3 * belly, 0),
+        ),
         ellipsoid(j["hips"] + s * np.array((0.0, 0, -0.01)), s * g * np.array((0.142, 0.186, 0.160))),
         round_cone(j["neck"] - (0, 0, 0.05 * s), j["neck"] + s * np.array((0.004, 0, 0.045)), 0.080 * s, 0.072 * s),
     ]
@@ -150,9 +164,9 @@ def _jacket(body: Body) -> tuple:
         shoulder, elbow, wrist = (j[f"{name}.{side}"] for name in ("shoulder", "elbow", "wrist"))
         cuff = elbow + 0.93 * (wrist - elbow)
         parts += [
-            round_cone(j["neck"] - (0, 0, 0.03 * s), shoulder, 0.052 * s * g, 0.058 * s * g),
-            round_cone(shoulder, elbow, 0.063 * s * g, 0.050 * s * g),
-            cut(round_cone(elbow, wrist, 0.053 * s * g, 0.042 * s * g), cuff, wrist - elbow, 0.012 * s),
+            round_cone(j["neck"] - (0, 0, 0.03 * s), shoulder, 0.052 * s * limb, 0.056 * s * limb),
+            round_cone(shoulder, elbow, 0.060 * s * limb, 0.050 * s * limb),
+            cut(round_cone(elbow, wrist, 0.053 * s * limb, 0.042 * s * limb), cuff, wrist - elbow, 0.012 * s),
         ]
     solid = cut(union(parts, 0.05 * s), (0, 0, hem), (0, 0, -1), 0.02 * s)
     solid = cut(solid, j["neck"] + s * np.array((0.03, 0, 0.052)), (-0.35, 0, 1), 0.015 * s)
@@ -170,7 +184,7 @@ def _jacket(body: Body) -> tuple:
 
 
 def _trousers(body: Body) -> tuple:
-    s, g = body.stature / 1.78, body.girth
+    s, g, limb = body.stature / 1.78, body.girth, _limb_girth(body)
     j = body.joints
     parts = [ellipsoid(j["hips"] + s * np.array((-0.008, 0, 0.0)), s * g * np.array((0.114, 0.154, 0.130)))]
     for side in SIDES:
@@ -179,9 +193,11 @@ def _trousers(body: Body) -> tuple:
         parts.append(
             union(
                 [
-                    round_cone(hip + inward, knee, 0.090 * s * g, 0.064 * s * g),
-                    round_cone(knee, ankle, 0.063 * s * g, 0.056 * s * g),
-                    ellipsoid(knee + s * np.array((-0.022, 0, -0.12)), s * g * np.array((0.050, 0.054, 0.13))),  # calf
+                    round_cone(hip + inward, knee, 0.090 * s * limb, 0.064 * s * limb),
+                    round_cone(knee, ankle, 0.063 * s * limb, 0.056 * s * limb),
+                    ellipsoid(
+                        knee + s * np.array((-0.022, 0, -0.12)), s * limb * np.array((0.050, 0.054, 0.13))
+                    ),  # calf
                 ],
                 0.03 * s,
             )

@@ -64,12 +64,15 @@ class Roll:
         Knots as parts of stance and of swing, in [0, 1), and the pitch there [degrees].
     toe_bend : float
         Bend of the toes beyond which they lift too [degrees].
+    held_toes : bool
+        The toes are held by something stiff (a snowshoe): level in stance, only a little tipped up in swing.
     """
 
     duty_factor: float
     stance: tuple[tuple[float, ...], tuple[float, ...]]
     swing: tuple[tuple[float, ...], tuple[float, ...]]
     toe_bend: float
+    held_toes: bool = False
 
     def pitch(self, phase: Array) -> Array:
         """Foot pitch at phases of the stride, 0 at heel strike [rad]."""
@@ -79,6 +82,9 @@ class Roll:
 
     def bend(self, phase: Array) -> Array:
         """Toes up relative to the foot [rad]: in stance they stay flat until they can bend no further."""
+        if self.held_toes:
+            swing = np.clip((phase - self.duty_factor) / (1 - self.duty_factor), 0.0, 1.0)
+            return -self.pitch(phase) + np.radians(7.0) * np.sin(np.pi * swing) ** 2
         duty, landing_bend = self.duty_factor, np.radians(8.0)
         limit, give = np.radians(self.toe_bend), np.radians(10.0)
 

@@ -59,6 +59,8 @@ class Gait(Stride):
         Lateral excursion of the hips to either side [m].
     surge : float
         Forward excursion of the hips about steady progress [m].
+    held_toes : bool
+        See `Roll`.
     """
 
     speed: float = 1.20
@@ -75,6 +77,7 @@ class Gait(Stride):
     bounce: float = 0.62
     sway: float = 0.022
     surge: float = 0.008
+    held_toes: bool = False
 
     def step_length(self, body: Body) -> float:
         """Distance from one heel strike to the next [m]."""
@@ -99,6 +102,7 @@ class Gait(Stride):
             ((0.0, 0.07, 0.16, 0.54, 0.70, 0.80, 0.90), stance_pitch),
             ((0.0, 0.12, 0.28, 0.50, 0.68, 0.82, 0.93), swing_pitch),
             self.toe_bend,
+            self.held_toes,
         )
         landing = (self.touch_down_forward * self.speed, 0.0, -self.touch_down * self.speed)
         return FootCourse(body.foot, roll, self._swing, landing)

@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from sample_scenes.stage import plain_material
+
 Array = NDArray[np.float64]
 
 _AROUND = 12  # vertices around a stick
@@ -35,7 +37,7 @@ def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collectio
     mesh = bpy.data.meshes.new(f"{armature.name} Figure")
     mesh.from_pydata(np.concatenate(vertices).tolist(), [], faces)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), dtype=bool))
-    mesh.materials.append(_material())
+    mesh.materials.append(plain_material("SoftGround Sample stick", (0.42, 0.055, 0.035), 0.5))
     figure = bpy.data.objects.new(mesh.name, mesh)
     collection.objects.link(figure)
     for bone in armature.data.bones:
@@ -75,16 +77,3 @@ def _stick(head: Array, tail: Array, head_radius: float, tail_radius: float) -> 
     i, j = np.meshgrid(np.arange(len(angle) - 1), np.arange(_AROUND), indexing="ij")
     a, b = i * _AROUND + j, i * _AROUND + (j + 1) % _AROUND
     return vertices.reshape(-1, 3), np.stack([a, b, b + _AROUND, a + _AROUND], axis=-1).reshape(-1, 4)
-
-
-def _material() -> bpy.types.Material:
-    name = "SoftGround Sample stick"
-    material = bpy.data.materials.get(name)
-    if material is None:
-        material = bpy.data.materials.new(name)
-        if material.node_tree is None:
-            material.use_nodes = True
-        shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-        shader.inputs["Base Color"].default_value = (0.42, 0.055, 0.035, 1.0)
-        shader.inputs["Roughness"].default_value = 0.5
-    return material

@@ -12,7 +12,7 @@ from sample_scenes.shoe import outline_width, shoe_mesh
 BODIES = [
     Body(),
     Body(stature=1.2, mass=24.0, foot=Foot(0.19, 0.075)),
-    Body(stature=2.1, girth=1.5, foot=Foot(0.40, 0.16)),
+    Body(stature=2.1, mass=286.0, foot=Foot(0.40, 0.16)),
 ]
 
 
