@@ -13,6 +13,10 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from .orientation import quaternions
+from .rigid import rotation
+from .solids import Solid
+
 Array = NDArray[np.float64]
 
 SIMULATION_RATE = 120.0
@@ -73,6 +77,9 @@ class Sole:
         Index of the patch that each landmark belongs to.
     outline : (N, 2) float array
         The flat sole's outline in the frame of the first patch [m], counter-clockwise, for drawing.
+    solid : Solid or None
+        The whole surface, in place of patches, of what prints by whatever faces down; its frame is that of the one
+        pose that it has.
     """
 
     name: str
@@ -81,6 +88,7 @@ class Sole:
     landmarks: Array
     landmark_patch: NDArray[np.intp]
     outline: Array
+    solid: Solid | None = None
 
     @property
     def area(self) -> float:
@@ -102,7 +110,7 @@ class SoleMotion:
     ----------
     sole : Sole
     transforms : (F, P, 4, 4) float array
-        Patch frame to world, rotation and translation only [m].
+        Patch frame to world, rotation and translation only [m]; of the one frame of a solid.
     """
 
     sole: Sole
@@ -112,6 +120,16 @@ class SoleMotion:
         """World positions of the sole's landmarks, (F, L, 3) [m]."""
         pose, (x, y, z) = self.transforms[:, self.sole.landmark_patch, :3], self.sole.landmarks.T[..., None]
         return pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3]
+
+    def at(self, position: Array) -> SoleMotion:
+        """The motion at fractional sample indices (K,), those of its samples exactly.
+
+        Between samples a foot moves along a C1 cubic; a solid turns evenly about the shortest way and moves straight,
+        so that what rolls keeps its shape and what stops at once does not swing past.
+        """
+        if self.sole.solid is None:
+            return dataclasses.replace(self, transforms=orthonormal(_interpolate(self.transforms, position)))
+        return dataclasses.replace(self, transforms=interpolated_poses(self.transforms, position))
 
 
 @dataclass(frozen=True)
@@ -135,6 +153,9 @@ class CharacterMotion:
         World positions of those of `JOINTS` that are mapped [m].
     gravity : float
         Magnitude of gravity [m/s²].
+    centre : (F, 3) float array or None
+        Centre of mass of a thing without a skeleton, which falls, rolls and slides [m]; None for a character, whose
+        joints tell it.
     """
 
     name: str
@@ -145,6 +166,7 @@ class CharacterMotion:
     soles: tuple[SoleMotion, ...]
     joints: dict[str, Array] = field(default_factory=dict)
     gravity: float = 9.81
+    centre: Array | None = None
 
     @property
     def times(self) -> Array:
@@ -180,21 +202,51 @@ class CharacterMotion:
             return self
         count = (len(self.frames) - 1) * steps_per_frame + 1
         position = np.arange(count) / steps_per_frame
-        soles = tuple(
-            dataclasses.replace(sole, transforms=orthonormal(_interpolate(sole.transforms, position)))
-            for sole in self.soles
-        )
         return dataclasses.replace(
             self,
             frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
-            soles=soles,
+            soles=tuple(sole.at(position) for sole in self.soles),
             joints={name: _interpolate(path, position) for name, path in self.joints.items()},
+            centre=None if self.centre is None else _linear(self.centre, position),
+        )
+
+    def first(self, count: int) -> CharacterMotion:
+        """The first `count` samples of the motion."""
+        return dataclasses.replace(
+            self,
+            frames=self.frames[:count],
+            soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[:count]) for sole in self.soles),
+            joints={name: path[:count] for name, path in self.joints.items()},
+            centre=None if self.centre is None else self.centre[:count],
         )
 
 
 def steps_per_frame(frame_rate: float) -> int:
     """Number of simulation steps in a frame, so that a step is at most 1/`SIMULATION_RATE` s long."""
     return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
+
+
+def interpolated_poses(poses: Array, position: Array) -> Array:
+    """Rigid poses (F, ..., 4, 4) at fractional sample indices (K,): turned evenly, moved along a straight line."""
+    last = len(poses) - 1
+    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
+    a, b = poses[index], poses[np.minimum(index + 1, last)]
+    turn = np.swapaxes(a[..., :3, :3], -1, -2) @ b[..., :3, :3]
+    w, *axis = quaternions(turn.reshape(-1, 3, 3)).T
+    sine = np.linalg.norm(axis, axis=0)
+    angle = 2 * np.arctan2(sine, w) / np.maximum(sine, 1e-300)
+    vector = (angle * np.array(axis)).T.reshape(*turn.shape[:-2], 3)
+    u = (position - index).reshape(-1, *[1] * (vector.ndim - 1))
+    result = a.copy()
+    result[..., :3, :3] = a[..., :3, :3] @ rotation(u * vector)
+    result[..., :3, 3] += u * (b[..., :3, 3] - a[..., :3, 3])
+    return result
+
+
+def _linear(samples: Array, position: Array) -> Array:
+    """Straight interpolation along the first axis at fractional sample indices."""
+    index = np.arange(len(samples))
+    return np.stack([np.interp(position, index, column) for column in samples.T], axis=-1)
 
 
 def _interpolate(samples: Array, position: Array) -> Array:

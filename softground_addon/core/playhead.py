@@ -169,10 +169,8 @@ def _until(frame: float, character: CharacterLoads) -> CharacterLoads:
     """The loads up to a scene frame."""
     motion = character.motion
     count = int(np.searchsorted(motion.frames, frame, side="right"))
-    soles = tuple(replace(sole, transforms=sole.transforms[:count]) for sole in motion.soles)
-    joints = {name: path[:count] for name, path in motion.joints.items()}
     return CharacterLoads(
-        replace(motion, frames=motion.frames[:count], soles=soles, joints=joints),
+        motion.first(count),
         _first(character.contacts, count),
         _first(character.forces, count),
     )

@@ -104,9 +104,8 @@ class Press:
     def _press(
         self, stance: Stance, imprints: Imprints, start: int, end: int, frame: float, timing: Timing
     ) -> list[Window]:
-        steps = (
-            start - imprints.first + np.flatnonzero(imprints.pressing[start - imprints.first : end - imprints.first])
-        )
+        first, last = ((step - imprints.first) * imprints.parts for step in (start, end))
+        steps = first + np.flatnonzero(imprints.pressing[first:last])
         if not len(steps):
             return []
         window, surface = imprints.window, None

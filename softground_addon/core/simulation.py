@@ -17,12 +17,14 @@ from .deformation import GroundMaterial
 from .errors import InputError
 from .footprints import Footprint
 from .forces import ContactForces, impulse_forces, whole_body_forces
+from .free_bodies import free_loads
 from .heightfield import HeightField, Terrain, Window
 from .imprint import sole_points
 from .motion import CharacterMotion, steps_per_frame
 from .pressing import Press
 from .pressure import Pressure
-from .stance import Stance, Steps, Timing
+from .solid_stance import SolidStance
+from .stance import SoleStance, Stance, Steps, Timing
 from .variation import Variation
 
 Array = NDArray[np.float64]
@@ -57,11 +59,17 @@ def estimate_loads(
         The undisturbed ground.
     force_model : 'WHOLE_BODY' or 'IMPULSE'
     material : GroundMaterial
-        Its characteristic time shapes the impulse model; the whole-body model does not depend on it.
+        Its characteristic time shapes the impulse model and the landings of things without a skeleton; the
+        whole-body model of a character does not depend on it.
     crisp_landings : bool
         See `whole_body_forces`.
     """
     steps = steps_per_frame(motion.frame_rate)
+    if motion.centre is not None:
+        tau = material.characteristic_time
+        return CharacterLoads(
+            *free_loads(motion, terrain, steps=steps, characteristic_time=tau, force_model=force_model)
+        )
     source, given = continued(without_holds(motion))
     source = source.resampled(steps)
     contacts = detect_contacts(source, terrain)
@@ -236,9 +244,11 @@ class Simulation:
                     if begin == end:
                         continue
                     stance = before.pop((number, index), None) if first + offset == 0 else None
-                    if stance is None:
+                    if stance is None and motion.sole.solid:
+                        stance = SolidStance(character.motion.name, motion.sole)
+                    elif stance is None:
                         points = points or sole_points(motion.sole, motion.transforms)
-                        stance = Stance(character.motion.name, motion.sole, points)
+                        stance = SoleStance(character.motion.name, motion.sole, points)
                     steps = slice(begin, end)
                     stance.extend(
                         Steps(

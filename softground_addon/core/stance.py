@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,12 +98,14 @@ class Bed:
 
 @dataclass(frozen=True)
 class Imprints:
-    """A stance over the cells, at each of N steps from `first` on.
+    """A stance over the cells, at each of N steps from `first` on, or at each of N parts of them.
 
     Attributes
     ----------
     first : int
         Step of the simulation.
+    parts : int
+        Number of parts that each step is laid out in: more than one where the sole moves far in a step.
     window : Window
     coverage : (N, rows, columns) float array
         Fraction of each cell that is in contact.
@@ -120,11 +123,12 @@ class Imprints:
         Where an unbroken crust carries the stress.
     factors : Factors or None
         How the ground varies over the window.
-    sinkage : (N,) float array
+    sinkage : (number of steps,) float array
         How far the ground had given way under the sole's lowest point when each step began [m].
     """
 
     first: int
+    parts: int
     window: Window
     coverage: NDArray[np.float32]
     contact: NDArray[np.bool_]
@@ -139,7 +143,7 @@ class Imprints:
     @property
     def end(self) -> int:
         """The step after the last."""
-        return self.first + len(self.pressing)
+        return self.first + len(self.pressing) // self.parts
 
 
 @dataclass(frozen=True)
@@ -171,19 +175,17 @@ class Steps:
     centres: Array
 
 
-class Stance:
+class Stance(ABC):
     """One sole from touching down to leaving, and its footprint as it grows.
 
     Parameters
     ----------
     character : str
     sole : Sole
-    points : SolePoints
-        Of that sole.
     """
 
-    def __init__(self, character: str, sole: Sole, points: SolePoints) -> None:
-        self.character, self.sole, self.points = character, sole, points
+    def __init__(self, character: str, sole: Sole) -> None:
+        self.character, self.sole = character, sole
         self.first = self.end = 0
         self.compressed = self.raised = self.unplaced = 0.0
         self.recorder: FootprintRecorder | None = None
@@ -207,7 +209,7 @@ class Stance:
         hardest = int(self._force.argmax())
         if self._force[hardest] > self._peak:
             self._peak = float(self._force[hardest])
-            self._heading = float(np.arctan2(steps.poses[hardest, 0, 1, 0], steps.poses[hardest, 0, 0, 0]))
+            self._heading = float(np.arctan2(*self._toward(hardest)[::-1]))
 
     def imprints(self, start: int, end: int, bed: Bed, timing: Timing) -> Imprints:
         """The imprints of these steps, laid out together with as many later ones as pays."""
@@ -216,7 +218,8 @@ class Stance:
             last = min(self.end, end + per_frame * max(0, STEPS_AT_ONCE // per_frame - 1))
             allowed = LARGEST_SPREAD * self._window(start, start + 1, bed).cells
             window = self._window(start, last, bed)
-            while last > end and (window.cells > allowed or window.cells * (last - start) > CELLS_AT_ONCE):
+            most = CELLS_AT_ONCE // self._parts(start, last, bed)
+            while last > end and (window.cells > allowed or window.cells * (last - start) > most):
                 last = end + (last - end) // (2 * per_frame) * per_frame
                 window = self._window(start, last, bed)
             self._imprints = self._lay_out(start, last, window, bed, timing.step)
@@ -253,6 +256,59 @@ class Stance:
             load_frames=frames,
             load_n=np.concatenate(self._forces),
         )
+
+    @abstractmethod
+    def _window(self, start: int, end: int, bed: Bed) -> Window:
+        """The cells that may change in these steps."""
+
+    @abstractmethod
+    def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
+        """The imprints of these steps."""
+
+    def _parts(self, _start: int, _end: int, _bed: Bed) -> int:
+        """Number of parts in which each of these steps is laid out."""
+        return 1
+
+    def _toward(self, step: int) -> Array:
+        """Horizontal direction of the toes at a step, (2,)."""
+        direction: Array = self._steps.poses[step, 0, :2, 0]
+        return direction
+
+    def _leaning(self, path: Array, step: float, bias: float, length: float) -> Array:
+        """Where the rim leans to and how far at each of N steps, (N, 2): the way that the sole moves.
+
+        Parameters
+        ----------
+        path : (N + 1, 2) float array
+            Of the middle of what can touch, from the step before on [m].
+        step : float
+            Time between them [s].
+        bias : float
+            How far it leans at most.
+        length : float
+            Of the sole [m].
+        """
+        velocity = np.diff(path, axis=0) / step
+        leaning: Array = (
+            bias * velocity / np.sqrt((velocity**2).sum(axis=1, keepdims=True) + (LEANING_SPEED * length) ** 2)
+        )
+        return leaning
+
+
+class SoleStance(Stance):
+    """A stance of a foot: patches that keep their underside, tilted a little at most.
+
+    Parameters
+    ----------
+    character : str
+    sole : Sole
+    points : SolePoints
+        Of that sole.
+    """
+
+    def __init__(self, character: str, sole: Sole, points: SolePoints) -> None:
+        super().__init__(character, sole)
+        self.points = points
 
     def _window(self, start: int, end: int, bed: Bed) -> Window:
         window = contact_window(self.points, self._steps.poses[start - self.first : end - self.first], bed.cell_size)
@@ -298,7 +354,9 @@ class Stance:
             divisions=divisions,
         )
         contact = in_contact(coverage)
-        toward = self._leaning(steps, step, material.rim_bias) if material.rim_bias else None
+        toward = None
+        if material.rim_bias:
+            toward = self._leaning(self._path(steps), step, material.rim_bias, points.length)
         rim = rim_weights(coverage, contact, bed.rim_reach, cells.bears, toward)
         rate = np.broadcast_to(
             compression_rate(step, material, sinking.target, self._descent / step), sinking.target.shape
@@ -315,17 +373,15 @@ class Stance:
             varying = {"stiffness": factors.stiffness, "depth": factors.depth} if factors else {}
             target = target_compression(stress, material, **varying)
         holds = stress < material.crust_stress if material.crust_stress else None
-        return Imprints(start, window, coverage, contact, rim, pressing, target, rate, holds, factors, sinking.sinkage)
+        return Imprints(
+            start, 1, window, coverage, contact, rim, pressing, target, rate, holds, factors, sinking.sinkage
+        )
 
-    def _leaning(self, steps: slice, step: float, bias: float) -> Array:
-        """Where the rim leans to and how far at each of these steps, (N, 2): the way that the sole moves."""
+    def _path(self, steps: slice) -> Array:
+        """Middle of the sole from the step before on, (N + 1, 2) [m]."""
         poses = np.concatenate([self._steps.approach[-1:], self._steps.poses])[steps.start : steps.stop + 1]
         area = np.concatenate([patch.area for patch in self.points.patches])
-        middle = centroid(self.points, poses, np.broadcast_to(area, (len(poses), len(area))))
-        velocity = np.diff(middle[:, :2], axis=0) / step
-        slow = LEANING_SPEED * self.points.length
-        leaning: Array = bias * velocity / np.sqrt((velocity**2).sum(axis=1, keepdims=True) + slow**2)
-        return leaning
+        return centroid(self.points, poses, np.broadcast_to(area, (len(poses), len(area))))[:, :2]
 
 
 def _descent(sole: Sole, poses: Array, normal: Array) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .motion import Array
+Array = NDArray[np.float64]
 
 _SUPERSAMPLING = 4
 """Samples per node along each axis; edges are then known to a few per cent of the node distance."""
@@ -51,7 +51,7 @@ def underside_map(
     fine = spacing / _SUPERSAMPLING
     fine_origin = np.asarray(origin) - spacing / 2 + fine / 2
     rows, columns = shape
-    lowest = _z_buffer(vertices, triangles, fine_origin, (rows * _SUPERSAMPLING, columns * _SUPERSAMPLING), fine)
+    lowest = lowest_surface(vertices, triangles, fine_origin, (rows * _SUPERSAMPLING, columns * _SUPERSAMPLING), fine)
     counts = lowest <= lowest.min() + band if np.isfinite(lowest).any() else np.zeros(lowest.shape, dtype=bool)
     counts &= np.isfinite(lowest)
 
@@ -63,7 +63,7 @@ def underside_map(
     return heights, samples / _SUPERSAMPLING**2
 
 
-def _z_buffer(
+def lowest_surface(
     vertices: Array, triangles: NDArray[np.intp], origin: Array, shape: tuple[int, int], spacing: float
 ) -> Array:
     """Lowest z of the triangles over each node, infinite where there is none."""

@@ -1,0 +1,259 @@
+"""When a thing without a skeleton touches the ground and what the ground does to it, from its mass and its motion.
+
+A body in the air feels nothing. On the ground it feels its weight, and what changes its momentum: m·(g + a). What stops
+a fall stops it within the ground's characteristic time, as in the paper (Eq. 8): animation and simulation stop it from
+one frame to the next, which says nothing about how long the ground takes. So every change of velocity acts over that
+time from when it is seen on, or over what is left of the contact; all momentum is kept and no frame rate shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contacts import Contacts, ground_normal, hysteresis, runs
+from .forces import ContactForces
+from .heightfield import Terrain
+from .load_sharing import share_by_moment
+from .motion import CharacterMotion, SoleMotion
+from .solids import posed
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOUCH_HEIGHT = 0.02
+"""A body lower than this above its ground touches it, in its sizes."""
+LEAVE_HEIGHT = 0.04
+"""A touching body higher than this has left, in its sizes."""
+FLOAT_LIMIT = 0.15
+"""A body that is carried this near to its ground rests on it, and the rest is float or sink, in its sizes."""
+FLOAT_PERCENTILE = 10.0
+"""The clearance of a carried body that counts as float or sink."""
+FALLING = 0.5
+"""A body that is pushed up by less than this falls, in its weights."""
+SHORTEST_CONTACT = 1 / 24
+"""A contact lasts at least so long [s]: a bounce shows in one frame, however short."""
+SLOPE_PROBE = 0.05
+"""Half the distance over which the ground's slope is read, in sizes of the body."""
+NEAR_LOWEST = 0.5
+"""Points of a body that lie higher above its lowest one than this do not touch, in its sizes: those of a sphere on a
+wall of 60° lie at 0.25 of its diameter."""
+PRESSED = 0.01
+"""Points this much higher than the lowest one count e times less for where a body touches, in its sizes."""
+POINTS_AT_ONCE = 400_000
+"""Points whose ground is looked up in one go, to bound memory."""
+
+
+def free_loads(
+    motion: CharacterMotion,
+    terrain: Terrain,
+    *,
+    steps: int,
+    characteristic_time: float,
+    force_model: Literal["WHOLE_BODY", "IMPULSE"] = "WHOLE_BODY",
+) -> tuple[CharacterMotion, Contacts, ContactForces]:
+    """A body's motion, contacts and forces on the simulation's time grid.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        At scene frames, with a `centre`; its soles are solids.
+    terrain : Terrain
+        The undisturbed ground.
+    steps : int
+        Steps of the simulation in a frame.
+    characteristic_time : float
+        tau of the ground [s].
+    force_model : 'WHOLE_BODY' or 'IMPULSE'
+        The impulse model is the paper's: the weight, and m·v/tau for tau after each landing.
+
+    Returns
+    -------
+    motion : CharacterMotion
+        Resampled.
+    contacts : Contacts
+    forces : ContactForces
+        0 where nothing touches. With the whole-body model, their impulse over a contact is the change of momentum
+        from the speed of the fall to that of what follows, and the weight meanwhile.
+    """
+    assert motion.centre is not None, motion.name
+    path = motion.centre
+    feet = [_approach(sole, terrain) for sole in motion.soles]
+    offset = np.array([_offset(foot.clearance, path, motion, foot.size) for foot in feet])
+    clearance = np.stack([foot.clearance for foot in feet], axis=1) - offset
+    touching = np.stack(
+        [
+            hysteresis(height < TOUCH_HEIGHT * foot.size, height > LEAVE_HEIGHT * foot.size)
+            for foot, height in zip(feet, clearance.T, strict=True)
+        ],
+        axis=1,
+    )
+    touching |= _bounces(path, clearance, motion) & ~_with_neighbours(touching)
+    normal = np.stack([foot.normal for foot in feet], axis=1)
+    place = np.stack([foot.place for foot in feet], axis=1)
+
+    fine = motion.resampled(steps)
+    frame_of = np.minimum(np.arange(len(fine.frames)) // steps, len(path) - 1)
+    shown = touching[frame_of]
+    least = round(SHORTEST_CONTACT / fine.time_step)
+    for number in range(len(feet)):
+        for start in runs(shown[:, number])[0]:
+            shown[start : start + least, number] = True
+    along = np.arange(len(fine.frames)) / steps
+    place = _straight(place, along)
+    momentum = np.zeros((len(fine.frames), 3))
+    for first, last in zip(*runs(touching.any(axis=1)), strict=True):
+        height = float(clearance[max(first - 1, 0)].min())
+        up = normal[first, int(clearance[first].argmin())]
+        impulse = force_model == "IMPULSE"
+        changes = _velocity_changes(path, int(first), int(last), up, height, motion, landing_only=impulse)
+        end = min(max(int(last) * steps, int(first) * steps + least), len(momentum))
+        for frame, change in changes.items():
+            start = frame * steps
+            lasting = max(1, round(characteristic_time / fine.time_step))
+            if not impulse:
+                lasting = min(lasting, end - start)
+            stop = min(start + lasting, end)
+            momentum[start:stop] += change / (lasting * fine.time_step)
+    grounded = shown.any(axis=1)
+    weight = motion.mass * motion.gravity * np.array([0.0, 0.0, 1.0]) * grounded[:, None]
+    total = weight + motion.mass * momentum
+    total[total[:, 2] <= 0] = 0.0
+    share = share_by_moment(place[..., :2], _straight(path, along)[:, :2], shown)
+    forces = share[..., None] * total[:, None]
+    carried = np.minimum(share * weight[:, 2:], forces[..., 2])
+    clear = np.where(np.isfinite(clearance), clearance, np.inf)[frame_of]
+    return (
+        fine,
+        Contacts(shown, offset, normal[frame_of], clear),
+        ContactForces(forces, total, place, carried, forces[..., 2] - carried),
+    )
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """How a solid lies to its ground at each of F frames.
+
+    Attributes
+    ----------
+    clearance : (F,) float array
+        Height of its lowest point above the ground [m], infinite off the ground.
+    place : (F, 3) float array
+        Where it touches or would [m].
+    normal : (F, 3) float array
+        The ground's unit normal there, vertical where there is none.
+    size : float [m]
+    """
+
+    clearance: Array
+    place: Array
+    normal: Array
+    size: float
+
+
+def _approach(sole: SoleMotion, terrain: Terrain) -> _Approach:
+    solid = sole.sole.solid
+    assert solid is not None, sole.sole.name
+    probes, size = solid.probes, solid.size
+    clearance, place = [], []
+    at_once = max(1, POINTS_AT_ONCE // len(probes))
+    for first in range(0, len(sole.transforms), at_once):
+        points = posed(probes, sole.transforms[first : first + at_once, 0])
+        height = np.full(points.shape[:2], np.inf)
+        near = points[..., 2] < points[..., 2].min(axis=1, keepdims=True) + NEAR_LOWEST * size
+        ground = terrain.heights(points[near][:, 0], points[near][:, 1])
+        height[near] = np.where(np.isfinite(ground), points[near][:, 2] - ground, np.inf)
+        lowest = height.min(axis=1)
+        above = np.where(np.isfinite(height), height - np.where(np.isfinite(lowest), lowest, 0.0)[:, None], np.inf)
+        nearness = np.exp(-above / (PRESSED * size))
+        nearness[~np.isfinite(lowest)] = 1.0
+        clearance.append(lowest)
+        place.append(np.einsum("fq,fqi->fi", nearness, points) / nearness.sum(axis=1)[:, None])
+    where = np.concatenate(place)
+    normal = ground_normal(terrain, where[:, 0], where[:, 1], reach=SLOPE_PROBE * size)
+    normal = np.where(np.isfinite(normal), normal, (0.0, 0.0, 1.0))
+    return _Approach(np.concatenate(clearance), where, normal, size)
+
+
+def _offset(clearance: Array, path: Array, motion: CharacterMotion, size: float) -> float:
+    """The clearance at which a body that is carried stands [m], 0 when it never does."""
+    carried = np.zeros(len(path), bool)
+    if len(path) > 2:
+        push = np.diff(path[:, 2], 2) / motion.time_step**2 / motion.gravity + 1.0
+        carried[1:-1] = np.abs(push - 1.0) < FALLING
+    standing = carried & (np.abs(clearance) < FLOAT_LIMIT * size)
+    return float(np.percentile(clearance[standing], FLOAT_PERCENTILE)) if standing.any() else 0.0
+
+
+def _bounces(path: Array, clearance: Array, motion: CharacterMotion) -> Mask:
+    """Frames at which the nearest sole hits the ground between two frames, (F, S)."""
+    hits = np.zeros(clearance.shape, bool)
+    if len(path) < 3:
+        return hits
+    velocity = np.diff(path[:, 2]) / motion.time_step
+    before, after = velocity[:-1], velocity[1:]
+    lowest = clearance[1:-1].min(axis=1)
+    back = (before < 0) & (after > 0) & (after - before > 2 * motion.gravity * motion.time_step)
+    reach = np.maximum(np.abs(before), np.abs(after)) * motion.time_step
+    frame = 1 + np.flatnonzero(back & (lowest < reach))
+    hits[frame, clearance[frame].argmin(axis=1)] = True
+    return hits
+
+
+def _with_neighbours(mask: Mask) -> Mask:
+    """Frames (F, S) that are marked or next to one that is."""
+    wider = mask.copy()
+    wider[1:] |= mask[:-1]
+    wider[:-1] |= mask[1:]
+    return wider
+
+
+def _velocity_changes(
+    path: Array, first: int, last: int, up: Array, height: float, motion: CharacterMotion, *, landing_only: bool
+) -> dict[int, Array]:
+    """Changes of velocity beyond gravity's during a contact from frame `first` to before `last`, by frame [m/s]."""
+    velocity = np.diff(path, axis=0) / motion.time_step  # between frame i and i + 1
+    changes: dict[int, Array] = {}
+    for frame in range(first, min(last, len(velocity))):
+        if frame > 0 and frame == first:
+            falling = _landing_velocity(velocity, first, up, height, motion)
+            change = velocity[frame] - falling
+            changes[frame] = -min(float(falling @ up), 0.0) * up if landing_only else change
+        elif frame > 0 and not landing_only:
+            changes[frame] = velocity[frame] - velocity[frame - 1]
+    return changes
+
+
+def _landing_velocity(velocity: Array, first: int, up: Array, height: float, motion: CharacterMotion) -> Array:
+    """Velocity with which a body meets the ground between frame `first` - 1 and `first` (3,) [m/s].
+
+    The mean over that frame is of a body that fell for a part of it and lay still for the rest; what it fell with is
+    continued from the frames before.
+    """
+    step = motion.time_step
+    mean: Array = velocity[first - 1]
+    if first < 2:
+        return mean
+    pull = np.array([0.0, 0.0, -motion.gravity])
+    if first > 2:
+        pull = (velocity[first - 2] - velocity[first - 3]) / step
+    start = velocity[first - 2] + pull * step / 2
+    speed, faster = -float(start @ up), -float(pull @ up)
+    # The time until it has fallen by `height`, at most until the frame is over.
+    reached = speed**2 + 2 * faster * max(height, 0.0)
+    whole = speed + np.sqrt(max(reached, 0.0))
+    time = min(2 * max(height, 0.0) / whole, step) if whole > 0 else step
+    landing: Array = start + pull * time
+    return landing if landing @ up < mean @ up else mean
+
+
+def _straight(samples: Array, position: Array) -> Array:
+    """Straight interpolation along the first axis at fractional sample indices."""
+    last = len(samples) - 1
+    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
+    u = (position - index).reshape(-1, *[1] * (samples.ndim - 1))
+    between: Array = samples[index] + u * (samples[np.minimum(index + 1, last)] - samples[index])
+    return between

@@ -1,0 +1,222 @@
+"""A stance of a rigid body: it presses by whatever faces down, as it rolls, slides, tips or rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .deformation import GroundMaterial, compression_rate, in_contact, rim_weights
+from .heightfield import Surface, Window
+from .indentation import Springs, stress
+from .motion import Sole, interpolated_poses
+from .solids import MOST_DIVISIONS, SAMPLES_ACROSS, Solid, posed, underside
+from .stance import Bed, Imprints, Stance
+from .variation import Factors
+
+Array = NDArray[np.float64]
+
+STRIDE = 1 / 32
+"""A body that moves further than this in a step is laid out in parts of the step, in its sizes."""
+MOST_PARTS = 32
+"""Parts of a step at most."""
+STANDSTILL = 1e-4
+"""A body that moves less than this in a step, in its sizes, has no direction of travel."""
+FEWEST_DIVISIONS = 2
+"""Parts of a cell along each side, so that edges count by their covered fraction."""
+
+
+class SolidStance(Stance):
+    """A body on the ground, from touching it to leaving it.
+
+    Parameters
+    ----------
+    character : str
+    sole : Sole
+        With a solid.
+    """
+
+    def __init__(self, character: str, sole: Sole) -> None:
+        super().__init__(character, sole)
+        assert sole.solid is not None, sole.name
+        self.solid: Solid = sole.solid
+        self._corners = self.solid.vertices[self.solid.triangles].reshape(-1, 3)
+
+    def _window(self, start: int, end: int, bed: Bed) -> Window:
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for pose in _distinct(self._between(start, end, 1)):
+            place = posed(self.solid.vertices, pose)[:, :2]
+            low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
+        window = Window.around(low - bed.cell_size / 2, high + bed.cell_size / 2, bed.cell_size)
+        return window.expanded(max(1, int(bed.rim_reach + 1e-6)))
+
+    def _parts(self, start: int, end: int, bed: Bed) -> int:
+        path = self._between(start, end, 1, before=True)[:, :2, 3]
+        furthest = float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0))
+        return max(1, min(MOST_PARTS, ceil(furthest / max(bed.cell_size, STRIDE * self.solid.size) - 1e-6)))
+
+    def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
+        steps, material, cells = slice(start - self.first, end - self.first), bed.material, bed.surface(window)
+        parts = self._parts(start, end, bed)
+        poses = self._between(start, end, parts)
+        force = np.repeat(self._force[steps], parts)
+        upright = np.repeat(self._steps.normals[steps, 2], parts)
+        factors = bed.variation.factors(window) if bed.variation else None
+        coverage = np.zeros((len(poses), window.rows, window.columns), np.float32)
+        target = np.zeros(coverage.shape)
+        sinkage, area = np.zeros(len(poses)), np.zeros(len(poses))
+        for k, pose in enumerate(poses):
+            if k and force[k] == force[k - 1] and upright[k] == upright[k - 1] and (pose == poses[k - 1]).all():
+                coverage[k], target[k], sinkage[k], area[k] = (
+                    coverage[k - 1],
+                    target[k - 1],
+                    sinkage[k - 1],
+                    area[k - 1],
+                )
+            else:
+                hollow = self._hollow(pose, force[k], cells, material, factors)
+                coverage[k], target[k], sinkage[k] = hollow.coverage, hollow.compression, hollow.sinkage
+                area[k] = hollow.area / upright[k]
+            self._moment += force[k] * _middle(coverage[k] * target[k], cells)
+        pressing = sinkage > 0
+        load = force * pressing
+        self._load += float(load.sum())
+        self._area = max(self._area, float(area[load > 0].max(initial=0.0)))
+        contact = in_contact(coverage)
+        toward = None
+        if material.rim_bias:
+            path = self._between(start, end, parts, before=True)[:, :2, 3]
+            toward = self._leaning(path, step / parts, material.rim_bias, self.solid.size)
+        rim = rim_weights(coverage, contact, bed.rim_reach, cells.bears, toward)
+        rate = np.broadcast_to(compression_rate(step / parts, material, sinkage, self._descent / step), sinkage.shape)
+        holds = None
+        if material.crust_stress:
+            varying = {"stiffness": factors.stiffness, "depth": factors.depth} if factors else {}
+            holds = stress(target, material, **varying) < material.crust_stress
+        return Imprints(
+            start, parts, window, coverage, contact, rim, pressing, target, rate, holds, factors, sinkage[::parts]
+        )
+
+    def _toward(self, step: int) -> Array:
+        """The way that the body moves; of one that stands, its own x axis."""
+        pose = self._steps.poses[step, 0]
+        before = np.concatenate([self._steps.approach[-1:], self._steps.poses])[max(0, step)]
+        travel: Array = pose[:2, 3] - before[0, :2, 3]
+        return travel if np.linalg.norm(travel) > STANDSTILL * self.solid.size else pose[:2, 0]
+
+    def _between(self, start: int, end: int, parts: int, *, before: bool = False) -> Array:
+        """Poses (N, 4, 4) of these steps, each in so many parts; with that of the step before, if asked."""
+        known = np.concatenate([self._steps.approach[-1:], self._steps.poses])[:, 0]
+        first = len(known) - len(self._steps.poses) + start - self.first  # where `start` is among them
+        at = first - 1 + np.arange(0 if before else 1, (end - start) * parts + 1) / parts
+        return interpolated_poses(known, np.maximum(at, 0.0))
+
+    def _hollow(
+        self, pose: Array, force: float, cells: Surface, material: GroundMaterial, factors: Factors | None
+    ) -> _Hollow:
+        """What the body presses at a pose, under a lasting force."""
+        window, size = cells.window, cells.cell_size
+        hollow = _Hollow(np.zeros((window.rows, window.columns)), np.zeros((window.rows, window.columns)), 0.0, 0.0)
+        corners = posed(self._corners, pose)
+        above = (corners[:, 2] - _ground_under(corners, cells)).reshape(-1, 3).min(axis=1)
+        deepest = material.layer_depth * (float(factors.depth.max()) if factors else 1.0) + self.solid.give
+        near = above < above.min() + deepest
+        if force <= 0 or not np.isfinite(above.min()):
+            return hollow
+        corners = corners.reshape(-1, 3, 3)[near]
+        low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
+        first = np.maximum(np.floor(low / size).astype(int) - (window.column, window.row), 0)
+        last = np.minimum(
+            np.floor(high / size).astype(int) - (window.column, window.row), (window.columns - 1, window.rows - 1)
+        )
+        columns, rows = (slice(int(a), int(b) + 1) for a, b in zip(first, last, strict=True))
+        across = np.sqrt(float(np.prod(np.maximum(high - low, 1e-9)))) / SAMPLES_ACROSS
+        divisions = int(np.clip(ceil(size / across), FEWEST_DIVISIONS, MOST_DIVISIONS))
+        spacing = size / divisions
+        shape = ((rows.stop - rows.start) * divisions, (columns.stop - columns.start) * divisions)
+        origin = (first + np.array([window.column, window.row])) * size + spacing / 2
+        lower = underside(corners, origin, shape, spacing)
+        clearance = lower - _finer(cells, rows, columns, divisions)
+        clearance -= clearance.min()
+        over = np.isfinite(clearance)
+        if not over.any():
+            return hollow
+        varying = (
+            [_repeated(field[rows, columns], divisions)[over] for field in (factors.stiffness, factors.depth)]
+            if factors
+            else ()
+        )
+        springs = Springs(
+            np.maximum(clearance[over] - self.solid.give, 0.0), np.full(int(over.sum()), spacing**2), *varying
+        )
+        sinkage = springs.sinkage(force, material)
+        compression = np.zeros(shape)
+        compression[over] = springs.compression(sinkage, material)
+        blocks = (rows.stop - rows.start, divisions, columns.stop - columns.start, divisions)
+        covered = (compression > 0).reshape(blocks).mean(axis=(1, 3))
+        mean = compression.reshape(blocks).mean(axis=(1, 3))
+        hollow.coverage[rows, columns] = covered
+        hollow.compression[rows, columns] = np.divide(mean, covered, out=np.zeros_like(mean), where=covered > 0)
+        return _Hollow(hollow.coverage, hollow.compression, sinkage, float((compression > 0).sum()) * spacing**2)
+
+
+@dataclass(frozen=True)
+class _Hollow:
+    """What a body presses into the cells of a window.
+
+    Attributes
+    ----------
+    coverage, compression : (rows, columns) float arrays
+        Fraction of each cell that it touches, and mean compression there [m].
+    sinkage : float
+        Of its lowest point [m].
+    area : float
+        Horizontal area of contact [m²].
+    """
+
+    coverage: Array
+    compression: Array
+    sinkage: float
+    area: float
+
+
+def _distinct(poses: Array) -> Array:
+    """Poses without those that repeat the one before."""
+    moved = np.ones(len(poses), bool)
+    moved[1:] = (np.diff(poses, axis=0) != 0).any(axis=(1, 2))
+    return poses[moved]
+
+
+def _ground_under(points: Array, cells: Surface) -> Array:
+    """Height of the ground's plane in the cell under each point (Q, 3), (Q,) [m]; -inf where nothing bears."""
+    column = points[:, 0] / cells.cell_size - cells.window.column
+    row = points[:, 1] / cells.cell_size - cells.window.row
+    i = np.clip(np.floor(column).astype(int), 0, cells.window.columns - 1)
+    j = np.clip(np.floor(row).astype(int), 0, cells.window.rows - 1)
+    rise = cells.slope_x[j, i] * (column - i - 0.5) + cells.slope_y[j, i] * (row - j - 0.5)
+    return np.where(cells.bears[j, i], cells.heights[j, i] + rise * cells.cell_size, -np.inf)
+
+
+def _finer(cells: Surface, rows: slice, columns: slice, divisions: int) -> Array:
+    """Heights of the ground at samples within some cells, on each cell's plane [m]; -inf where nothing bears."""
+    within = ((np.arange(divisions) + 0.5) / divisions - 0.5) * cells.cell_size
+    heights = np.where(cells.bears, cells.heights, -np.inf)[rows, columns][:, None, :, None]
+    heights = heights + cells.slope_x[rows, columns][:, None, :, None] * within
+    heights = heights + cells.slope_y[rows, columns][:, None, :, None] * within[:, None, None]
+    return np.asarray(heights.reshape(heights.shape[0] * divisions, -1))
+
+
+def _repeated(values: Array, divisions: int) -> Array:
+    return values.repeat(divisions, axis=0).repeat(divisions, axis=1)
+
+
+def _middle(pressed: Array, cells: Surface) -> Array:
+    """Middle of a pressed volume on the undisturbed ground, (3,) [m]; 0 where nothing is pressed."""
+    total = float(pressed.sum())
+    if total <= 0:
+        return np.zeros(3)
+    x, y = cells.window.centres(cells.cell_size)
+    height = float((pressed * np.where(cells.bears, cells.heights, 0.0)).sum())
+    return np.array([pressed.sum(axis=0) @ x, pressed.sum(axis=1) @ y, height]) / total
