@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
-from ..core.prediction import StanceLoad, deepest, matching_modulus, stance_loads
+from ..core.prediction import SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
+from .character_setup import characters_of
 from .shots import Shot, estimate_shot, read_shot
 
 TRIALS = 4
@@ -37,14 +37,14 @@ class Analysis:
         What the loads depend on beside that.
     shot : Shot
     loads : list of CharacterLoads
-    stances : list of StanceLoad
+    stances : list of StanceLoad or SolidLoad
     """
 
     source: Hashable
     terms: Hashable
     shot: Shot
     loads: list[CharacterLoads]
-    stances: list[StanceLoad]
+    stances: list[StanceLoad | SolidLoad]
 
 
 _known: dict[int, Analysis] = {}
@@ -158,23 +158,22 @@ def _source(scene: bpy.types.Scene) -> Hashable:
         (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(
             (
-                character.armature.session_uid,
+                character.armature and character.armature.session_uid,
                 tuple((joint.name, joint.bone, joint.end) for joint in character.joints),
                 tuple((s.name, s.side, s.bone, s.toe_bone, s.object and s.object.name) for s in character.soles),
             )
-            for character in _characters(options)
+            for character in characters_of(scene)
         ),
     )
 
 
 def _terms(scene: bpy.types.Scene) -> Hashable:
-    options = scene.softground
-    tau = options.material.characteristic_time
+    tau = scene.softground.material.characteristic_time
     return tuple(
-        (character.mass, character.force_model, tau if character.force_model == "IMPULSE" else None)
-        for character in _characters(options)
+        (
+            character.mass,
+            character.force_model,
+            tau if character.force_model == "IMPULSE" or character.armature is None else None,
+        )
+        for character in characters_of(scene)
     )
-
-
-def _characters(options: Any) -> list[Any]:
-    return [character for character in options.characters if character.armature]

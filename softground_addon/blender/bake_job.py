@@ -24,7 +24,7 @@ from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads, simulate
 from . import bake_report, baked_ground, ground_mesh, response_job, settings, staleness
 from .bake_checks import check_volumes, vertex_spacing, wants_detail
-from .character_setup import characters_of
+from .character_setup import characters_of, movers_of
 from .ground_mesh import GroundPlan
 from .jobs import Job, Progress, aside
 from .materials import ensure_material
@@ -147,7 +147,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
     )
     if write_ground and ground:
         ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = bake_report.summary(result)
-        staleness.store(bake_report.inputs_of(scene), ground, [one.armature for one in characters])
+        staleness.store(bake_report.inputs_of(scene), ground, movers_of(scene))
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 

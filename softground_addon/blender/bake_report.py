@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.footprints import Footprint
 from ..core.simulation import CharacterLoads
 from . import properties, response_job, settings, staleness
-from .character_setup import characters_of, mapping_of
+from .character_setup import characters_of, mapping_of, movers_of, title_of
 from .jobs import STAGES
 
 Array = NDArray[np.float64]
@@ -43,6 +43,8 @@ def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads], c
                 f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long: set the cell size to "
                 f"{length / ENOUGH_CELLS:.2g} m to see their shape."
             )
+        if motion.centre is not None:
+            continue  # a thing has no legs to go by
         likely = properties.DEFAULT_MASS * (motion.leg_length / ADULT_LEG) ** 3
         if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
             found.append(
@@ -75,8 +77,7 @@ def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     options = scene.softground
     if options.ground is None:
         return ()
-    armatures = [character.armature for character in characters_of(scene)]
-    return staleness.reasons(inputs_of(scene), options.ground, armatures)
+    return staleness.reasons(inputs_of(scene), options.ground, movers_of(scene))
 
 
 def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
@@ -88,7 +89,8 @@ def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
         "ground": options.ground.name if options.ground else None,
         "characters": [
             {
-                "armature": character.armature.name,
+                "armature": character.armature.name if character.armature else None,
+                "name": title_of(character),
                 "mass_kg": settings.typed(character.mass),
                 "force_model": character.force_model,
                 "joints": {joint: list(place) for joint, place in mapping_of(character).joints.items()},

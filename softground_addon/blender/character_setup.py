@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from math import ceil, floor
+from collections.abc import Iterable
+from math import ceil, floor, log10
 
 import bpy
+import numpy as np
 
 from ..core.errors import InputError
+from ..core.solids import mass_properties
 from .properties import SoftGroundCharacter
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
+from .rig_sampling import is_simulated
+from .solid_extraction import surface_of
 
 _SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
 _SIDE_TO_ENUM = {code: side for side, code in _SIDE_TO_CODE.items()}
@@ -37,13 +42,110 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     character.armature = armature
     _fill(character, mapping)
     settings.active_character = len(settings.characters) - 1
-    frames = animated_frames(armature)
+    _take_frames(scene, animated_frames(armature))
+    return character
+
+
+DENSITY = 500.0
+"""Density from which a thing's first mass is guessed [kg/m³]: wood's, between a tyre's and a stone's."""
+
+
+def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[SoftGroundCharacter]:
+    """Add mesh objects to the scene's characters, as things without a rig that fall, roll and slide.
+
+    Objects that hang on one parent, such as the wheels of a bicycle, are one thing. Its mass is that of its rigid
+    bodies, or guessed from its volume.
+
+    Raises
+    ------
+    InputError
+        If there is no object, or one is no mesh, the ground, or printing already.
+    """
+    things = list(things)
+    if not things:
+        raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
+    for thing in things:
+        _check_addable(scene, thing)
+    groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    for thing in things:
+        groups.setdefault(_root(thing), []).append(thing)
+    added = []
+    for root, members in groups.items():
+        character = scene.softground.characters.add()
+        character.name = (members[0] if len(members) == 1 else root).name
+        character.mass = _guessed_mass(scene, members)
+        for thing in members:
+            sole = character.soles.add()
+            sole.name, sole.object = thing.name, thing
+        added.append(character)
+        for thing in members:
+            _take_frames(scene, _moving_frames(scene, thing))
+    scene.softground.active_character = len(scene.softground.characters) - 1
+    return added
+
+
+def _check_addable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    if thing.type != "MESH":
+        raise InputError(
+            f"'{thing.name}' is a {thing.type.lower()}: select an animated armature, or mesh objects that fall or roll."
+        )
+    if thing == scene.softground.ground:
+        raise InputError(f"'{thing.name}' is the ground: select what moves on it.")
+    if not thing.data.polygons and not thing.modifiers:
+        raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or select another object.")
+    for character in scene.softground.characters:
+        if any(sole.object == thing for sole in character.soles):
+            raise InputError(f"'{thing.name}' prints already, as a sole of '{character.name}'.")
+        if character.armature and character.armature in _ancestors(thing):
+            raise InputError(
+                f"'{thing.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
+                "Contact."
+            )
+
+
+def _ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
+    """An object's parents, nearest first."""
+    found, parent = [], thing.parent
+    while parent is not None:
+        found.append(parent)
+        parent = parent.parent
+    return found
+
+
+def _root(thing: bpy.types.Object) -> bpy.types.Object:
+    return ([thing, *_ancestors(thing)])[-1]
+
+
+def _guessed_mass(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> float:
+    """Mass of some objects [kg]: that of their rigid bodies, or from their volume, to two digits."""
+    total = 0.0
+    for thing in things:
+        if thing.rigid_body:
+            total += thing.rigid_body.mass
+            continue
+        vertices, triangles = surface_of(scene, thing)
+        to_world = np.array(thing.matrix_world)[:3, :3] * scene.unit_settings.scale_length
+        total += mass_properties(vertices @ to_world.T, triangles).volume * DENSITY
+    if not total > 0:
+        return 1.0
+    return round(total, 1 - floor(log10(total)))
+
+
+def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int, int] | None:
+    if is_simulated(thing) and scene.rigidbody_world:
+        cache = scene.rigidbody_world.point_cache
+        return max(cache.frame_start, scene.frame_start), min(cache.frame_end, scene.frame_end)
+    return animated_frames(thing)
+
+
+def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
+    """Bake the frames of the first character; widen the range for further ones."""
+    settings = scene.softground
     if frames and len(settings.characters) == 1:
         settings.frame_start, settings.frame_end = frames
     elif frames:
         settings.frame_start = min(settings.frame_start, frames[0])
         settings.frame_end = max(settings.frame_end, frames[1])
-    return character
 
 
 def detect_bones(character: SoftGroundCharacter) -> None:
@@ -71,9 +173,32 @@ def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
         sole.side = _SIDE_TO_ENUM[source.side]
 
 
+def is_thing(character: SoftGroundCharacter) -> bool:
+    """Whether an entry is of objects without a rig."""
+    return character.armature is None and any(sole.object for sole in character.soles)
+
+
+def is_set_up(character: SoftGroundCharacter) -> bool:
+    """Whether an entry still has what leaves prints: an armature, or an object."""
+    return character.armature is not None or is_thing(character)
+
+
+def title_of(character: SoftGroundCharacter) -> str:
+    """What the user calls a character: its armature's name, or that of the thing."""
+    return character.armature.name if character.armature else character.name
+
+
 def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
-    """The scene's characters whose armature is still there."""
-    return [character for character in scene.softground.characters if character.armature]
+    """The scene's characters whose armature or objects are still there."""
+    return [character for character in scene.softground.characters if is_set_up(character)]
+
+
+def movers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The armatures and objects whose animation a bake of the scene reads."""
+    movers: list[bpy.types.Object] = []
+    for character in characters_of(scene):
+        movers += [character.armature] if character.armature else [s.object for s in character.soles if s.object]
+    return movers
 
 
 def mapping_of(character: SoftGroundCharacter) -> RigMapping:
@@ -84,7 +209,7 @@ def mapping_of(character: SoftGroundCharacter) -> RigMapping:
             sole.name, _SIDE_TO_CODE[sole.side], sole.bone, sole.toe_bone, sole.object.name_full if sole.object else ""
         )
         for sole in character.soles
-        if sole.bone or sole.object
+        if sole.object or (sole.bone and character.armature)
     )
     return RigMapping(joints, soles, "settings")
 
@@ -127,7 +252,10 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
                 f"The armature of '{inside.name}' is in a collection instance and cannot be read there: make it real "
                 "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
             )
-        raise InputError(f"Scene '{scene.name}' has no armature: open a shot with an animated character.")
+        raise InputError(
+            f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
+            "with Add Character in the SoftGround panel."
+        )
     if len(armatures) > 1:
         names = ", ".join(f"'{armature.name}'" for armature in armatures)
         raise InputError(

@@ -20,6 +20,7 @@ from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
 from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
+from .character_setup import characters_of
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .translation import rpt_
@@ -265,7 +266,7 @@ def _why_not(context: bpy.types.Context) -> str:
     options = settings.scene_of(context).softground
     if session.current().is_baking:
         return "A bake is running"
-    if not any(character.armature for character in options.characters):
+    if not characters_of(settings.scene_of(context)):
         return "Add a character first: select its armature and press Add Character"
     if options.ground and baked_ground.is_baked(options.ground):
         return "There is a bake on the ground: clear it first"

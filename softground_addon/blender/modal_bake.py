@@ -9,6 +9,7 @@ import bpy
 
 from ..core.errors import SoftGroundError
 from . import bake_job, jobs, session, settings
+from .character_setup import characters_of
 from .operators import reports_errors
 from .translation import iface_, rpt_
 
@@ -185,7 +186,7 @@ def _why_not(context: bpy.types.Context) -> str:
         return "A bake is running"
     if state.is_live:
         return "Live mode is on: stop it first"
-    if not any(character.armature for character in settings.scene_of(context).softground.characters):
+    if not characters_of(settings.scene_of(context)):
         return "Add a character first: select its armature and press Add Character"
     return ""
 

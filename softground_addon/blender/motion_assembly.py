@@ -20,7 +20,7 @@ from ..core.foot_attitude import (
 )
 from ..core.motion import Array, CharacterMotion, SoleMotion
 from .rig_mapping import RigMapping, SoleSource
-from .sole_extraction import find_foot_meshes, foot_sole, object_sole
+from .sole_extraction import find_foot_meshes, foot_sole
 
 STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
@@ -54,9 +54,26 @@ class Recording:
 
 
 def assemble_motion(
-    scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, recording: Recording, *, mass: float
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    mapping: RigMapping,
+    recording: Recording,
+    *,
+    mass: float,
+    carried: Mapping[str, SoleMotion],
 ) -> CharacterMotion:
     """The character's motion with the soles of its mapping.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    armature : bpy.types.Object
+    mapping : RigMapping
+    recording : Recording
+    mass : float
+        [kg]
+    carried : mapping of str to SoleMotion
+        The objects that print, by name of the sole.
 
     Raises
     ------
@@ -64,8 +81,7 @@ def assemble_motion(
         If a mesh that should print has no underside.
     """
     rest = RestPose(armature, recording.armature[0])
-    frame_rate = scene.render.fps / scene.render.fps_base
-    gravity = scene.gravity.length if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
+    frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
     leg = rest.leg_length(mapping)
 
     sources = [source for source in mapping.soles if not source.object]
@@ -100,9 +116,7 @@ def assemble_motion(
         carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
         transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
         motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))
-    for source in mapping.soles:
-        if source.object:
-            motions[source.name] = _object_motion(source, recording.things[source.object])
+    motions.update(carried)
 
     return CharacterMotion(
         name=armature.name,
@@ -117,6 +131,16 @@ def assemble_motion(
         },
         gravity=gravity,
     )
+
+
+def frame_rate_of(scene: bpy.types.Scene) -> float:
+    """Scene frames per second [Hz]."""
+    return float(scene.render.fps / scene.render.fps_base)
+
+
+def gravity_of(scene: bpy.types.Scene) -> float:
+    """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
+    return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
 
 
 def along_bone(matrices: Array, distance: float) -> Array:
@@ -292,7 +316,7 @@ def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[
 
 def _rigid_motion(matrices: Array, rest: Array) -> Array:
     """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
-    turn = _nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
+    turn = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
     motion = np.zeros_like(matrices)
     motion[:, :3, :3] = turn
     motion[:, :3, 3] = matrices[:, :3, 3] - turn @ rest[:3, 3]
@@ -300,18 +324,9 @@ def _rigid_motion(matrices: Array, rest: Array) -> Array:
     return motion
 
 
-def _nearest_rotation(matrices: Array) -> Array:
+def nearest_rotation(matrices: Array) -> Array:
     """Rotations closest to the given matrices (polar decomposition)."""
     u, _, vh = np.linalg.svd(matrices)
     handed = np.ones(matrices.shape[:-1])
     handed[..., 2] = np.sign(np.linalg.det(u @ vh))
     return (u * handed[..., None, :]) @ vh
-
-
-def _object_motion(source: SoleSource, matrices: Array) -> SoleMotion:
-    """An object that prints with its own mesh; its local z axis is up."""
-    scale = np.linalg.norm(matrices[0, :3, :3], axis=0)
-    placed = object_sole(source, bpy.data.objects[source.object], scale)
-    rigid = matrices.copy()
-    rigid[:, :3, :3] = _nearest_rotation(matrices[:, :3, :3] / scale)
-    return SoleMotion(placed.sole, (rigid @ placed.placements[0])[:, None])

@@ -35,7 +35,8 @@ def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -
 
 
 class SOFTGROUND_OT_add_character(bpy.types.Operator):
-    """Add the active armature: its feet, hips and limbs are recognised by their names or by the rest pose"""
+    """Add the active armature: its feet, hips and limbs are recognised by their names or by the rest pose. Without an
+    armature, add the selected mesh objects as things that fall, roll or slide"""
 
     bl_idname = "softground.add_character"
     bl_label = "Add Character"
@@ -43,13 +44,21 @@ class SOFTGROUND_OT_add_character(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
         armature = _armature_of(context.active_object)
-        character = character_setup.add_character(settings.scene_of(context), armature)
-        names = ", ".join(sole.name for sole in character.soles)
-        self.report({"INFO"}, f"Added '{character.name}' with {names}")
+        if armature is not None and armature.type == "MESH":
+            selected = [
+                thing for thing in context.selected_objects if thing.type == "MESH" and not thing.find_armature()
+            ]
+            added = character_setup.add_things(scene, dict.fromkeys([armature, *selected]))
+            self.report({"INFO"}, "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added))
+        else:
+            character = character_setup.add_character(scene, armature)
+            names = ", ".join(sole.name for sole in character.soles)
+            self.report({"INFO"}, f"Added '{character.name}' with {names}")
         if not bpy.app.background:
             with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-                analysis.read(settings.scene_of(context))
+                analysis.read(scene)
         return {"FINISHED"}
 
 

@@ -17,6 +17,7 @@ from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
 from . import analysis, baked_ground, ground_mesh, live, overlay_shapes, session, settings
+from .character_setup import characters_of
 from .operators import reports_errors
 from .overlay_shapes import Outline
 
@@ -202,7 +203,7 @@ class SOFTGROUND_OT_overlay(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is anybody whose steps could be shown."""
         cls.poll_message_set("Add a character first")
-        return any(character.armature for character in settings.scene_of(context).softground.characters)
+        return bool(characters_of(settings.scene_of(context)))
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:

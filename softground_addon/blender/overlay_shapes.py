@@ -12,7 +12,9 @@ from ..core.contacts import runs
 from ..core.footprints import Footprint
 from ..core.heightfield import Terrain, Window
 from ..core.motion import Sole
+from ..core.outlines import convex_hull
 from ..core.simulation import CharacterLoads
+from ..core.solids import posed
 
 Array = NDArray[np.float64]
 
@@ -157,10 +159,13 @@ def _centres(footprint: Footprint, cells: NDArray[np.int32]) -> Array:
 
 
 def _posed(sole: Sole, transforms: Array) -> Array:
-    """The outline in world space, on the underside of the sole's first piece."""
+    """The outline in world space, on the underside of the sole's first piece; of a solid, as seen from above."""
+    if sole.solid:
+        points = posed(sole.solid.probes, transforms[0])
+        hull = convex_hull(points[:, :2])
+        return np.column_stack([hull, np.full(len(hull), points[:, 2].min())])
     flat = np.column_stack([sole.outline, np.zeros(len(sole.outline))])
-    posed: Array = flat @ transforms[0, :3, :3].T + transforms[0, :3, 3]
-    return posed
+    return np.asarray(flat @ transforms[0, :3, :3].T + transforms[0, :3, 3])
 
 
 def _step(character: CharacterLoads, frame: float) -> int:

@@ -11,6 +11,7 @@ from bpy.props import FloatProperty, StringProperty
 from ..core import files, presets
 from ..core.errors import InputError
 from . import analysis, settings
+from .character_setup import characters_of, title_of
 from .operators import reports_errors
 from .translation import iface_, rpt_
 
@@ -72,7 +73,7 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         lines = [preset.source] if preset.source else []
         depth = analysis.expected_depth(settings.scene_of(context), preset.material)
         if depth is not None:
-            who = ", ".join(c.armature.name for c in settings.scene_of(context).softground.characters if c.armature)
+            who = ", ".join(title_of(c) for c in characters_of(settings.scene_of(context)))
             text = iface_("Deepest print to expect for {who}: {depth:.1f} cm")
             lines.append(text.format(who=who, depth=depth * 100))
         return "\n".join(lines)
@@ -152,7 +153,7 @@ class SOFTGROUND_OT_predict_depth(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is anybody to leave prints."""
         cls.poll_message_set("Add a character first")
-        return any(character.armature for character in settings.scene_of(context).softground.characters)
+        return bool(characters_of(settings.scene_of(context)))
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:

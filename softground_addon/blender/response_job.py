@@ -93,9 +93,14 @@ def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
     return ResponseOptions(tilt, grounding)
 
 
+def rigged(characters: Iterable[SoftGroundCharacter]) -> list[SoftGroundCharacter]:
+    """Those that can answer the ground: things without a rig cannot."""
+    return [character for character in characters if character.armature]
+
+
 def check_characters(characters: Iterable[SoftGroundCharacter]) -> None:
     """Raise InputError, naming the remedy, where a character can take no layer."""
-    for character in characters:
+    for character in rigged(characters):
         nla_layer.check_layerable(character.armature)
 
 
@@ -105,7 +110,7 @@ def standing_on(
     """The motions as they will walk on the terrain, which is where they press it."""
     if options is None or options.grounding is None:
         return tuple(motions)
-    return tuple(stood_on(motion, terrain) for motion in motions)
+    return tuple(motion if motion.centre is not None else stood_on(motion, terrain) for motion in motions)
 
 
 def leaning(
@@ -120,6 +125,9 @@ def leaning(
         return None
     moved, most = [], 0.0
     for of_character, motion in zip(loads, motions, strict=True):
+        if motion.centre is not None:
+            moved.append(motion)
+            continue
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
         response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
         moved.append(responding(motion, response))
@@ -134,11 +142,13 @@ def answers_of(
     footprints: Sequence[Footprint],
     options: ResponseOptions | None,
 ) -> list[Answer]:
-    """Each character's response to the pressed ground, on top of its source."""
+    """Each rigged character's response to the pressed ground, on top of its source."""
     answers: list[Answer] = []
     if options is None:
         return answers
     for of_character, motion in zip(loads, motions, strict=True):
+        if motion.centre is not None:
+            continue
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
         response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
         before = gaps(motion, touching, terrain, footprints)
@@ -152,7 +162,7 @@ def layers_of(
 ) -> Generator[float, None, list[Layer]]:
     """The keys of each character's layer; yields the part that is done."""
     layers: list[Layer] = []
-    for number, (character, answer) in enumerate(zip(characters, answers, strict=False)):
+    for number, (character, answer) in enumerate(zip(rigged(characters), answers, strict=False)):
         job = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
         while True:
             try:
@@ -189,7 +199,7 @@ def put_layers(
     """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
     stretch = time_stretch(scene)
     span = scene.softground.frame_start * stretch, scene.softground.frame_end * stretch
-    for number, character in enumerate(characters):
+    for number, character in enumerate(rigged(characters)):
         if number < len(layers) and layers[number].curves:
             nla_layer.add_layer(character.armature, layers[number].curves, span, layers[number].notes)
             nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
@@ -264,4 +274,8 @@ def warnings(answers: Sequence[Answer]) -> list[str]:
 
 def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:
     """Speed that people would choose on this ground, over that of level hard ground, by character."""
-    return {motion.name: round(suggested_speed(mean_sinkage(footprints, motion.name)), 3) for motion in motions}
+    return {
+        motion.name: round(suggested_speed(mean_sinkage(footprints, motion.name)), 3)
+        for motion in motions
+        if motion.centre is None
+    }

@@ -7,7 +7,7 @@ motion act as in the user's scene, its meshes cost nothing, and the user's frame
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import bpy
 import numpy as np
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..core.errors import InputError
 from ..core.motion import CharacterMotion
 from .compat import remove_scene
-from .motion_assembly import Recording, assemble_motion
+from .motion_assembly import Recording, assemble_motion, frame_rate_of, gravity_of
 from .nla_layer import without_layer
 from .rig_mapping import RigMapping, SoleSource, require_armature
+from .solid_extraction import check_things, solid_motion
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -78,18 +79,62 @@ def sample_character(
     InputError
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
-    _check_input(armature, mapping, mass)
-    frames = np.arange(frame_start, frame_end + 1, frame_step) if frame_step > 0 else np.empty(0, dtype=int)
-    if not len(frames):
-        raise InputError(
-            f"The frame range {frame_start} to {frame_end} in steps of {frame_step} is empty: "
-            "set a start before the end and a positive step."
-        )
+    _check_input(scene, armature, mapping, mass)
+    frames = _frames(frame_start, frame_end, frame_step)
     bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
     things = dict.fromkeys(source.object for source in mapping.soles if source.object)
     recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
     _check_recording(armature.name, recording)
-    return assemble_motion(scene, armature, mapping, recording, mass=mass)
+    carried = {
+        source.name: solid_motion(scene, source, recording.things[source.object])[0]
+        for source in mapping.soles
+        if source.object
+    }
+    return assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried)
+
+
+def sample_thing(
+    scene: bpy.types.Scene,
+    name: str,
+    mapping: RigMapping,
+    *,
+    mass: float,
+    frame_start: int,
+    frame_end: int,
+    frame_step: int = 1,
+) -> Sampling:
+    """Read frame by frame a thing without a rig: one or more objects that fall, roll or slide together.
+
+    Parameters
+    ----------
+    name : str
+        What the user calls it.
+    mapping : RigMapping
+        Its soles are objects.
+    scene, mass, frame_start, frame_end, frame_step
+        As for `sample_character`; and so is what it yields, returns and raises.
+    """
+    _check_mass(name, mass)
+    sources = tuple(source for source in mapping.soles if source.object)
+    check_things(scene, name, sources)
+    frames = _frames(frame_start, frame_end, frame_step)
+    things = list(dict.fromkeys(source.object for source in sources))
+    recording = yield from _evaluate(scene, "", frames, [], things)
+    _check_finite(name, recording)
+    parts = [solid_motion(scene, source, recording.things[source.object]) for source in sources]
+    volumes = np.array([volume for _, volume in parts])
+    shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
+    motions = tuple(motion for motion, _ in parts)
+    return CharacterMotion(
+        name=name,
+        mass=mass,
+        leg_length=max(motion.sole.solid.size for motion in motions if motion.sole.solid),
+        frames=recording.frames,
+        frame_rate=frame_rate_of(scene),
+        soles=motions,
+        gravity=gravity_of(scene),
+        centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
+    )
 
 
 def sample_character_now(
@@ -120,6 +165,16 @@ def sample_character_now(
             return motion
 
 
+def _frames(first: int, last: int, step: int) -> NDArray[np.int_]:
+    frames = np.arange(first, last + 1, step) if step > 0 else np.empty(0, dtype=int)
+    if not len(frames):
+        raise InputError(
+            f"The frame range {first} to {last} in steps of {step} is empty: "
+            "set a start before the end and a positive step."
+        )
+    return frames
+
+
 def _bones(source: SoleSource) -> list[str]:
     return [bone for bone in (source.bone, source.toe_bone) if bone]
 
@@ -127,26 +182,29 @@ def _bones(source: SoleSource) -> list[str]:
 def _evaluate(
     scene: bpy.types.Scene, armature: str, frames: NDArray[np.int_], bones: Sequence[str], things: Sequence[str]
 ) -> Generator[int, None, Recording]:
-    """Record the matrices frame by frame, yielding the number of frames done."""
+    """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
     bone_matrices = np.empty((len(frames), len(bones), 4, 4))
     thing_matrices = np.empty((len(frames), len(things), 4, 4))
-    armature_matrices = np.empty((len(frames), 4, 4))
-    with sampling_scene(scene, armature, bones, things) as name:
+    armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
+    simulated = any(is_simulated(object_named(thing)) for thing in things)
+    source = simulated_scene(scene, int(frames[0])) if simulated else sampling_scene(scene, armature, bones, things)
+    with source as name:
         for done, frame in enumerate(frames):
             temporary = bpy.data.scenes.get(name)
             if temporary is None:
                 raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
-            with handlers_silent(), without_layer(object_named(armature)):
+            with handlers_silent(), without_layer(object_named(armature)) if armature else nullcontext():
                 temporary.frame_set(int(frame))
                 depsgraph = temporary.view_layers[0].depsgraph
-                evaluated = object_named(armature).evaluated_get(depsgraph)
-                armature_matrices[done] = evaluated.matrix_world
-                pose = evaluated.pose.bones
-                if done == 0:
-                    places = [pose.find(bone) for bone in bones]
-                    buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
-                pose.foreach_get("matrix", buffer.reshape(-1))
-                bone_matrices[done] = buffer[places]
+                if armature:
+                    evaluated = object_named(armature).evaluated_get(depsgraph)
+                    armature_matrices[done] = evaluated.matrix_world
+                    pose = evaluated.pose.bones
+                    if done == 0:
+                        places = [pose.find(bone) for bone in bones]
+                        buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
+                    pose.foreach_get("matrix", buffer.reshape(-1))
+                    bone_matrices[done] = buffer[places]
             for place, thing in enumerate(things):
                 thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1
@@ -189,6 +247,39 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
                 bpy.data.objects.remove(left_probe)
 
 
+def is_simulated(thing: bpy.types.Object) -> bool:
+    """Whether Blender's rigid bodies move an object, or one that it is parented to."""
+    node: bpy.types.Object | None = thing
+    while node is not None:
+        if node.rigid_body and node.rigid_body.type == "ACTIVE":
+            return True
+        node = node.parent
+    return False
+
+
+@contextmanager
+def simulated_scene(scene: bpy.types.Scene, first: int) -> Iterator[str]:
+    """Name of the user's scene, stepped to just before a frame from where its rigid bodies start; back afterwards.
+
+    Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
+    cache.
+    """
+    shown = scene.frame_current, scene.frame_subframe
+    name = scene.name
+    try:
+        world = scene.rigidbody_world
+        if world and not world.point_cache.is_baked:
+            with handlers_silent():
+                for frame in range(world.point_cache.frame_start, first):
+                    scene.frame_set(frame)
+        yield name
+    finally:
+        left = bpy.data.scenes.get(name)
+        if left is not None:
+            with handlers_silent():
+                left.frame_set(shown[0], subframe=shown[1])
+
+
 def object_named(name: str) -> bpy.types.Object:
     """Object by its full name, which tells linked ones from local ones."""
     found = bpy.data.objects.get(name)
@@ -213,19 +304,22 @@ def handlers_silent() -> Iterator[None]:
             handlers[:] = functions
 
 
-def _check_input(armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
-    require_armature(armature)
-    name = armature.name
+def _check_mass(name: str, mass: float) -> None:
     if not (np.isfinite(mass) and mass > 0):
         raise InputError(f"The mass of '{name}' is {mass} kg: give it a positive mass.")
+
+
+def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
+    require_armature(armature)
+    name = armature.name
+    _check_mass(name, mass)
     if not mapping.soles:
         raise InputError(f"'{name}' has no soles: add a foot bone or an object to the character's list of soles.")
     bones = armature.data.bones
     for source in mapping.soles:
         if not source.bone and not source.object:
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
-        if source.object and source.object not in bpy.data.objects:
-            raise InputError(f"Sole '{source.name}' of '{name}': object '{source.object}' is gone, choose another one.")
+    check_things(scene, name, mapping.soles)
     missing = [
         b
         for b in [*(b for s in mapping.soles for b in _bones(s)), *(b for b, _ in mapping.joints.values())]
@@ -254,7 +348,7 @@ def _is_animated(armature: bpy.types.Object) -> bool:
     return bool(armature.data.animation_data)
 
 
-def _check_recording(name: str, recording: Recording) -> None:
+def _check_finite(name: str, recording: Recording) -> None:
     for matrices in (recording.armature, *recording.bones.values(), *recording.things.values()):
         bad = ~(np.abs(matrices) <= _FARTHEST).all(axis=(1, 2))
         if bad.any():
@@ -262,6 +356,10 @@ def _check_recording(name: str, recording: Recording) -> None:
                 f"'{name}' has no finite pose at frame {int(recording.frames[bad.argmax()])}: "
                 "look for broken keys (NaN, infinite or huge values) in its action and delete them."
             )
+
+
+def _check_recording(name: str, recording: Recording) -> None:
+    _check_finite(name, recording)
     axes = recording.armature[:, :3, :3]
     gram = np.swapaxes(axes, -1, -2) @ axes
     size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.contacts import detect_contacts
 from ..core.errors import InputError
 from ..core.heightfield import FlatTerrain, Terrain
-from ..core.motion import CharacterMotion
+from ..core.motion import CharacterMotion, SoleMotion
 from ..core.simulation import CharacterLoads, estimate_loads
 from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
@@ -23,7 +23,7 @@ from .character_setup import characters_of, mapping_of
 from .ground_mesh import GroundPlan, GroundSurface
 from .jobs import Job, Progress, aside
 from .properties import SoftGroundCharacter
-from .rig_sampling import sample_character
+from .rig_sampling import sample_character, sample_thing
 
 Array = NDArray[np.float64]
 
@@ -109,16 +109,32 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
     lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
     upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
     margin = GROUND_MARGIN * max(sole.sole.length for motion in motions for sole in motion.soles)
-    low = float(np.median([np.percentile(path[..., 2].min(axis=1), LOW_PERCENTILE) for path in paths]))
-    floats = [detect_contacts(motion, FlatTerrain(low)).offset for motion in motions]
-    return GroundPlan(lower - margin, upper + margin, low + float(np.median(np.concatenate(floats))))
+    low = float(np.median([_standing_height(motion, sole) for motion in motions for sole in motion.soles]))
+    floats = [detect_contacts(motion, FlatTerrain(low)).offset for motion in motions if motion.centre is None]
+    float_above = float(np.median(np.concatenate(floats))) if floats else 0.0
+    return GroundPlan(lower - margin, upper + margin, low + float_above)
+
+
+def _standing_height(motion: CharacterMotion, sole: SoleMotion) -> float:
+    """Height at which a sole is on its ground [m]: a thing may fly for most of a shot, and its mesh touches exactly."""
+    percentile = LOW_PERCENTILE if motion.centre is None else 0.0
+    return float(np.percentile(sole.lowest(), percentile))
 
 
 def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
     """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
     options = scene.softground
     if not characters:
-        raise InputError("No character is set up: select an animated armature and press Add Character.")
+        raise InputError(
+            "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
+            "Character."
+        )
+    for character in options.characters:
+        if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
+            raise InputError(
+                f"The object of '{character.name}' is gone: choose another one in Soles, or remove '{character.name}' "
+                "from the characters."
+            )
     if options.frame_end <= options.frame_start:
         raise InputError(
             f"The frame range {options.frame_start}-{options.frame_end} is empty: set End after Start in the Bake "
@@ -134,14 +150,12 @@ def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCha
     options = scene.softground
     count = options.frame_end - options.frame_start + 1
     for number, character in enumerate(characters):
-        job = sample_character(
-            scene,
-            character.armature,
-            mapping_of(character),
-            frame_start=options.frame_start,
-            frame_end=options.frame_end,
-            mass=settings.typed(character.mass),
-        )
+        frames = {"frame_start": options.frame_start, "frame_end": options.frame_end}
+        mapping, mass = mapping_of(character), settings.typed(character.mass)
+        if character.armature:
+            job = sample_character(scene, character.armature, mapping, mass=mass, **frames)
+        else:
+            job = sample_thing(scene, character.name, mapping, mass=mass, **frames)
         while True:
             try:
                 read = next(job)

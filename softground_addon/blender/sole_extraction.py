@@ -9,10 +9,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import InputError
 from ..core.foot_attitude import FlatFoot, FootSize
 from ..core.motion import Array
-from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_mesh, sole_from_underside
+from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
 from .rig_mapping import SoleSource
 
 _REACH = 2.0
@@ -100,27 +99,6 @@ def _flattened(mesh: FootMesh, flat: FlatFoot) -> Array:
 
 def _moved(transform: Array, points: Array) -> Array:
     return points @ transform[:3, :3].T + transform[:3, 3]
-
-
-def object_sole(source: SoleSource, thing: bpy.types.Object, scale: Array) -> PlacedSole:
-    """Sole of an object from its own mesh, its local axes taken as the sole frame after scaling.
-
-    Parameters
-    ----------
-    source : SoleSource
-    thing : bpy.types.Object
-    scale : (3,) float array
-        Size of a local unit along each axis [m].
-
-    Raises
-    ------
-    InputError
-        If the object has no mesh to print with.
-    """
-    if thing.type != "MESH":
-        raise InputError(f"'{thing.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")
-    vertices, triangles = _read_mesh(thing)
-    return sole_from_mesh(vertices * scale, triangles, name=source.name, side=source.side)
 
 
 def find_foot_meshes(

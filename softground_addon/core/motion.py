@@ -121,6 +121,13 @@ class SoleMotion:
         pose, (x, y, z) = self.transforms[:, self.sole.landmark_patch, :3], self.sole.landmarks.T[..., None]
         return pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3]
 
+    def lowest(self) -> Array:
+        """Height of the sole's lowest point, (F,) [m]; of a foot, of its lowest landmark."""
+        if self.sole.solid is None:
+            return np.asarray(self.landmark_positions()[..., 2].min(axis=1))
+        pose = self.transforms[:, 0]
+        return np.asarray((pose[:, 2, :3] @ self.sole.solid.probes.T).min(axis=1) + pose[:, 2, 3])
+
     def at(self, position: Array) -> SoleMotion:
         """The motion at fractional sample indices (K,), those of its samples exactly.
 

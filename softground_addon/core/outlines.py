@@ -151,3 +151,25 @@ def as_one_polygon(loops: Sequence[Array]) -> Array:
         ring = np.roll(loop, -there, axis=0)
         joined = np.concatenate([joined[: here + 1], ring, ring[:1], joined[here:]])
     return joined
+
+
+def convex_hull(points: Array) -> Array:
+    """Corners of the smallest convex outline around points (N, 2), counter-clockwise (Andrew's monotone chain)."""
+    ordered = np.unique(points, axis=0)
+    if len(ordered) < 3:
+        return ordered
+
+    def chain(places: Array) -> list[Array]:
+        kept: list[Array] = []
+        for place in places:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], place) <= 0:
+                kept.pop()
+            kept.append(place)
+        return kept[:-1]
+
+    return np.array(chain(ordered) + chain(ordered[::-1]))
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    """Positive where the way from a over b to c turns left."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

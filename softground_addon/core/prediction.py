@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 from .contacts import runs
 from .deformation import GroundMaterial, compress, compression_rate, sink, touching_fraction
 from .errors import InputError
-from .heightfield import Terrain, TerrainTiles
+from .heightfield import Terrain, TerrainTiles, Window
 from .imprint import contact_window, point_contact, sole_points
+from .indentation import Springs
 from .simulation import CharacterLoads
+from .solid_imprint import ground_under
+from .solids import posed
 
 Array = NDArray[np.float64]
 
@@ -26,6 +29,8 @@ MATCH_TOLERANCE = 1e-3
 """Relative error of a matched depth."""
 MOST_TRIALS = 60
 """Halvings of the interval in which the modulus is searched: its logarithm is then known to rounding."""
+POSES = 12
+"""Steps of a body's contact that are looked at, and the one that presses hardest."""
 SOFTEST, STIFFEST = 1e3, 1e10
 """Range in which a modulus is searched [Pa]."""
 
@@ -73,7 +78,34 @@ class StanceLoad:
         return float(compression.max(initial=0.0))
 
 
-def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float) -> list[StanceLoad]:
+@dataclass(frozen=True)
+class SolidLoad:
+    """One body from touching down to leaving, as the ground feels it at some of its steps.
+
+    Attributes
+    ----------
+    character, sole : str
+    frames : (N,) float array
+        Scene frame of each step.
+    springs : tuple of Springs
+        The ground under it at some steps.
+    force : (K,) float array
+        Normal force at those [N].
+    """
+
+    character: str
+    sole: str
+    frames: Array
+    springs: tuple[Springs, ...]
+    force: Array
+
+    def depth(self, material: GroundMaterial) -> float:
+        """Depth to which it sinks if it rests there [m]: too large for one that rolls on before the ground gives."""
+        loads = zip(self.springs, self.force.tolist(), strict=True)
+        return max((springs.sinkage(force, material) for springs, force in loads), default=0.0)
+
+
+def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float) -> list[StanceLoad | SolidLoad]:
     """Every stance of the characters, in the order of their first contact.
 
     Parameters
@@ -85,10 +117,13 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
         Side of a cell [m]: the ground's height is looked up once per cell.
     """
     tiles: dict[int, TerrainTiles] = {}
-    stances = []
+    stances: list[StanceLoad | SolidLoad] = []
     for character in loads:
         motion, contacts = character.motion, character.contacts
         for index, sole in enumerate(motion.soles):
+            if sole.sole.solid:
+                stances += _solid_loads(character, index, tiles.setdefault(1, TerrainTiles(terrain, cell_size)))
+                continue
             points = sole_points(sole.sole, sole.transforms)
             divisions = points.cell_divisions(cell_size)
             tiles.setdefault(divisions, TerrainTiles(terrain, cell_size / divisions))
@@ -115,12 +150,38 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
     return sorted(stances, key=lambda stance: float(stance.frames[0]))
 
 
-def deepest(stances: Sequence[StanceLoad], material: GroundMaterial) -> float:
+def _solid_loads(character: CharacterLoads, index: int, tiles: TerrainTiles) -> list[StanceLoad | SolidLoad]:
+    """Every contact of a body."""
+    motion = character.motion
+    sole, force = motion.soles[index], character.forces.forces[:, index]
+    solid = sole.sole.solid
+    assert solid is not None, sole.sole.name
+    normal_force = np.maximum(np.einsum("ni,ni->n", force, character.contacts.normal[:, index]), 0.0)
+    found: list[StanceLoad | SolidLoad] = []
+    for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
+        steps = np.arange(max(int(first), 1), int(end))
+        if not len(steps):
+            continue
+        chosen = np.unique([*np.linspace(steps[0], steps[-1], POSES).astype(int), steps[normal_force[steps].argmax()]])
+        springs, pressing = [], []
+        for step in chosen:
+            place = posed(solid.vertices, sole.transforms[step, 0])[:, :2]
+            window = Window.around(place.min(axis=0), place.max(axis=0), tiles.cell_size)
+            under = ground_under(solid, sole.transforms[step, 0], tiles.surface(window), np.inf)
+            if under is not None:
+                springs.append(under.springs)
+                pressing.append(normal_force[step])
+        frames = motion.frames[steps]
+        found.append(SolidLoad(motion.name, sole.sole.name, frames, tuple(springs), np.array(pressing)))
+    return found
+
+
+def deepest(stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial) -> float:
     """Depth of the deepest print [m], 0 if there is none."""
     return max((stance.depth(material) for stance in stances), default=0.0)
 
 
-def matching_modulus(stances: Sequence[StanceLoad], material: GroundMaterial, depth: float) -> float:
+def matching_modulus(stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, depth: float) -> float:
     """The modulus [Pa] at which the deepest print gets a depth, everything else being equal.
 
     Parameters

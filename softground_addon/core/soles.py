@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .motion import Array, Sole, SolePatch
-from .outlines import area, as_one_polygon, signed_distance, trace_loops
+from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
+from .solids import Solid, supports
 from .undersides import continue_outside, sample_map, underside_map
 
 FOOT_BREADTH = 0.373
@@ -161,6 +162,32 @@ def sole_from_mesh(vertices: Array, triangles: NDArray[np.intp], *, name: str, s
     Parameters and errors are those of `sole_from_underside`; all of the mesh that can be seen from below counts.
     """
     return _from_mesh(vertices, triangles, name=name, side=side, ball=None, band=np.inf)
+
+
+def solid_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "", give: float = 0.0) -> Sole:
+    """Sole of a rigid body that prints by whatever faces down: a ball, a wheel, a snowshoe, a hand.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+        The body in a frame of its own, best with its centre of mass at the origin [m].
+    triangles : (T, 3) int array
+    name, side : str
+        As in `Sole`.
+    give : float
+        See `solids.Solid`.
+
+    Raises
+    ------
+    InputError
+        If it has no faces.
+    """
+    if not len(triangles):
+        raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.")
+    solid = Solid(np.asarray(vertices, dtype=float), triangles, give)
+    landmarks = supports(solid.probes)
+    outline = convex_hull(solid.probes[:, :2])
+    return Sole(name, side, (), landmarks, np.zeros(len(landmarks), dtype=np.intp), outline, solid)
 
 
 def _from_mesh(

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from .deformation import GroundMaterial, compression_rate, in_contact, rim_weights
 from .heightfield import Surface, Window
-from .indentation import Springs, stress
+from .indentation import stress
 from .motion import Sole, interpolated_poses
-from .solids import MOST_DIVISIONS, SAMPLES_ACROSS, Solid, posed, underside
+from .solid_imprint import ground_under
+from .solids import Solid, posed
 from .stance import Bed, Imprints, Stance
 from .variation import Factors
 
@@ -22,10 +23,10 @@ STRIDE = 1 / 32
 """A body that moves further than this in a step is laid out in parts of the step, in its sizes."""
 MOST_PARTS = 32
 """Parts of a step at most."""
+FIRST_REACH = 0.05
+"""Part of a body that is looked at before it is known how deep it sinks, in its sizes above its lowest point."""
 STANDSTILL = 1e-4
 """A body that moves less than this in a step, in its sizes, has no direction of travel."""
-FEWEST_DIVISIONS = 2
-"""Parts of a cell along each side, so that edges count by their covered fraction."""
 
 
 class SolidStance(Stance):
@@ -42,7 +43,7 @@ class SolidStance(Stance):
         super().__init__(character, sole)
         assert sole.solid is not None, sole.name
         self.solid: Solid = sole.solid
-        self._corners = self.solid.vertices[self.solid.triangles].reshape(-1, 3)
+        self._deepest = 0.0
 
     def _window(self, start: int, end: int, bed: Bed) -> Window:
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
@@ -117,49 +118,28 @@ class SolidStance(Stance):
         self, pose: Array, force: float, cells: Surface, material: GroundMaterial, factors: Factors | None
     ) -> _Hollow:
         """What the body presses at a pose, under a lasting force."""
-        window, size = cells.window, cells.cell_size
-        hollow = _Hollow(np.zeros((window.rows, window.columns)), np.zeros((window.rows, window.columns)), 0.0, 0.0)
-        corners = posed(self._corners, pose)
-        above = (corners[:, 2] - _ground_under(corners, cells)).reshape(-1, 3).min(axis=1)
-        deepest = material.layer_depth * (float(factors.depth.max()) if factors else 1.0) + self.solid.give
-        near = above < above.min() + deepest
-        if force <= 0 or not np.isfinite(above.min()):
-            return hollow
-        corners = corners.reshape(-1, 3, 3)[near]
-        low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
-        first = np.maximum(np.floor(low / size).astype(int) - (window.column, window.row), 0)
-        last = np.minimum(
-            np.floor(high / size).astype(int) - (window.column, window.row), (window.columns - 1, window.rows - 1)
+        shape = (cells.window.rows, cells.window.columns)
+        hollow = _Hollow(np.zeros(shape), np.zeros(shape), 0.0, 0.0)
+        deepest = material.layer_depth * (float(factors.depth.max()) if factors else 1.0)
+        reach = min(max(2 * self._deepest, FIRST_REACH * self.solid.size), deepest)
+        while True:
+            under = ground_under(self.solid, pose, cells, reach, factors) if force > 0 else None
+            if under is None:
+                return hollow
+            sinkage = under.springs.sinkage(force, material)
+            if sinkage <= reach or reach >= deepest:
+                break
+            reach = min(2 * sinkage, deepest)
+        self._deepest = sinkage
+        compression = np.zeros(under.over.shape)
+        compression[under.over] = under.springs.compression(sinkage, material)
+        covered, mean = under.by_cell(compression > 0), under.by_cell(compression)
+        hollow.coverage[under.rows, under.columns] = covered
+        hollow.compression[under.rows, under.columns] = np.divide(
+            mean, covered, out=np.zeros_like(mean), where=covered > 0
         )
-        columns, rows = (slice(int(a), int(b) + 1) for a, b in zip(first, last, strict=True))
-        across = np.sqrt(float(np.prod(np.maximum(high - low, 1e-9)))) / SAMPLES_ACROSS
-        divisions = int(np.clip(ceil(size / across), FEWEST_DIVISIONS, MOST_DIVISIONS))
-        spacing = size / divisions
-        shape = ((rows.stop - rows.start) * divisions, (columns.stop - columns.start) * divisions)
-        origin = (first + np.array([window.column, window.row])) * size + spacing / 2
-        lower = underside(corners, origin, shape, spacing)
-        clearance = lower - _finer(cells, rows, columns, divisions)
-        clearance -= clearance.min()
-        over = np.isfinite(clearance)
-        if not over.any():
-            return hollow
-        varying = (
-            [_repeated(field[rows, columns], divisions)[over] for field in (factors.stiffness, factors.depth)]
-            if factors
-            else ()
-        )
-        springs = Springs(
-            np.maximum(clearance[over] - self.solid.give, 0.0), np.full(int(over.sum()), spacing**2), *varying
-        )
-        sinkage = springs.sinkage(force, material)
-        compression = np.zeros(shape)
-        compression[over] = springs.compression(sinkage, material)
-        blocks = (rows.stop - rows.start, divisions, columns.stop - columns.start, divisions)
-        covered = (compression > 0).reshape(blocks).mean(axis=(1, 3))
-        mean = compression.reshape(blocks).mean(axis=(1, 3))
-        hollow.coverage[rows, columns] = covered
-        hollow.compression[rows, columns] = np.divide(mean, covered, out=np.zeros_like(mean), where=covered > 0)
-        return _Hollow(hollow.coverage, hollow.compression, sinkage, float((compression > 0).sum()) * spacing**2)
+        area = float((compression > 0).sum() * under.springs.area[0])
+        return _Hollow(hollow.coverage, hollow.compression, sinkage, area)
 
 
 @dataclass(frozen=True)
@@ -187,29 +167,6 @@ def _distinct(poses: Array) -> Array:
     moved = np.ones(len(poses), bool)
     moved[1:] = (np.diff(poses, axis=0) != 0).any(axis=(1, 2))
     return poses[moved]
-
-
-def _ground_under(points: Array, cells: Surface) -> Array:
-    """Height of the ground's plane in the cell under each point (Q, 3), (Q,) [m]; -inf where nothing bears."""
-    column = points[:, 0] / cells.cell_size - cells.window.column
-    row = points[:, 1] / cells.cell_size - cells.window.row
-    i = np.clip(np.floor(column).astype(int), 0, cells.window.columns - 1)
-    j = np.clip(np.floor(row).astype(int), 0, cells.window.rows - 1)
-    rise = cells.slope_x[j, i] * (column - i - 0.5) + cells.slope_y[j, i] * (row - j - 0.5)
-    return np.where(cells.bears[j, i], cells.heights[j, i] + rise * cells.cell_size, -np.inf)
-
-
-def _finer(cells: Surface, rows: slice, columns: slice, divisions: int) -> Array:
-    """Heights of the ground at samples within some cells, on each cell's plane [m]; -inf where nothing bears."""
-    within = ((np.arange(divisions) + 0.5) / divisions - 0.5) * cells.cell_size
-    heights = np.where(cells.bears, cells.heights, -np.inf)[rows, columns][:, None, :, None]
-    heights = heights + cells.slope_x[rows, columns][:, None, :, None] * within
-    heights = heights + cells.slope_y[rows, columns][:, None, :, None] * within[:, None, None]
-    return np.asarray(heights.reshape(heights.shape[0] * divisions, -1))
-
-
-def _repeated(values: Array, divisions: int) -> Array:
-    return values.repeat(divisions, axis=0).repeat(divisions, axis=1)
 
 
 def _middle(pressed: Array, cells: Surface) -> Array:

@@ -9,15 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .undersides import lowest_surface
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-SAMPLES_ACROSS = 64
-"""Samples along the side of a square as large as what may touch: areas are then known to about 1 %."""
-MOST_DIVISIONS = 64
-"""Parts of a cell along each side beyond which no finer detail is looked for."""
 FEW_VERTICES = 400
 """Meshes with fewer vertices are probed between them too: the faces of a box are larger than bumps of the ground."""
 _FLATTEST = 0.1
@@ -52,6 +47,11 @@ class Solid:
     def size(self) -> float:
         """Side of a cube of the volume of its bounding box [m]: the scale of what counts as touching."""
         return float(max(np.cbrt(self.extent.prod()), _FLATTEST * self.extent.max()))
+
+    @cached_property
+    def corners(self) -> Array:
+        """Corners of the triangles one after the other, (3·T, 3) [m]."""
+        return np.asarray(self.vertices[self.triangles].reshape(-1, 3))
 
     @cached_property
     def probes(self) -> Array:
@@ -128,20 +128,3 @@ def supports(points: Array, count: int = 64) -> Array:
 def posed(points: Array, pose: Array) -> Array:
     """Points (Q, 3) of a body in the world at a pose (4, 4) or at poses (N, 4, 4), (..., Q, 3) [m]."""
     return np.asarray(points @ np.swapaxes(pose[..., :3, :3], -1, -2) + pose[..., None, :3, 3])
-
-
-def underside(corners: Array, origin: Array, shape: tuple[int, int], spacing: float) -> Array:
-    """Height of the lowest of some triangles over each sample, (rows, columns) [m], infinite where there is none.
-
-    Parameters
-    ----------
-    corners : (T, 3, 3) float array
-        Their corners in the world [m].
-    origin : (2,) float array
-        Place of sample (0, 0) [m].
-    shape : (rows, columns)
-    spacing : float
-        Distance between samples [m].
-    """
-    vertices = corners.reshape(-1, 3)
-    return lowest_surface(vertices, np.arange(len(vertices)).reshape(-1, 3), origin, shape, spacing)

@@ -13,6 +13,9 @@ _SUPERSAMPLING = 4
 _PAIR_BLOCK = 2_000_000
 """Triangle-sample pairs handled at once, to bound memory."""
 
+_UPRIGHT = 1e-12
+"""Triangles that cover less than this are upright, in squares of the node distance."""
+
 _RELAXATIONS = 200
 """Sweeps that smooth the continuation outside; it only has to be smooth near the edge."""
 
@@ -66,10 +69,15 @@ def underside_map(
 def lowest_surface(
     vertices: Array, triangles: NDArray[np.intp], origin: Array, shape: tuple[int, int], spacing: float
 ) -> Array:
-    """Lowest z of the triangles over each node, infinite where there is none."""
+    """Lowest z of the triangles (T, 3) over each node, (rows, columns), infinite where there is none.
+
+    Upright triangles have no underside and are left out.
+    """
     rows, columns = shape
     corners = vertices[triangles]
     flat = (corners[..., :2] - origin) / spacing
+    lying = np.abs(_cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
+    corners, flat = corners[lying], flat[lying]
     first = np.clip(np.ceil(flat.min(axis=1)).astype(int), 0, (columns, rows))
     last = np.clip(np.floor(flat.max(axis=1)).astype(int), -1, (columns - 1, rows - 1))
     size = np.maximum(last - first + 1, 0)
@@ -78,7 +86,7 @@ def lowest_surface(
 
     buffer = np.full(rows * columns, np.inf)
     start = 0
-    while start < len(triangles):
+    while start < len(corners):
         done = order[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(order, done + _PAIR_BLOCK, side="right")))
         block = slice(start, stop)
@@ -104,13 +112,11 @@ def _draw(
 
     a, b, c = (flat[:, corner] for corner in range(3))
     determinant = _cross(b - a, c - a)
-    usable = np.abs(determinant) > 1e-12
-    determinant = np.where(usable, determinant, 1.0)
     offset = node - a[triangle]
     v = _cross(offset, (c - a)[triangle]) / determinant[triangle]
     w = _cross((b - a)[triangle], offset) / determinant[triangle]
     edge = 1e-9
-    covered = (v >= -edge) & (w >= -edge) & (v + w <= 1 + edge) & usable[triangle]
+    covered = (v >= -edge) & (w >= -edge) & (v + w <= 1 + edge)
     height = z[triangle, 0] + v * (z[:, 1] - z[:, 0])[triangle] + w * (z[:, 2] - z[:, 0])[triangle]
     index = node[:, 1] * columns + node[:, 0]
     np.minimum.at(buffer, index[covered], height[covered])
