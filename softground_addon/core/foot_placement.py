@@ -26,9 +26,10 @@ POINTS_ALONG = 9
 """Points along a sole at which the ground is read."""
 ALIGN_TIME = 0.05
 """Standard deviation of the smoothing of a foot's turn over time [s], for an adult."""
-STEEPEST_LIFT = 3.0
-"""A standing foot is let down no faster than this [m/s], for an adult: one that slides over the edge of an old print
-does not fall into it."""
+PIVOT_DEPTH = 0.05
+"""A foot is turned about those of its points that are this near to its lowest, in sole lengths: where it presses."""
+SLIDE_DEPTH = 0.01
+"""The same for the points whose sliding is that of the sole."""
 CLEAR_TIME = 0.10
 """Half the time over which a swinging foot is lifted over what is in its way [s], for an adult."""
 
@@ -53,11 +54,14 @@ class Placement:
         Its vertical part [m].
     sinkage : (F,) float array
         How much lower it stands than it would on the undisturbed ground, 0 where it does not touch [m].
+    room : (F,) float array
+        How far it is above the ground, 0 where it touches and infinite where there is no ground [m].
     """
 
     carry: Array
     lift: Array
     sinkage: Array
+    room: Array
 
 
 def underside(sole: Sole, edge: float = EDGE) -> list[tuple[int, Array]]:
@@ -113,11 +117,13 @@ def place_sole(
     lock: float = 0.0,
     heel_rise: Array | None = None,
     change: Array | None = None,
+    clearance: Array | None = None,
 ) -> Placement:
     """Put a sole on the ground.
 
-    While it touches, its lowest point lies on the ground, and it is turned by the ground's slope as far as the ankle
-    allows. Between contacts both change smoothly, and the sole keeps above the ground.
+    While it touches, its lowest point lies on the ground, or as far above it as is wanted, and it is turned by the
+    ground's slope as far as the ankle allows. Between contacts both change smoothly, and the sole keeps above the
+    ground.
 
     Parameters
     ----------
@@ -140,6 +146,8 @@ def place_sole(
         Angle by which the foot rolls further over its toes [rad].
     change : (F, 3) float array, optional
         Further displacement, 0 while it touches [m].
+    clearance : (F,) float array, optional
+        How far above the ground its lowest point should be while it touches [m].
 
     Returns
     -------
@@ -149,35 +157,47 @@ def place_sole(
     points = posed_points(motion)
     if not touching.any():
         carry = np.broadcast_to(np.eye(4), (len(frames), 4, 4)).copy()
-        return Placement(carry, np.zeros(len(frames)), np.zeros(len(frames)))
-    centre = points.mean(axis=1)
+        return Placement(carry, np.zeros(len(frames)), np.zeros(len(frames)), np.full(len(frames), np.inf))
+    pivot = np.einsum("fq,fqi->fi", _lowest(points, PIVOT_DEPTH), points)
     per_second = frame_rate * time_scale
-    slide = lock * slide_offset(points, touching) if lock else np.zeros_like(centre)
+    slide = lock * slide_offset(points, touching) if lock else np.zeros_like(pivot)
     turn = rotation(
         align
         * _alignment(motion, points + slide[:, None], touching, ground, undisturbed, frames, ALIGN_TIME * per_second)
     )
-    carry = displacement(turn, centre, centre + slide)
+    carry = displacement(turn, pivot, pivot + slide)
     if heel_rise is not None:
         across = (turn @ motion.transforms[:, 0, :3, 1, None])[..., 0]
         toes = carried(carry, points[:, _foremost(motion, points)])
         carry = displacement(rotation(heel_rise[:, None] * across), toes, toes) @ carry
     turned = carried(carry[:, None], points)
     needed = -lowest_clearance(turned, ground, frames)
-    steepest = STEEPEST_LIFT * time_scale / frame_rate
-    lift = _between_contacts(_let_down(np.where(np.isfinite(needed), needed, 0.0), touching, steepest), touching)
+    if clearance is not None:
+        needed = np.where(touching, needed + clearance, needed)
+    lift = _between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
     lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * per_second)))
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change
     on_top = -lowest_clearance(turned, undisturbed, frames)
     sinkage = np.maximum(np.where(touching & np.isfinite(on_top), on_top - needed, 0.0), 0.0)
-    return Placement(carry, lift, sinkage)
+    room = np.where(touching, 0.0, np.maximum(lift - needed, 0.0))
+    return Placement(carry, lift, sinkage, room)
 
 
 def _foremost(motion: SoleMotion, points: Array) -> int:
     """Which of the points (F, Q, 3) lies farthest toward the toes."""
     return int(((points[0] - motion.transforms[0, 0, :3, 3]) @ motion.transforms[0, 0, :3, 0]).argmax())
+
+
+def _lowest(points: Array, depth: float) -> Array:
+    """How much each of the points (F, Q, 3) belongs to the lowest ones, (F, Q), 1 in all.
+
+    Those count that are higher by no more than about `depth`, in lengths of the sole.
+    """
+    height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    weight = np.exp(-height / (depth * max(float(np.ptp(points[0], axis=0).max()), 1e-9)))
+    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
 
 def slide_offset(points: Array, touching: Mask) -> Array:
@@ -186,10 +206,7 @@ def slide_offset(points: Array, touching: Mask) -> Array:
     Each contact is held where it is in its middle; between contacts the correction changes smoothly.
     """
     count = len(points)
-    height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-    scale = 0.01 * max(float(np.ptp(points[0], axis=0).max()), 1e-9)
-    weight = np.exp(-height / scale)
-    weight /= weight.sum(axis=1, keepdims=True)
+    weight = _lowest(points, SLIDE_DEPTH)
     step = np.zeros((count, 3))
     step[1:] = np.einsum("fq,fqi->fi", (weight[1:] + weight[:-1]) / 2, np.diff(points, axis=0))
     step[:, 2] = 0.0
@@ -245,20 +262,12 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
     return posed
 
 
-def _let_down(values: Array, touching: Mask, steepest: float) -> Array:
-    """Values (F,) that are nowhere lower and, within a contact, fall and rise by no more than `steepest` per sample."""
-    result = values.copy()
-    for first, end in zip(*runs(touching), strict=True):
-        slope = steepest * np.arange(end - first)
-        part = values[first:end]
-        after = np.maximum.accumulate(part + slope) - slope
-        before = np.maximum.accumulate(part[::-1] + slope)[::-1] - slope[::-1]
-        result[first:end] = np.maximum(after, before)
-    return result
+def _between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> Array:
+    """Values (F,) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
 
-
-def _between_contacts(values: Array, touching: Mask) -> Array:
-    """Values (F,) of the contacts, with a cubic from the end of each to the start of the next; the ends held."""
+    With `upward`, a value that falls at the end of a contact or will rise after the start of one does not go on so
+    between them: a foot leaves its print upward and comes down on the next.
+    """
     starts, ends = runs(touching)
     result = values.copy()
     result[: starts[0]] = values[starts[0]]
@@ -267,10 +276,11 @@ def _between_contacts(values: Array, touching: Mask) -> Array:
         gap = first - last
         u = np.arange(1, gap) / gap
         a, b = values[last], values[first]
+        before = (a - values[last - 1]) * gap if last > 0 and touching[last - 1] else 0.0
+        after = (values[first + 1] - b) * gap if first + 1 < len(values) and touching[first + 1] else 0.0
         steepest = 1.5 * max(abs(b - a), 1e-3)
-        before = np.clip((a - values[last - 1]) * gap if last > 0 and touching[last - 1] else 0.0, -steepest, steepest)
-        further = first + 1 < len(values) and touching[first + 1]
-        after = np.clip((values[first + 1] - b) * gap if further else 0.0, -steepest, steepest)
+        before = np.clip(before, 0.0 if upward else -steepest, steepest)
+        after = np.clip(after, -steepest, 0.0 if upward else steepest)
         result[last + 1 : first] = a + u * (
             before + u * (3 * (b - a) - 2 * before - after + u * (2 * (a - b) + before + after))
         )

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .foot_placement import Placement
+from .knee_pace import PacedLeg, relieve
 from .legs import Leg, solve
 from .motion import CharacterMotion, SoleMotion
-from .rigid import carried, displacement, rotation
+from .rigid import carried, displacement, rotation, unit
 from .slopes import smoothed, upper_envelope
 
 Array = NDArray[np.float64]
@@ -168,21 +169,39 @@ def settle(
     crouch : (F,) float array, optional
         How much deeper the hips go by choice [m].
     """
-    count = len(motion.frames)
     tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
     legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
     ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
-    short = np.zeros(count)
+    short = np.zeros(len(motion.frames))
     for side, leg in legs.items():
         hip = carried(tilted, leg.hip) + raised
-        short = np.maximum(short, _out_of_reach(leg, hip, ankles[side]))
+        short = np.maximum(short, touching[:, placements[side][0]] * _out_of_reach(leg, hip, ankles[side]))
     reach = round(REACH_TIME * motion.frame_rate * time_scale(motion))
     raised[:, 2] -= upper_envelope(short, max(1, reach))
+    if legs:
+        relief = relieve(
+            {
+                side: PacedLeg(
+                    leg,
+                    carried(tilted, leg.hip) + raised,
+                    ankles[side],
+                    reach_of(leg),
+                    touching[:, sole],
+                    placement.room,
+                )
+                for (side, leg), (sole, placement) in zip(legs.items(), placements.values(), strict=True)
+            },
+            step=motion.time_step,
+            time_scale=time_scale(motion),
+            leg_length=motion.leg_length,
+        )
+        raised[:, 2] += relief.hips
     body = tilted.copy()
     body[:, :3, 3] += raised
     responses = {}
     for side, leg in legs.items():
-        solved = solve(leg, carried(body, leg.hip), ankles[side])
+        hip = carried(body, leg.hip)
+        solved = solve(leg, hip, ankles[side] + relief.feet[side][:, None] * unit(hip - ankles[side]))
         foot = placements[side][1].carry.copy()
         foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
         responses[side] = LegResponse(solved.thigh, solved.shank, foot)
@@ -240,10 +259,15 @@ def _hips_moved(
 
 def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:
     """How far the hip must come down for the ankle to be in reach, (F,) [m]."""
-    reach = leg.length * np.maximum(leg.extension, COMFORTABLE_REACH)
+    reach = reach_of(leg)
     level = np.linalg.norm((ankle - hip)[:, :2], axis=1)
     below = hip[:, 2] - ankle[:, 2]
     return np.asarray(np.where(below > 0, below - np.sqrt(np.maximum(reach**2 - level**2, 0.0)), 0.0).clip(min=0.0))
+
+
+def reach_of(leg: Leg) -> Array:
+    """How far an ankle may be from its hip, (F,) [m]."""
+    return leg.length * np.maximum(leg.extension, COMFORTABLE_REACH)
 
 
 def hips_of(motion: CharacterMotion) -> Array:

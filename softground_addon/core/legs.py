@@ -11,7 +11,7 @@ from .rigid import carried, displacement, rotation, turn_between, unit
 
 Array = NDArray[np.float64]
 
-_KNEE_HINT = 0.01
+_KNEE_HINT = 0.1
 """How much the direction of the foot says about that of the knee, in leg lengths of knee offset: a bent knee decides
 for itself, a straight one bends toward the toes."""
 _CLOSEST = 1e-6
@@ -45,6 +45,34 @@ class Leg:
     def extension(self) -> Array:
         """Distance from hip to ankle over the leg's length, (F,)."""
         return np.asarray(np.linalg.norm(self.ankle - self.hip, axis=-1) / np.maximum(self.length, 1e-12))
+
+    @property
+    def flexion(self) -> Array:
+        """Angle by which the knee is bent, (F,) [rad], 0 where the leg is straight."""
+        return self.flexion_at(np.linalg.norm(self.ankle - self.hip, axis=-1))[0]
+
+    def flexion_at(self, span: Array, nearly_straight: float = 0.0) -> tuple[Array, Array]:
+        """Flexion of the knee with which the ankle is so far from the hip, and how it changes with that distance.
+
+        Parameters
+        ----------
+        span : (F,) float array
+            Distance from hip to ankle [m]; the leg is straight, or folded, where it cannot be.
+        nearly_straight : float
+            The change is at least that of a knee bent by so much: it has no bound as the leg straightens [rad].
+
+        Returns
+        -------
+        flexion : (F,) float array [rad]
+        slope : (F,) float array [rad/m]
+            Negative.
+        """
+        thigh = np.linalg.norm(self.knee - self.hip, axis=-1)
+        shank = np.linalg.norm(self.ankle - self.knee, axis=-1)
+        product = np.maximum(thigh * shank, 1e-12)
+        flexion = np.arccos(np.clip((span**2 - thigh**2 - shank**2) / (2 * product), -1.0, 1.0))
+        sine = np.maximum(np.sin(flexion), max(np.sin(nearly_straight), 1e-9))
+        return flexion, -span / (product * sine)
 
 
 @dataclass(frozen=True)

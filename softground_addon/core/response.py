@@ -122,7 +122,7 @@ def respond(
         leaning = tilt.strength * _lean(motion, touching, history, tilt)
     if grounding is None:
         placements = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
-        return settle(motion, placements, touching, leaning)
+        return settle(motion, placements, np.ones_like(touching), leaning)  # feet stay where they are, in swings too
 
     def placed(side: str, heel_rise: Array | None = None, change: Array | None = None) -> tuple[int, Placement]:
         sole = feet[side]
@@ -175,7 +175,7 @@ def mean_sinkage(footprints: Sequence[Footprint], character: str) -> float:
 
 
 def _unmoved(count: int) -> Placement:
-    return Placement(np.broadcast_to(np.eye(4), (count, 4, 4)), np.zeros(count), np.zeros(count))
+    return Placement(np.broadcast_to(np.eye(4), (count, 4, 4)), np.zeros(count), np.zeros(count), np.zeros(count))
 
 
 def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt: TiltOptions) -> Array:
@@ -225,14 +225,32 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
     """The motion on the terrain that it will walk on: as it is where it was made for it, else put on it.
 
     A walk that was made for level ground and is placed on a hill or on bumps touches nothing as it is. Its contacts
-    are those with the level that it was made for; its feet are put on the terrain, and hips and legs follow.
+    are those with the level that it was made for; its feet keep the heights above the terrain that they had above the
+    level, and hips and legs follow.
     """
     level = _level_of(motion)
     if level is None or not _fits_better(motion, level, terrain):
         return motion
-    touching = detect_contacts(motion, FlatTerrain(level)).touching
-    response = respond(motion, touching, terrain, (), tilt=None, grounding=GroundingOptions())
-    return responding(motion, response)
+    made_for = detect_contacts(motion, FlatTerrain(level))
+    ground = GroundHistory(terrain)
+    placements = {}
+    for side, sole in leg_soles(motion).items():
+        as_made = np.maximum(made_for.clearance[:, sole], 0.0)
+        placements[side] = (
+            sole,
+            place_sole(
+                motion.soles[sole],
+                made_for.touching[:, sole],
+                ground,
+                ground,
+                motion.frames,
+                frame_rate=motion.frame_rate,
+                time_scale=time_scale(motion),
+                clearance=np.where(np.isfinite(as_made), as_made, 0.0),
+            ),
+        )
+    level_body = np.zeros((len(motion.frames), 2))
+    return responding(motion, settle(motion, placements, made_for.touching, level_body))
 
 
 _LEVEL = 0.005

@@ -12,6 +12,8 @@ from softground_addon.blender.compat import action_curves
 from softground_addon.blender.rig_sampling import sample_character_now
 from softground_addon.core.foot_placement import lowest_clearance, posed_points
 from softground_addon.core.ground_history import GroundHistory
+from softground_addon.core.grounding import leg_soles
+from softground_addon.core.legs import Leg
 from softground_addon.core.motion import SoleMotion
 from tests.blender import rigs
 
@@ -191,16 +193,35 @@ def gaps_on_the_rig(scene, result, terrain, character=None):
     return np.concatenate(found)
 
 
-def knee_angles(scene, character=None):
-    """Flexion of each knee over time [degrees], (F, sides), in the user's scene."""
+def legs(scene, character=None):
+    """Both legs over time as the user's scene shows them [m]: a list of `Leg`."""
     character = character or scene.softground.characters[0]
     joints = dict(mapping_of(character).joints)
     frames = range(scene.softground.frame_start, scene.softground.frame_end + 1)
-    angles = []
-    for side in "lr":
+    motion = source_motion(scene, character)
+    found = []
+    for side, sole in leg_soles(motion).items():
         bones = [joints[f"{joint}_{side}"][0] for joint in ("hip", "knee", "ankle")]
-        points = world_matrices(scene, character.armature, bones, list(frames))[..., :3, 3]
-        thigh, shank = points[:, 1] - points[:, 0], points[:, 2] - points[:, 1]
-        cosine = np.sum(thigh * shank, axis=1) / np.linalg.norm(thigh, axis=1) / np.linalg.norm(shank, axis=1)
-        angles.append(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
-    return np.stack(angles, axis=1)
+        hip, knee, ankle = np.moveaxis(world_matrices(scene, character.armature, bones, frames)[..., :3, 3], 1, 0)
+        found.append(Leg(hip, knee, ankle, motion.soles[sole].transforms[:, 0, :3, 0]))
+    return found
+
+
+def knee_turn(legs, rate):
+    """The most that any knee turns within a frame at 30 fps [degrees]."""
+    window = max(1, round(rate / 30))
+    scale = rate / window / 30
+    angles = np.degrees([leg.flexion for leg in legs])
+    return scale * np.abs(angles[:, window:] - angles[:, :-window]).max()
+
+
+def knee_direction(leg):
+    """Where the knee lies off the line from hip to ankle, (F, 3) [m]."""
+    axis = (leg.ankle - leg.hip) / np.linalg.norm(leg.ankle - leg.hip, axis=1, keepdims=True)
+    offset = leg.knee - leg.hip
+    return offset - np.sum(offset * axis, axis=1, keepdims=True) * axis
+
+
+def knee_angles(scene, character=None):
+    """Flexion of each knee over time [degrees], (F, sides), in the user's scene."""
+    return np.degrees(np.stack([leg.flexion for leg in legs(scene, character)], axis=1))

@@ -78,6 +78,15 @@ def test_a_slightly_overstretched_source_does_not_make_the_knee_flip():
     assert (knee[:, 0] > 0).all()
 
 
+@pytest.mark.parametrize("overstretched", [-3.0, -7.0, -12.0])
+def test_a_knee_that_the_source_overstretches_bends_forward(overstretched):
+    """Captured knees are straight to a few degrees, now to this side and now to that; a leg bent by 60° must not be."""
+    leg = bent_leg(np.radians([overstretched, 1.0, -1.0, overstretched]), count=4)
+    hip, knee, ankle = solved_joints(leg, solve(leg, leg.hip, leg.ankle * 0.85))
+    assert (flexion_of(hip, knee, ankle) > np.radians(50)).all()
+    assert (knee[:, 0] > 0.15).all()
+
+
 @settings(max_examples=30)
 @given(vectors, vectors)
 def test_the_same_body_moved_as_a_whole_keeps_its_pose(shift, turn):
