@@ -88,8 +88,7 @@ def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
     for walker in built.walkers:
-        for child in walker.children:
-            child.hide_render = True  # their long shadows would fall on the prints
+        stage.hide(walker)
     light(scene, close_up_of(built.bakes["Snow"].footprints))
     camera = stage.add_camera(scene, "Close-up", lens=50.0)
     pictures = []

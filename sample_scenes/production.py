@@ -26,7 +26,7 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import baked_ground, settings
+from softground_addon.blender import bake_job, baked_ground, jobs, settings
 from softground_addon.core.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")
@@ -81,17 +81,22 @@ class Bake:
 
     Attributes
     ----------
-    ground : bpy.types.Object
-        What the user chose as the ground.
+    ground : bpy.types.Object or None
+        The scene's ground; None where nothing was written.
     footprints : tuple of Footprint
         In the order of their first contact.
-    poisson_ratio, layer_depth : float
-        Of its material; [m].
+    report : dict
+        See `core.report`.
+    rim_share : (float, float)
+        Least and largest part of the compressed volume that rises as a rim: 2·nu, times what is painted.
+    layer_depth : float
+        [m].
     """
 
-    ground: bpy.types.Object
+    ground: bpy.types.Object | None
     footprints: tuple[Footprint, ...]
-    poisson_ratio: float
+    report: Mapping[str, Any]
+    rim_share: tuple[float, float]
     layer_depth: float
 
     @property
@@ -124,8 +129,12 @@ def bake(
     *,
     ground: bpy.types.Object | None = None,
     options: Options | None = None,
+    write: bool = True,
 ) -> Bake:
-    """Bake walkers into a ground as a user does it in the panel; without a ground, one is made that fits the walk."""
+    """Bake walkers into a ground as a user does it in the panel; without a ground, one is made that fits the walk.
+
+    Without writing, the prints are computed and the ground stays as it is.
+    """
     shot = scene.softground
     shot.ground = ground
     shot.characters.clear()
@@ -137,10 +146,22 @@ def bake(
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)
-    if ground is None:
+    if ground is None and write:
         bpy.ops.softground.create_ground()
-    bpy.ops.softground.bake()
-    return result_of(scene)
+    result = jobs.run(bake_job.bake(scene, write=write))
+    displaced = 2 * shot.material.poisson_ratio * _painted_range(shot.ground, shot.painted.rim)
+    share = float(np.clip(displaced[0], 0, 1)), float(np.clip(displaced[1], 0, 1))
+    return Bake(shot.ground, result.footprints, result.report, share, shot.material.layer_depth)
+
+
+def _painted_range(ground: bpy.types.Object | None, name: str) -> np.ndarray:
+    """Smallest and largest factor that is painted on a ground; 1 where nothing is."""
+    attribute = ground.data.attributes.get(name) if ground else None
+    if attribute is None:
+        return np.ones(2)
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return np.array((values.min(), values.max()))
 
 
 def make_active(thing: bpy.types.Object) -> None:
@@ -157,30 +178,19 @@ def remove_character(armature: bpy.types.Object) -> None:
         bpy.data.objects.remove(thing)
 
 
-def result_of(scene: bpy.types.Scene) -> Bake:
-    """The bake that is on the scene's ground."""
-    shot = scene.softground
-    footprints, _ = baked_ground.load(shot.ground)
-    return Bake(shot.ground, tuple(footprints), shot.material.poisson_ratio, shot.material.layer_depth)
-
-
 def invariants(bake: Bake) -> list[Claim]:
     """What holds on every ground, whatever is switched on."""
     ground = recompose(bake.footprints)
     compressed, raised = ground.volumes()
     placed = raised + sum(step.unplaced_rim_m3 for step in bake.footprints)
+    low, high = (share * compressed for share in bake.rim_share)
     smallest = min((int(step.compression.amounts.min(initial=0)) for step in bake.footprints), default=0)
     deepest = max((float(tile[0].max()) for tile in ground.tiles.values()), default=0.0)
     return [
-        Claim("Rim volume over 2·nu times the compressed volume", _share(placed, bake, compressed), 1 - 1e-6, 1 + 1e-6),
+        Claim("Volume of the rims [m³]", placed, low * (1 - 1e-6), high * (1 + 1e-6)),
         Claim("Smallest change of compression [nm]", float(smallest), 0, np.inf),
         Claim("Deepest compression over the layer's depth", deepest / bake.layer_depth, 0, 1 + 1e-6),
     ]
-
-
-def _share(raised: float, bake: Bake, compressed: float) -> float:
-    displaced = 2 * bake.poisson_ratio * compressed
-    return raised / displaced if displaced else 1.0
 
 
 def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
@@ -203,6 +213,7 @@ def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
             stage.set_up_rendering(bpy.context.scene)
             pictures = module.shoot(built, folder.resolve(), options.samples)
         blend = folder / f"{name}.blend"
+        bpy.context.preferences.filepaths.save_version = 0  # no backup beside it
         bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()), compress=True)
     for path in (blend, *pictures):
         print(path)

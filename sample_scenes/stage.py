@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import atan2, cos, pi, radians, sin
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -40,7 +41,7 @@ def set_up_rendering(scene: bpy.types.Scene) -> None:
     scene.cycles.max_bounces = 4
     scene.render.use_persistent_data = True
     scene.view_settings.look = "AgX - Medium High Contrast"
-    scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.quality = 90
 
 
 def add_sun(scene: bpy.types.Scene, toward: float, elevation: float = SUN_ELEVATION) -> None:
@@ -141,6 +142,52 @@ def plain_material(name: str, colour: tuple[float, float, float], roughness: flo
     return material
 
 
+def add_arrow(
+    start: ArrayLike, end: ArrayLike, material: bpy.types.Material, collection: bpy.types.Collection
+) -> bpy.types.Object:
+    """An arrow of a round shaft and a cone, its point at `end`."""
+    way = Vector(end) - Vector(start)
+    length, radius, head = way.length, 0.012, min(0.08, 0.5 * way.length)
+    profile = [(0.0, 0.0), (radius, 0.0), (radius, length - head), (2.6 * radius, length - head), (0.0, length)]
+    around = np.linspace(0.0, 2 * pi, 16, endpoint=False)
+    vertices = [(r * cos(a), r * sin(a), z) for r, z in profile for a in around]
+    quads = [
+        (16 * ring + i, 16 * ring + (i + 1) % 16, 16 * (ring + 1) + (i + 1) % 16, 16 * (ring + 1) + i)
+        for ring in range(len(profile) - 1)
+        for i in range(16)
+    ]
+    mesh = bpy.data.meshes.new("Arrow")
+    mesh.from_pydata(vertices, [], quads)
+    mesh.materials.append(material)
+    arrow = bpy.data.objects.new("Arrow", mesh)
+    arrow.location = Vector(start)
+    arrow.rotation_euler = way.to_track_quat("Z", "Y").to_euler()
+    collection.objects.link(arrow)
+    return arrow
+
+
+def freeze(armature: bpy.types.Object, frames: Iterable[int], collection: bpy.types.Collection) -> list[Any]:
+    """Copies of a character's figure as it stands at some frames; the figure itself is left out of pictures."""
+    scene, copies = bpy.context.scene, []
+    for frame in frames:
+        scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        for figure in (child for child in armature.children if child.type == "MESH"):
+            mesh = bpy.data.meshes.new_from_object(figure.evaluated_get(graph), depsgraph=graph)
+            copy = bpy.data.objects.new(f"{figure.name} {frame}", mesh)
+            copy.matrix_world = figure.matrix_world
+            collection.objects.link(copy)
+            copies.append(copy)
+    hide(armature)
+    return copies
+
+
+def hide(armature: bpy.types.Object) -> None:
+    """Leave a character's figure out of pictures: its long shadow would fall on the prints."""
+    for figure in armature.children:
+        figure.hide_render = True
+
+
 def add_camera(scene: bpy.types.Scene, name: str, lens: float) -> bpy.types.Object:
     """A camera, focal length in mm for a sensor of 36 mm."""
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
@@ -179,6 +226,7 @@ def render(scene: bpy.types.Scene, camera: bpy.types.Object, path: Path, size: t
     scene.cycles.samples = samples
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "JPEG" if path.suffix == ".jpg" else "PNG"
     scene.render.filepath = str(path)
     with _quiet():
         bpy.ops.render.render(write_still=True)
