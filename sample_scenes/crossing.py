@@ -108,7 +108,7 @@ def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
     camera = stage.add_camera(scene, "Crossing", lens=40.0)
     bake = built.bakes["Snow"]
     middle = np.mean([step.position for step in bake.footprints], axis=0)
-    stage.aim(camera, middle + np.array((3.6, 1.6, 2.6)), middle + np.array((0.0, -0.2, 0.35)))
+    stage.aim(camera, middle + np.array((2.2, 3.9, 2.5)), middle + np.array((-0.15, -0.35, 0.25)))
     low, _ = stage.bounds([bake.carrier])
     stage.add_floor(low[2] - 0.02, scene.collection)
     path = folder / "crossing.jpg"

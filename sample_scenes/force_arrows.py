@@ -86,23 +86,35 @@ def shoot(built: ForceArrows, folder: Path, samples: int) -> list[Path]:
     """The walker at several moments in one picture, with the arrows of each."""
     scene = bpy.context.scene
     materials = {kind: _glowing(f"SoftGround Sample {kind}", colour) for kind, colour in COLOURS.items()}
-    frames = moments(built.loads)[:5]
+    frames = moments(built.loads)[::3]  # a metre apart
     for frame in frames:
         for arrow in overlay_shapes.arrows([built.loads], frame):
             stage.add_arrow(arrow.start, arrow.end, materials[arrow.kind], scene.collection)
     copies = stage.freeze(built.walker, frames, scene.collection)
+    ghost = _ghost()
+    for copy in copies:
+        copy.data.materials.clear()
+        copy.data.materials.append(ghost)
     heading = built.bakes["Soil"].footprints[0].heading
     stage.add_sun(scene, heading + radians(140), radians(28))
-    stage.add_floor(-0.02, scene.collection)
+    stage.add_floor(-0.05, scene.collection)
     camera = stage.add_camera(scene, "Side", lens=60.0)
     low, high = stage.bounds(copies)
     corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    toward = heading + radians(65)
+    toward = heading + radians(60)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     stage.frame_points(camera, corners, (cos(toward), sin(toward), -0.20))
     path = folder / "force_arrows.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]
+
+
+def _ghost() -> bpy.types.Material:
+    """Figures that let the arrows through."""
+    material = stage.plain_material("SoftGround Sample ghost", (0.55, 0.55, 0.58), 0.7)
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Alpha"].default_value = 0.35
+    return material
 
 
 def _glowing(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:

@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -69,10 +69,13 @@ class Walker:
     armature : bpy.types.Object
     mass : float
         [kg].
+    shoes : mapping
+        Objects that print in place of the feet, by "L" and "R".
     """
 
     armature: bpy.types.Object
     mass: float
+    shoes: Mapping[str, bpy.types.Object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,8 @@ def bake(
         make_active(walker.armature)
         bpy.ops.softground.add_character()
         shot.characters[-1].mass = walker.mass
+        for sole in shot.characters[-1].soles:
+            sole.object = walker.shoes.get(sole.side[:1])
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)

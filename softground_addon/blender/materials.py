@@ -10,12 +10,16 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import bpy
+import numpy as np
 
 from ..core.errors import InputError
 from .ground_mesh import COMPRESSION, RIM
 
 MARK = "softground_surface"
 """Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
+
+BLEND = "softground_blend"
+"""Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
 Colour = tuple[float, float, float]
 
@@ -153,39 +157,77 @@ def ensure_material(surface: str) -> bpy.types.Material:
     InputError
         If there is no such surface.
     """
+    name = surface.replace("_", " ").title()
+    return _material(surface, name, (surface,), lambda graph: _shaded(graph, _looks(surface)[0](graph, _ground(graph))))
+
+
+def ensure_blend(surface: str, other: str) -> bpy.types.Material:
+    """A material that passes from one surface to another where the attribute `BLEND` of the mesh goes from 0 to 1.
+
+    Raises
+    ------
+    InputError
+        If there is no such surface.
+    """
+
+    def build(graph: Graph) -> tuple[Socket, Socket]:
+        ground = _ground(graph)
+        shaders, reliefs = zip(
+            *(_shaded(graph, _looks(name)[0](graph, ground)) for name in (surface, other)), strict=True
+        )
+        drift = graph.noise(ground.place, 0.35, 4.0, 0.6) * 0.5  # no border is drawn with a ruler
+        factor = graph.ramp(graph.attribute(BLEND) + drift, 0.70, 0.80)
+        mixed = graph.node("ShaderNodeMixShader", {0: factor, 1: shaders[0], 2: shaders[1]})
+        return graph.out(mixed), graph.blend(factor, *reliefs)
+
+    name = " to ".join(one.replace("_", " ").title() for one in (surface, other))
+    return _material(f"{surface} {other}", name, (surface, other), build)
+
+
+def _looks(surface: str) -> tuple[Callable[[Graph, Ground], Look], Colour]:
     if surface not in _SURFACES:
         raise InputError(f"There is no surface '{surface}': choose one of {', '.join(_SURFACES)}.")
+    return _SURFACES[surface]
+
+
+def _material(
+    mark: str, name: str, surfaces: tuple[str, ...], build: Callable[[Graph], tuple[Socket, Socket]]
+) -> bpy.types.Material:
+    """The material of that mark, or a new one: its nodes from `build`, which gives its shader and its relief [m]."""
+    preview = np.mean([_looks(surface)[1] for surface in surfaces], axis=0)
     for material in bpy.data.materials:
-        if material.get(MARK) == surface and material.library is None:
+        if material.get(MARK) == mark and material.library is None:
             return material
-    material = bpy.data.materials.new(f"SoftGround {surface.replace('_', ' ').title()}")
-    material[MARK] = surface
-    look_of, preview = _SURFACES[surface]
-    material.diffuse_color = (*preview, 1.0)
+    material = bpy.data.materials.new(f"SoftGround {name}")
+    material[MARK] = mark
+    material.diffuse_color = (*preview.tolist(), 1.0)
     if material.node_tree is None:  # 5.x makes the tree with the material and warns of the switch
         material.use_nodes = True
     tree = cast("bpy.types.NodeTree", material.node_tree)
     tree.nodes.clear()
-    _build(Graph(tree), look_of)
+    graph = Graph(tree)
+    shader, height = build(graph)
+    # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
+    relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Displacement": graph.out(relief)})
     return material
 
 
-def _build(graph: Graph, look_of: Callable[[Graph, Ground], Look]) -> None:
-    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+def _ground(graph: Graph) -> Ground:
     compression = graph.attribute(COMPRESSION)
-    ground = Ground(
-        place=place,
+    return Ground(
+        place=graph.out(graph.node("ShaderNodeNewGeometry")),
         pressed=graph.ramp(compression, 0.0004, 0.004),
         deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
     )
-    look = look_of(graph, ground)
+
+
+def _shaded(graph: Graph, look: Look) -> tuple[Socket, Socket]:
+    """Shader and relief [m] of a look."""
     # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
     shader = graph.node("ShaderNodeBsdfPrincipled", look.inputs, subsurface_method="BURLEY")
-    # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
-    relief = graph.node("ShaderNodeDisplacement", {"Height": look.relief, "Midlevel": 0.0, "Scale": 1.0})
-    outputs = {"Surface": graph.out(shader), "Displacement": graph.out(relief)}
-    graph.node("ShaderNodeOutputMaterial", outputs)
+    return graph.out(shader), look.relief
 
 
 def _snow(graph: Graph, ground: Ground) -> Look:

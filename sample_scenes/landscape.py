@@ -1,0 +1,181 @@
+"""Fig. 4, a landscape: snow turns to sand behind a hill, and five characters cross it, each in their own way.
+
+One walks, one runs over the hill, one is on snowshoes, a heavy one with large feet leaves a trail, a light one with
+tiny feet leaves hardly anything. Snow and sand are one mesh: stiffness, rim and look are painted on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from sample_scenes import production, stage, terrain
+from sample_scenes.body import Body, Foot
+from sample_scenes.character import create_character
+from sample_scenes.course import Course
+from sample_scenes.gait import Gait, walk
+from sample_scenes.keys import write_action
+from sample_scenes.motion import BodyMotion
+from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.run import Run, run
+from sample_scenes.snowshoe import ON_SNOWSHOES, put_on_snowshoes
+from softground_addon.blender.materials import BLEND, ensure_blend
+from softground_addon.core.footprints import Footprint
+
+CELL_SIZE = 0.01  # m
+FRAMES = 116
+SPACING = 0.06  # m between the vertices of the landscape; along the tracks the bake makes it finer
+LOW, HIGH = np.array((-3.4, -8.0)), np.array((4.2, 1.4))  # m
+BORDER = -3.6  # m; snow before it, sand beyond
+PICTURE = (1024, 576)
+
+SAND_STIFFNESS = 6.0  # times that of snow: 2.25 MPa over 0.375 (the paper, Table 1)
+SAND_RIM = 10.0  # Poisson's ratio 0.5 over 0.05
+
+HILL_HEIGHT, HILL_WIDTH = 0.45, 0.85  # m
+HILL = np.array((1.1, -1.6))
+
+LANES = {"walker": -0.3, "runner": 1.1, "snowshoes": -1.4, "heavy": -2.5, "light": 2.7}
+"""Across the way, where each goes [m]."""
+STARTS = {"walker": 0.3, "runner": 0.9, "snowshoes": -0.7, "heavy": -1.9, "light": -1.0}
+"""Along the way, where each starts [m]; all go toward -y."""
+
+_WALKER = Body()
+_HEAVY = Body(stature=2.05, mass=230.0, foot=Foot(0.48, 0.20), girth=1.6)
+_LIGHT = Body(stature=1.05, mass=9.0, foot=Foot(0.13, 0.055))
+
+
+@dataclass(frozen=True)
+class Landscape:
+    """One ground with five tracks."""
+
+    bakes: dict[str, Bake]
+    walkers: dict[str, bpy.types.Object]
+
+
+def height(x: terrain.Array, y: terrain.Array) -> terrain.Array:
+    """A hill in the snow [m]."""
+    away = ((x - HILL[0]) ** 2 + (y - HILL[1]) ** 2) / HILL_WIDTH**2
+    return HILL_HEIGHT * np.exp(-away)
+
+
+def sand(_x: terrain.Array, y: terrain.Array) -> terrain.Array:
+    """0 in the snow, 1 in the sand, with a hand's breadth between."""
+    return np.clip(0.5 + (BORDER - y) / 0.12, 0.0, 1.0)
+
+
+def motions(rate: float) -> dict[str, tuple[Body, BodyMotion]]:
+    """Who goes how, in their own frames: x ahead is -y of the landscape."""
+    lane, start = LANES["runner"], STARTS["runner"]
+    course = Course(heights=lambda ahead, left: height(lane + left, start - ahead))
+    return {
+        "walker": (_WALKER, walk(_WALKER, Gait(), FRAMES, rate)),
+        "runner": (_WALKER, run(_WALKER, Run(speed=2.8), round(2.8 * rate), rate, course=course)),
+        "snowshoes": (_WALKER, walk(_WALKER, ON_SNOWSHOES, FRAMES, rate)),
+        "heavy": (_HEAVY, walk(_HEAVY, Gait(speed=0.55, step_width=0.10), FRAMES, rate)),
+        "light": (_LIGHT, walk(_LIGHT, Gait(speed=0.8), FRAMES, rate)),
+    }
+
+
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Landscape:
+    """Ground, characters, one bake."""
+    painted = {
+        "softground_stiffness": lambda x, y: 1 + (SAND_STIFFNESS - 1) * sand(x, y),
+        "softground_rim_factor": lambda x, y: 1 + (SAND_RIM - 1) * sand(x, y),
+        BLEND: sand,
+    }
+    x, y = (terrain.spaced(LOW[axis], HIGH[axis], SPACING) for axis in (0, 1))
+    ground = terrain.add_terrain("Landscape", x, y, height, "snow", scene.collection, painted)
+    ground.data.materials[0] = ensure_blend("snow", "sand")
+    scene.frame_start, scene.frame_end = 1, FRAMES
+    walkers, bodies = {}, {}
+    for name, (body, motion) in motions(scene.render.fps).items():
+        walkers[name] = create_character(name.title(), body, scene.collection)
+        walkers[name].location = (LANES[name], STARTS[name], 0.0)
+        write_action(walkers[name], motion, name.title())
+        bodies[name] = body
+    shoes = put_on_snowshoes(walkers["snowshoes"], _WALKER, scene.collection)
+    options = {"shape_keys": "false", "detail": "ALWAYS"} | dict(options or {})
+    bake = production.bake(
+        scene,
+        [Walker(walkers[name], bodies[name].mass, shoes if name == "snowshoes" else {}) for name in walkers],
+        "Snow",
+        cell_size,
+        ground=ground,
+        options=options,
+    )
+    return Landscape({"landscape": bake}, walkers)
+
+
+def depth(steps: list[Footprint]) -> float:
+    """Mean depth of whole prints [m]."""
+    largest = max(step.area_m2 for step in steps)
+    return float(np.mean([s.compressed_m3 / s.area_m2 for s in steps if s.area_m2 > 0.8 * largest]))
+
+
+def claims(built: Landscape) -> list[Claim]:
+    """What mass, soles, speed and ground do to the prints."""
+    bake = built.bakes["landscape"]
+    tracks = {name: bake.of(walker.name) for name, walker in built.walkers.items()}
+    snow = {name: [s for s in steps if s.position[1] > BORDER + 0.35] for name, steps in tracks.items()}
+    beyond = {name: [s for s in steps if s.position[1] < BORDER - 0.35] for name, steps in tracks.items()}
+    area = {name: max(step.area_m2 for step in steps) for name, steps in snow.items()}
+    ratio = depth(snow["walker"]) / depth(snow["snowshoes"])
+    return [
+        Claim(
+            "A walker's prints in snow over those in sand, in depth",
+            depth(snow["walker"]) / depth(beyond["walker"]),
+            4.5,
+            7.5,
+        ),
+        Claim(
+            "Prints of running over those of walking, in depth", depth(snow["runner"]) / depth(snow["walker"]), 1.1, 2.5
+        ),
+        Claim(
+            "Depth without snowshoes over depth with them, relative to the areas",
+            ratio * area["walker"] / area["snowshoes"],
+            0.8,
+            1.2,
+        ),
+        Claim("Area of a snowshoe over that of a shoe", area["snowshoes"] / area["walker"], 3.0, 7.0),
+        Claim("Part of the heavy one's way that is trodden", covered(tracks["heavy"]), 0.98, 1.0),
+        Claim("Part of the walker's way that is trodden", covered(tracks["walker"]), 0.2, 0.75),
+        Claim("Heavy prints over the walker's, in depth", depth(snow["heavy"]) / depth(snow["walker"]), 1.0, 4.0),
+        Claim("Light prints over the walker's, in volume", _volume(snow["light"]) / _volume(snow["walker"]), 0.0, 0.15),
+    ]
+
+
+def _volume(steps: list[Footprint]) -> float:
+    return float(np.mean([step.compressed_m3 for step in steps]))
+
+
+def covered(steps: tuple[Footprint, ...]) -> float:
+    """Part of a way along y, from the middle of its first print to that of its last, on which something was trodden."""
+    size = steps[0].cell_size
+    rows: set[int] = set()
+    for step in steps:
+        rows |= set((step.contact_cells // step.window.columns + step.window.row).tolist())
+    ends = [step.position[1] / size for step in (steps[0], steps[-1])]
+    way = np.arange(int(min(ends)), int(max(ends)) + 1)
+    return float(np.isin(way, sorted(rows)).mean())
+
+
+def shoot(_built: Landscape, folder: Path, samples: int) -> list[Path]:
+    """All of it from above the border, at the end."""
+    scene = bpy.context.scene
+    scene.frame_set(scene.frame_end)
+    stage.add_sun(scene, radians(-20), radians(17))
+    scene.view_settings.exposure = -0.4
+    camera = stage.add_camera(scene, "Landscape", lens=36.0)
+    stage.aim(camera, (-4.6, -8.6, 3.6), (0.5, -2.9, 0.35))
+    path = folder / "landscape.jpg"
+    stage.render(scene, camera, path, PICTURE, samples)
+    return [path]
+
+
+if __name__ == "__main__":
+    production.main(__name__)
