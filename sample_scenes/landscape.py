@@ -45,7 +45,7 @@ STARTS = {"walker": 0.3, "runner": 0.9, "snowshoes": -0.7, "heavy": -1.9, "light
 """Along the way, where each starts [m]; all go toward -y."""
 
 _WALKER = Body()
-_HEAVY = Body(stature=2.05, mass=230.0, foot=Foot(0.48, 0.20), girth=1.6)
+_HEAVY = Body(stature=2.05, mass=230.0, foot=Foot(0.48, 0.20))
 _LIGHT = Body(stature=1.05, mass=9.0, foot=Foot(0.13, 0.055))
 
 
