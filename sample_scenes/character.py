@@ -1,14 +1,17 @@
-"""A walking person in Blender: an armature, one weighted mesh, simple materials."""
+"""A person or a dog in Blender: an armature, one weighted mesh, simple materials."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
 
-from sample_scenes.body import BONES, Body
+from sample_scenes.body import Body
+from sample_scenes.dog import Dog
+from sample_scenes.dog_figure import hound
 from sample_scenes.figure import PARTS, hiker
+from sample_scenes.motion import Skeleton
 from sample_scenes.stage import plain_material
 
 TO_BLENDER = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
@@ -21,38 +24,41 @@ _LOOKS = {
     "cap": ((0.60, 0.34, 0.06), 0.90),
     "shoe": ((0.12, 0.065, 0.035), 0.55),
     "sole": ((0.34, 0.31, 0.26), 0.70),
+    "coat": ((0.20, 0.11, 0.05), 0.85),
+    "dark": ((0.012, 0.010, 0.009), 0.45),
 }
 """Base colour (linear) and roughness of each part."""
 
 
-def create_character(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
-    """A person in rest pose at the origin, facing -Y.
+def create_character(name: str, body: Body | Dog, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A person or a dog in rest pose at the origin, facing -Y.
 
     Returns
     -------
     The armature object; its mesh child is named `name` + " Figure".
     """
     armature = create_armature(name, body, collection)
-    figure = hiker(body)
+    figure = hound(body) if isinstance(body, Dog) else hiker(body)
     mesh = bpy.data.meshes.new(f"{name} Figure")
     faces = [quad[:3] if quad[2] == quad[3] else quad for quad in figure.quads.tolist()]
     mesh.from_pydata((figure.vertices @ TO_BLENDER.T).tolist(), [], faces)
-    for part in PARTS:
-        mesh.materials.append(_material(part))
-    mesh.polygons.foreach_set("material_index", figure.parts.astype(np.int32))
+    used, slots = np.unique(figure.parts, return_inverse=True)
+    for part in used:
+        mesh.materials.append(_material(PARTS[part]))
+    mesh.polygons.foreach_set("material_index", slots.astype(np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(figure.parts), dtype=bool))
     mesh.update()
 
     skin = bpy.data.objects.new(mesh.name, mesh)
     collection.objects.link(skin)
     skin.parent = armature
-    _assign_weights(skin, figure.weights)
+    _assign_weights(skin, list(body.bones), figure.weights)
     skin.modifiers.new("Armature", "ARMATURE").object = armature
     return armature
 
 
-def create_armature(name: str, body: Body, collection: bpy.types.Collection) -> bpy.types.Object:
-    """The bones of `BONES` in rest pose at the origin, facing -Y."""
+def create_armature(name: str, body: Skeleton, collection: bpy.types.Collection) -> bpy.types.Object:
+    """The bones of a body in rest pose at the origin, facing -Y."""
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     collection.objects.link(armature)
     view_layer = bpy.context.view_layer
@@ -61,12 +67,12 @@ def create_armature(name: str, body: Body, collection: bpy.types.Collection) -> 
     bpy.ops.object.mode_set(mode="EDIT")
     try:
         edit_bones = armature.data.edit_bones
-        for bone, (head, tail, parent) in BONES.items():
+        for bone, (head, tail, parent) in body.bones.items():
             edit_bone = edit_bones.new(bone)
             edit_bone.head, edit_bone.tail = TO_BLENDER @ body.joints[head], TO_BLENDER @ body.joints[tail]
             if parent:
                 edit_bone.parent = edit_bones[parent]
-                edit_bone.use_connect = bool(np.allclose(body.joints[head], body.joints[BONES[parent][1]]))
+                edit_bone.use_connect = bool(np.allclose(body.joints[head], body.joints[body.bones[parent][1]]))
     finally:
         bpy.ops.object.mode_set(mode="OBJECT")
         view_layer.objects.active = previous
@@ -93,7 +99,7 @@ def _meshes(armature: bpy.types.Object) -> Iterable[bpy.types.Object]:
     return [child for child in armature.children if child.type == "MESH"]
 
 
-def _assign_weights(skin: bpy.types.Object, weights: np.ndarray) -> None:
+def _assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.ndarray) -> None:
     """Write weights bone by bone, small ones dropped; equal values go in one call, on a grid of 1/500."""
     steps = 500
     kept = np.round(
@@ -101,7 +107,7 @@ def _assign_weights(skin: bpy.types.Object, weights: np.ndarray) -> None:
     )
     strongest = kept.argmax(axis=1)
     kept[np.arange(len(kept)), strongest] += steps - kept.sum(axis=1)
-    for column, bone in enumerate(BONES):
+    for column, bone in enumerate(bones):
         group = skin.vertex_groups.new(name=bone)
         for level in np.unique(kept[:, column]):
             if level > 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -9,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sample_scenes.body import BONES, SIDES, Array, Body
+from sample_scenes.motion import Skeleton
 from sample_scenes.shoe import shoe_mesh
 from sample_scenes.solids import Solid, cut, ellipsoid, mesh_of, round_cone, union
 
-PARTS = ("skin", "jacket", "trousers", "cap", "shoe", "sole")
+PARTS = ("skin", "jacket", "trousers", "cap", "shoe", "sole", "coat", "dark")
 """What the faces belong to, in the order of `Figure.parts`."""
 
 _FALLOFF = 6.0
@@ -32,7 +34,7 @@ class Figure:
     parts : (Q,) int array
         Index into `PARTS`.
     weights : (V, B) float array
-        Share of each bone of `BONES`; rows sum to 1.
+        Share of each of the body's bones; rows sum to 1.
     """
 
     vertices: Array
@@ -41,13 +43,24 @@ class Figure:
     weights: Array
 
 
+Piece = tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]
+"""Vertices, quads, parts and weights of a closed piece, as in `Figure`."""
+
+
 @cache
 def hiker(body: Body) -> Figure:
     """A dressed figure of the given proportions."""
-    pieces = [_garment(body, *piece) for piece in (_head(body), _cap(body), _jacket(body), _trousers(body))]
-    for side in SIDES:
-        pieces.append(_garment(body, *_hand(body, side)))
-        pieces.append(_shoe(body, side))
+    garments = [_head(body), _cap(body), _jacket(body), _trousers(body), *(_hand(body, side) for side in SIDES)]
+    size = body.stature / 1.78
+    pieces = [
+        surface(body, part, solid, low, high, spacing * size, bones)
+        for part, solid, low, high, spacing, bones in garments
+    ]
+    return joined([*pieces, *(_shoe(body, side) for side in SIDES)])
+
+
+def joined(pieces: Sequence[Piece]) -> Figure:
+    """Several closed pieces as one figure."""
     offsets = np.cumsum([0] + [len(vertices) for vertices, *_ in pieces])
     return Figure(
         vertices=np.concatenate([vertices for vertices, *_ in pieces]),
@@ -57,22 +70,20 @@ def hiker(body: Body) -> Figure:
     )
 
 
-Piece = tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]
-
-
-def _garment(
-    body: Body, part: str, solid: Solid, low: Array, high: Array, spacing: float, bones: tuple[str, ...]
+def surface(
+    body: Skeleton, part: str, solid: Solid, low: Array, high: Array, spacing: float, bones: tuple[str, ...]
 ) -> Piece:
-    vertices, quads = mesh_of(solid, low, high, spacing * body.stature / 1.78)
+    """A closed piece from its solid, within a box, with vertices about `spacing` [m] apart, that follows some bones."""
+    vertices, quads = mesh_of(solid, low, high, spacing)
     return vertices, quads, np.full(len(quads), PARTS.index(part)), _weights(body, vertices, bones)
 
 
-def _weights(body: Body, vertices: Array, bones: tuple[str, ...]) -> Array:
+def _weights(body: Skeleton, vertices: Array, bones: tuple[str, ...]) -> Array:
     """Shares by inverse distance to the given bones; a limb's bones do not reach across the middle of the body."""
-    names = list(BONES)
+    names = list(body.bones)
     closeness = np.zeros((len(vertices), len(names)))
     for name in bones:
-        start, end = (body.joints[joint] for joint in BONES[name][:2])
+        start, end = (body.joints[joint] for joint in body.bones[name][:2])
         axis = end - start
         along = np.clip((vertices - start) @ axis / (axis @ axis), 0.0, 1.0)
         distance = np.linalg.norm(vertices - start - along[:, None] * axis, axis=1)
