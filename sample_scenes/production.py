@@ -62,11 +62,12 @@ class Claim:
 
 @dataclass(frozen=True)
 class Walker:
-    """Somebody who walks.
+    """Somebody who walks, or a thing that falls or rolls.
 
     Attributes
     ----------
     armature : bpy.types.Object
+        Or the thing's mesh object.
     mass : float
         [kg].
     shoes : mapping
@@ -147,7 +148,8 @@ def bake(
         bpy.ops.softground.add_character()
         shot.characters[-1].mass = walker.mass
         for sole in shot.characters[-1].soles:
-            sole.object = walker.shoes.get(sole.side[:1])
+            if shoe := walker.shoes.get(sole.side[:1]):
+                sole.object = shoe
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)

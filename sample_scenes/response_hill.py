@@ -100,13 +100,13 @@ def shoot(built: ResponseHill, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     copies = {name: stage.freeze(walker, SHOWN, scene.collection) for name, walker in built.walkers.items()}
     stage.add_sun(scene, radians(-150), radians(30))
-    camera = stage.add_camera(scene, "Side", lens=70.0)
+    camera = stage.add_camera(scene, "Side", lens=60.0)
     pictures = []
     for name, bake in built.bakes.items():
         for other in built.bakes:
             for thing in (*copies[other], built.bakes[other].carrier):
                 thing.hide_render = other != name
-        middle = np.array((built.walkers[name].location.x, -2.45, 0.88))
+        middle = np.array((built.walkers[name].location.x, -2.35, 1.22))
         stage.aim(camera, middle + np.array((12.0, 0.0, 1.6)), middle)
         pictures.append(folder / f"response_hill_{name}.png")
         stage.render(scene, camera, pictures[-1], PICTURE, samples)

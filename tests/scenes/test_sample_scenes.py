@@ -22,7 +22,7 @@ EVERY_OPTION = {
 }
 COARSE = 0.015  # m
 
-QUICK = frozenset({"force_arrows", "four_grounds"})
+QUICK = frozenset({"force_arrows", "craters"})
 """Scenes that are built in a few seconds."""
 
 scenes = pytest.mark.parametrize(
