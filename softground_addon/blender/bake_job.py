@@ -49,7 +49,9 @@ class BakeResult:
     footprints: tuple[Footprint, ...]
 
 
-def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # noqa: PLR0915  (one stage after the other)
+def bake(  # noqa: PLR0915  (one stage after the other)
+    scene: bpy.types.Scene, *, write: bool = True, response_only: bool = False
+) -> Job[BakeResult]:
     """Bake the scene's characters into its ground.
 
     Without a ground in the settings, one is created that fits the walk.
@@ -60,6 +62,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
         Its `softground` settings say what to do.
     write : bool
         False computes and reports only, and changes nothing.
+    response_only : bool
+        Leave the ground as it is, whatever the settings say.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
 
     yield Progress("write", 0.0)
     layers = (yield from _layers(scene, characters, answers)) if write else []
-    write_ground = write and options.output != "RESPONSE"
+    write_ground = write and not response_only and options.output != "RESPONSE"
     at_the_end = partial(
         PressedGround.at,
         footprints,
@@ -141,7 +145,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True) -> Job[BakeResult]:  # n
         playback_error_m=playback_error,
         warnings=bake_report.warnings(footprints, loads, cell_size) + response_job.warnings(answers),
         forces=forces if options.keep_forces else None,
-        gaps_mm=response_job.gap_table(answers),
+        gaps_mm=response_job.gap_table(answers) or response_job.gaps_left(loads, motions, terrain, footprints),
         worst_gaps=response_job.worst_gaps(answers),
         suggested_speed=response_job.suggested_speeds(motions, footprints),
     )
@@ -157,7 +161,8 @@ def _press(
 ) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object], list[response_job.Answer]]]:
     """Loads, footprints and forces of a shot, and how its characters answer.
 
-    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them.
+    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
+    lean that the pressed ground gives is the lean that pressed it.
     """
     characters = characters_of(scene)
     asked = response_job.options_of(scene)
@@ -166,9 +171,13 @@ def _press(
     standing = response_job.standing_on(shot.motions, shot.terrain, asked)
     loads = yield from estimate_shot(scene, replace(shot, motions=standing))
     footprints, forces = yield from _simulate(scene, shot, loads)
-    leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
-    if leaning:
-        loads = yield from estimate_shot(scene, replace(shot, motions=leaning))
+    leaning = None
+    for _ in range(response_job.LEAN_PASSES):
+        before = leaning
+        leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
+        if not response_job.leans_anew(leaning, before):
+            break
+        loads = yield from estimate_shot(scene, replace(shot, motions=leaning.motions))
         footprints, forces = yield from _simulate(scene, shot, loads)
     check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
     return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)

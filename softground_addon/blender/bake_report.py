@@ -18,6 +18,9 @@ from .jobs import STAGES
 
 Array = NDArray[np.float64]
 
+FLOATING = "floating_mm"
+"""Entry of a bake's summary: how far feet float above their prints [mm]."""
+
 FEW_CELLS, ENOUGH_CELLS = 8, 27
 """Cells along a sole below which its outline is lost, and those that an adult's has at the default cell size."""
 
@@ -58,7 +61,8 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
     """What the panel shows of a bake."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
-    return {key: totals[key] for key in ("steps", "max_depth_m", "peak_force_n")} | {"seconds": seconds}
+    shown = {key: totals[key] for key in ("steps", "max_depth_m", "peak_force_n")}
+    return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"])}
 
 
 def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import SoftGroundError
-from . import bake_job, jobs, session, settings
+from . import bake_job, jobs, session, settings, sink_feet
 from .character_setup import characters_of
 from .operators import reports_errors
 from .translation import iface_, rpt_
@@ -35,15 +35,13 @@ _NAVIGATION = (
 )
 """Events that change nothing in the file (first parts of their names): they go on to Blender during a bake."""
 
-_running: list[SOFTGROUND_OT_bake] = []
+_running: list[_Bake] = []
 """The operator that is baking, for the handlers that have to end it before its scene goes away; at most one."""
 
 
-class SOFTGROUND_OT_bake(bpy.types.Operator):
-    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
+class _Bake(bpy.types.Operator):
+    """What operators that bake have in common: blocking in a script, modal for the user."""
 
-    bl_idname = "softground.bake"
-    bl_label = "Bake Footprints"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -56,16 +54,19 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        self._show(jobs.run(bake_job.bake(settings.scene_of(context))))
+        self._show(jobs.run(self._job_of(settings.scene_of(context))))
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
         return run(context)
 
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        raise NotImplementedError
+
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
-        self._job = bake_job.bake(settings.scene_of(context))
+        self._job = self._job_of(settings.scene_of(context))
         self._started = time.perf_counter()
         next(self._job)  # what cannot be baked is refused before anything moves
         manager = context.window_manager
@@ -147,12 +148,42 @@ class SOFTGROUND_OT_bake(bpy.types.Operator):
         session.redraw()
 
     def _show(self, result: bake_job.BakeResult) -> None:
+        raise NotImplementedError
+
+
+class SOFTGROUND_OT_bake(_Bake):
+    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
+
+    bl_idname = "softground.bake"
+    bl_label = "Bake Footprints"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        return bake_job.bake(scene)
+
+    def _show(self, result: bake_job.BakeResult) -> None:
         totals: Any = result.report["totals"]
         warnings: Any = result.report["warnings"]
         for warning in warnings:
             self.report({"WARNING"}, warning)
         text = rpt_("{steps} steps, deepest print {depth:.1f} cm")
         self.report({"INFO"}, text.format(steps=totals["steps"], depth=totals["max_depth_m"] * 100))
+
+
+class SOFTGROUND_OT_sink_feet(_Bake):
+    """Let the feet down into their prints, hips and knees with them: switch Grounding on and bake it as a layer above
+    the animation. The prints stay as they are, and Clear Bake takes the layer off. Esc cancels"""
+
+    bl_idname = "softground.sink_feet"
+    bl_label = "Sink Feet"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        return sink_feet.sink_feet(scene)
+
+    def _show(self, result: bake_job.BakeResult) -> None:
+        gaps: Any = result.report["gaps_mm"]
+        left = rpt_("Feet stand on their prints; the largest gap left is {gap:.1f} mm")
+        largest = max(gap["max"] for of_one in gaps["after"].values() for gap in of_one.values())
+        self.report({"INFO"}, left.format(gap=largest))
 
 
 class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
@@ -207,4 +238,4 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     return False
 
 
-CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_cancel_bake)
+CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_sink_feet, SOFTGROUND_OT_cancel_bake)

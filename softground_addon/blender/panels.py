@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.motion import JOINTS
-from . import analysis, baked_ground, ground_mesh, session, settings
+from . import analysis, bake_report, baked_ground, ground_mesh, response_job, session, settings
 from .character_editing import active_character, active_sole
 from .translation import iface_
 
@@ -250,6 +250,7 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
         if summary:
             _result(layout, summary)
+            _floating_feet(layout, options, summary)
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
 
@@ -314,6 +315,17 @@ def _result(layout: Any, summary: Any) -> None:
         row.label(text=label)
         row.alignment = "LEFT"
         row.label(text=value, translate=False)
+
+
+def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
+    """How far the feet are above the prints that they made, and a button that lets them down."""
+    floating = summary.get(bake_report.FLOATING, 0.0)
+    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
+        return
+    box = layout.box().column(align=True)
+    text = iface_("Feet float up to {gap} mm above their prints")
+    box.label(text=text.format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
 
 
 def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.footprints import Footprint
 from ..core.grounding import Response, responding
@@ -36,6 +38,9 @@ PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
 
 NOTICEABLE_LEAN = np.radians(0.25)
 """A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
+LEAN_PASSES = 4
+"""Most times that the ground is pressed anew by the leaning bodies. The lean of a frame follows from the ground before
+it, so that each pass makes the shot right further on (Picard iteration); two are mostly enough."""
 
 
 @dataclass(frozen=True)
@@ -113,26 +118,37 @@ def standing_on(
     return tuple(motion if motion.centre is not None else stood_on(motion, terrain) for motion in motions)
 
 
+@dataclass(frozen=True)
+class Leaning:
+    """The motions with the lean that the pressed ground gives them, and by how much each leans, (F, 2) [rad]."""
+
+    motions: tuple[CharacterMotion, ...]
+    leans: tuple[NDArray[np.float64], ...]
+
+
 def leaning(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
     footprints: Sequence[Footprint],
     options: ResponseOptions | None,
-) -> tuple[CharacterMotion, ...] | None:
-    """The motions with the lean that the pressed ground gives them, for the forces to see; None where it is nothing."""
-    if options is None or options.tilt is None:
-        return None
-    moved, most = [], 0.0
-    for of_character, motion in zip(loads, motions, strict=True):
-        if motion.centre is not None:
-            moved.append(motion)
-            continue
-        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
-        moved.append(responding(motion, response))
-        most = max(most, float(np.abs(response.lean).max()))
-    return tuple(moved) if most > NOTICEABLE_LEAN else None
+) -> Leaning:
+    """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
+    moved, leans = [], []
+    if options is not None and options.tilt is not None:
+        for of_character, motion in zip(loads, motions, strict=True):
+            touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+            response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
+            moved.append(responding(motion, response))
+            leans.append(response.lean)
+    return Leaning(tuple(moved), tuple(leans))
+
+
+def leans_anew(now: Leaning, before: Leaning | None) -> bool:
+    """Whether a lean differs from the one that pressed the ground by so much that the forces must be found anew."""
+    upright = before is None
+    pairs = zip(now.leans, now.leans if upright else before.leans, strict=True)
+    return any(float(np.abs(lean - (0.0 if upright else then)).max()) > NOTICEABLE_LEAN for lean, then in pairs)
 
 
 def answers_of(
@@ -230,6 +246,26 @@ def gap_table(answers: Sequence[Answer]) -> dict[str, object] | None:
         when: {answer.motion.name: _statistics(getattr(answer, when)) for answer in answers}
         for when in ("before", "after")
     }
+
+
+def gaps_left(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+) -> dict[str, object]:
+    """Penetration and float of the standing soles of characters that do not answer [mm], for the report."""
+    table = {}
+    for of_character, motion in zip(loads, motions, strict=True):
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        table[motion.name] = _statistics(gaps(motion, touching, terrain, footprints))
+    return {"before": table}
+
+
+def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
+    """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
+    left = gaps_mm.get("after", gaps_mm["before"])
+    return max((of_character["float"]["p95"] for of_character in left.values()), default=0.0)
 
 
 def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:

@@ -1,0 +1,69 @@
+"""After a bake of prints alone the panel says how far feet float, and one button lets them down."""
+
+import bpy
+import pytest
+
+from softground_addon.blender import bake_report, jobs, nla_layer, sink_feet
+from tests.blender import fingerprints, shots
+from tests.blender.test_bake import plane
+
+
+@pytest.fixture
+def baked(scene):
+    shots.walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    scene.softground.frame_end = 48
+    scene.softground.ground = plane(scene)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    return scene
+
+
+def test_a_bake_of_prints_says_how_far_the_feet_float(baked):
+    floating = sink_feet.floating_mm(baked)
+    assert 10.0 < floating < 100.0
+    assert not nla_layer.has_layer(baked.softground.characters[0].armature)
+
+
+def test_one_button_lets_the_feet_down_and_leaves_the_prints(baked):
+    ground = baked.softground.ground
+    before = fingerprints.of_mesh(ground.data)
+    assert bpy.ops.softground.sink_feet() == {"FINISHED"}
+    after = fingerprints.of_mesh(ground.data)
+    for part in ("attributes", "shape_keys", "materials"):
+        assert after[part] == before[part]
+    armature = baked.softground.characters[0].armature
+    assert nla_layer.has_layer(armature)
+    assert baked.softground.grounding.use
+    assert baked.softground.output == "BOTH"
+    assert sink_feet.floating_mm(baked) < 2.0
+    assert bake_report.stale_reasons(baked) == (), "on level ground the prints are those of the grounded walk"
+
+
+def test_feet_that_cannot_be_let_down_leave_the_settings_as_they_were(baked):
+    baked.softground.characters[0].armature.animation_data.use_nla = False
+    baked.softground.output = "PRINTS"
+    with pytest.raises(RuntimeError, match="NLA"):
+        bpy.ops.softground.sink_feet()
+    assert not baked.softground.grounding.use
+    assert baked.softground.output == "PRINTS"
+
+
+def test_a_sinking_that_is_cancelled_leaves_everything_as_it_was(baked):
+    before = fingerprints.of_file()
+    job = sink_feet.sink_feet(baked)
+    for _ in range(3):
+        next(job)
+    job.close()
+    assert not baked.softground.grounding.use
+    assert fingerprints.of_file() == before
+
+
+def test_sinking_needs_no_ground_that_is_baked(scene):
+    """With no ground chosen the plane under the walk is the ground."""
+    shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.softground.frame_end = 40
+    jobs.run(sink_feet.sink_feet(scene))
+    assert nla_layer.has_layer(scene.softground.characters[0].armature)
+    assert scene.softground.ground is None
