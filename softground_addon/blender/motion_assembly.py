@@ -130,6 +130,7 @@ def assemble_motion(
             for joint, (bone, end) in mapping.joints.items()
         },
         gravity=gravity,
+        four_legged=rest.is_four_legged(mapping),
     )
 
 
@@ -146,6 +147,10 @@ def gravity_of(scene: bpy.types.Scene) -> float:
 def along_bone(matrices: Array, distance: float) -> Array:
     """Path of the point at a distance from the bone's head, in units of the bone, (F, 3)."""
     return matrices[:, :3, 1] * distance + matrices[:, :3, 3]
+
+
+_ACROSS, _ALONG = 0.6, 0.7
+"""Largest cosine between the legs and a four-legged trunk, smallest between hind and front legs."""
 
 
 @dataclass(frozen=True)
@@ -179,6 +184,18 @@ class RestPose:
             return float(np.mean(lengths))
         ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
         return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
+
+    def is_four_legged(self, mapping: RigMapping) -> bool:
+        """Whether the trunk lies across the legs, and the arms along them."""
+        names = [f"{joint}_{side}" for joint in ("hip", "ankle", "shoulder", "wrist") for side in "lr"]
+        if any(name not in mapping.joints for name in names):
+            return False
+        left, right = (np.array([self.end(*mapping.joints[name]) for name in names[side::2]]) for side in (0, 1))
+        hip, ankle, shoulder, wrist = (left + right) / 2
+        leg, trunk, arm = (
+            line / max(np.linalg.norm(line), 1e-9) for line in (ankle - hip, shoulder - hip, wrist - shoulder)
+        )
+        return bool(abs(leg @ trunk) < _ACROSS and leg @ arm > _ALONG)
 
     def facing(self, mapping: RigMapping) -> Array:
         """Horizontal direction in which the character faces; Blender's front where left and right do not show."""

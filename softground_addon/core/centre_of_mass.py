@@ -1,7 +1,7 @@
 """Where a body's mass is: segments from the joints that are mapped, their centre of mass, and what free fall tells.
 
 Mass fractions and segment centres are those of de Leva (1996), "Adjustments to Zatsiorsky-Seluyanov's segment inertia
-parameters", J. Biomechanics 29(9), table 4, male.
+parameters", J. Biomechanics 29(9), table 4, male; four-legged animals have their own.
 """
 
 from __future__ import annotations
@@ -16,23 +16,62 @@ from .motion import CharacterMotion
 
 Array = NDArray[np.float64]
 
-_TRUNK_FRACTION = 0.4346
-_TRUNK_CENTRE = 0.4724
-"""Centre of the trunk from its upper end (0) to the hips (1); the upper end is midway between the neck joint, from
-which de Leva gives 0.5138, and the middle of the shoulders, from which he gives 0.4310."""
-_HEAD_FRACTION = 0.0694
-_HEAD_CENTRE = 0.20
-"""Head and neck: centre above the neck joint in trunk lengths (de Leva: 0.5·243 mm of 603 mm). Where rigs put their
-head joint varies too much to measure along it."""
-_LIMBS = (
-    (0.0271, "shoulder", "elbow", 0.5772),
-    (0.0162, "elbow", "wrist", 0.4574),
-    (0.0061, "elbow", "wrist", 1.25),  # the hand: 0.79·86 mm beyond the wrist of a 269 mm forearm
-    (0.1416, "hip", "knee", 0.4095),
-    (0.0433, "knee", "ankle", 0.4395),
-    (0.0137, "ankle", "ball", 0.35),  # 44 % from heel to toe tip, seen from the ankle
+
+@dataclass(frozen=True)
+class _MassTable:
+    """Mass fractions and centres of a kind of body.
+
+    Attributes
+    ----------
+    trunk, trunk_centre : float
+        Fraction, and centre from the upper end (0) to the hips (1).
+    head, head_centre : float
+        Fraction of head and neck, and their centre above the neck joint in trunk lengths. Where rigs put their head
+        joint varies too much to measure along it.
+    limbs : tuple of (float, str, str, float)
+        Fraction of one side, joints, and centre on the line from the first joint (0) to the second (1).
+    """
+
+    trunk: float
+    trunk_centre: float
+    head: float
+    head_centre: float
+    limbs: tuple[tuple[float, str, str, float], ...]
+
+
+_HUMAN = _MassTable(
+    trunk=0.4346,
+    # The upper end is midway between the neck joint, from which de Leva gives 0.5138, and the middle of the shoulders,
+    # from which he gives 0.4310.
+    trunk_centre=0.4724,
+    head=0.0694,
+    head_centre=0.20,  # 0.5·243 mm of 603 mm
+    limbs=(
+        (0.0271, "shoulder", "elbow", 0.5772),
+        (0.0162, "elbow", "wrist", 0.4574),
+        (0.0061, "elbow", "wrist", 1.25),  # the hand: 0.79·86 mm beyond the wrist of a 269 mm forearm
+        (0.1416, "hip", "knee", 0.4095),
+        (0.0433, "knee", "ankle", 0.4395),
+        (0.0137, "ankle", "ball", 0.35),  # 44 % from heel to toe tip, seen from the ankle
+    ),
 )
-"""Mass fraction of one side, joints, and centre on the line from the first joint (0) to the second (1)."""
+
+_FOUR_LEGGED = _MassTable(
+    trunk=0.66,
+    # So that the front legs of a standing animal bear 0.6 of its weight, as those of dogs do (Roush & McLaughlin 1994).
+    trunk_centre=0.458,
+    head=0.11,
+    head_centre=0.20,
+    limbs=(
+        (0.028, "shoulder", "elbow", 0.45),
+        (0.018, "elbow", "wrist", 0.45),
+        (0.009, "elbow", "wrist", 1.2),
+        (0.035, "hip", "knee", 0.42),
+        (0.017, "knee", "ankle", 0.42),
+        (0.008, "ankle", "ball", 0.35),
+    ),
+)
+"""Of animals with legs much lighter than a man's: two thirds of the mass are trunk, a ninth head and neck."""
 
 _TOWARD_HIPS = {
     "spine": "hips",
@@ -95,18 +134,19 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
     mapped one toward the hips, so that with only the hips mapped the whole mass moves with them (the paper's choice).
     Without any joint, the mean of the soles stands in.
     """
+    table = _FOUR_LEGGED if motion.four_legged else _HUMAN
     joints = _Joints(motion)
     neck, hips = joints["neck"], joints["hips"]
     shoulders = (joints["shoulder_l"] + joints["shoulder_r"]) / 2
     trunk_length = np.median(np.linalg.norm(neck - hips, axis=-1))
     points = [
-        (_TRUNK_FRACTION * _TRUNK_CENTRE, hips),
-        (_TRUNK_FRACTION * (1 - _TRUNK_CENTRE) / 2, neck),
-        (_TRUNK_FRACTION * (1 - _TRUNK_CENTRE) / 2, shoulders),
-        (_HEAD_FRACTION, neck + _HEAD_CENTRE * trunk_length * _direction(joints["head"] - neck)),
+        (table.trunk * table.trunk_centre, hips),
+        (table.trunk * (1 - table.trunk_centre) / 2, neck),
+        (table.trunk * (1 - table.trunk_centre) / 2, shoulders),
+        (table.head, neck + table.head_centre * trunk_length * _direction(joints["head"] - neck)),
     ]
     parts = list(range(len(points)))
-    for part, (fraction, start, end, centre) in enumerate(_LIMBS, start=len(points)):
+    for part, (fraction, start, end, centre) in enumerate(table.limbs, start=len(points)):
         for side in "lr":
             proximal, distal = joints[f"{start}_{side}"], joints[f"{end}_{side}"]
             points.append((fraction, proximal + centre * (distal - proximal)))

@@ -163,6 +163,8 @@ class CharacterMotion:
     centre : (F, 3) float array or None
         Centre of mass of a thing without a skeleton, which falls, rolls and slides [m]; None for a character, whose
         joints tell it.
+    four_legged : bool
+        An animal on four legs: its mass is distributed otherwise than a man's.
     """
 
     name: str
@@ -174,6 +176,7 @@ class CharacterMotion:
     joints: dict[str, Array] = field(default_factory=dict)
     gravity: float = 9.81
     centre: Array | None = None
+    four_legged: bool = False
 
     @property
     def times(self) -> Array:

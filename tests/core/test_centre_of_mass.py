@@ -1,5 +1,7 @@
 """The centre of mass of bodies whose segments one can add up by hand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,21 @@ def test_four_legs_without_a_neck_carry_the_trunk_between_hips_and_shoulders():
     place = com({"hips": (0, 0, 0.6), **legs})
     assert 0.25 < place[0] < 0.55  # near the middle, not at the hind legs
     assert place[1] == pytest.approx(0)
+
+
+def test_an_animal_on_four_legs_bears_six_tenths_in_front():
+    legs = {
+        f"{joint}_{side}": (x, y, z)
+        for side, y in (("l", 0.1), ("r", -0.1))
+        for joint, x, z in (
+            ("hip", 0, 0.6), ("knee", 0, 0.4), ("ankle", 0, 0.05), ("ball", 0, 0.02),
+            ("shoulder", 0.7, 0.6), ("elbow", 0.7, 0.4), ("wrist", 0.7, 0.1),
+        )
+    }  # fmt: skip
+    standing = body({"hips": (0, 0, 0.6), "neck": (0.7, 0, 0.65), "head": (0.9, 0, 0.85), **legs})
+    animal = centre_of_mass(dataclasses.replace(standing, four_legged=True))[0]
+    assert animal[0] / 0.7 == pytest.approx(0.6, abs=0.02)
+    assert centre_of_mass(standing)[0][0] / 0.7 < 0.5
 
 
 def test_with_the_hips_only_the_mass_is_in_the_hips():

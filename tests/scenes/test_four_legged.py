@@ -9,7 +9,7 @@ import pytest
 from sample_scenes.balance import GRAVITY
 from sample_scenes.body import SIDES
 from sample_scenes.course import Course
-from sample_scenes.dog import Dog
+from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.four_legged import LEGS, TROT, WALK, go_on_four_legs
 from sample_scenes.motion import joint_paths
 from tests.scenes.estimates import vertical_in_body_weights, whole_strides
@@ -161,6 +161,9 @@ class TestInBlender:
         sampled = sample_character_now(scene, armature, mapping, mass=dog.mass, frame_start=0, frame_end=119)
         return estimate_loads(sampled, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
+    def test_the_add_on_takes_it_for_an_animal(self, loads):
+        assert loads.motion.four_legged
+
     def test_the_add_on_finds_one_body_weight_on_paws_that_bear_in_turn(self, loads, gait):
         vertical = vertical_in_body_weights(loads)
         strides = whole_strides(loads, gait.stride_time(Dog()))
@@ -168,5 +171,6 @@ class TestInBlender:
         assert mean.sum() == pytest.approx(1.0, abs=0.04)
         assert mean[0] == pytest.approx(mean[1], abs=0.04)
         assert mean[2] == pytest.approx(mean[3], abs=0.04)
+        assert mean[2:].sum() / mean.sum() == pytest.approx(FRONT_SHARE, abs=0.08)
         duty = loads.contacts.touching[strides].mean(axis=0)
         assert duty == pytest.approx(gait.duty_factor, abs=0.09)

@@ -126,6 +126,7 @@ def test_the_add_on_finds_the_runs_contacts_and_forces(scene):
     body, gait = Body(), Run()
     motion = run(body, gait, 100, 60.0)
     loads = loads_in_blender(scene, body, motion)
+    assert not loads.motion.four_legged
     vertical = vertical_in_body_weights(loads)
     total = vertical.sum(axis=1)
     strides = whole_strides(loads, gait.stride_time(body))
