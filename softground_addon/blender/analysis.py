@@ -160,7 +160,9 @@ def _source(scene: bpy.types.Scene) -> Hashable:
             (
                 character.armature and character.armature.session_uid,
                 tuple((joint.name, joint.bone, joint.end) for joint in character.joints),
-                tuple((s.name, s.side, s.bone, s.toe_bone, s.object and s.object.name) for s in character.soles),
+                tuple(
+                    (s.name, s.side, s.kind, s.bone, s.toe_bone, s.object and s.object.name) for s in character.soles
+                ),
             )
             for character in characters_of(scene)
         ),

@@ -6,7 +6,9 @@ from typing import Any, cast
 
 import bpy
 
+from ..core.errors import InputError
 from . import character_setup, settings
+from .character_setup import ancestors
 from .operators import reports_errors
 
 
@@ -65,6 +67,36 @@ class SOFTGROUND_OT_detect_bones(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
+    """Let the selected bones or objects print too: hands, knees, canes, snowshoes. Each presses with whatever side of
+    it faces down"""
+
+    bl_idname = "softground.add_contact"
+    bl_label = "Add Contact"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        posed = context.object if context.mode == "POSE" else None
+        if posed is not None:
+            character = next((one for one in scene.softground.characters if one.armature == posed), None)
+            if character is None:
+                raise InputError(f"'{posed.name}' is no character yet: press Add Character first.")
+            bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
+            added = character_setup.add_bone_contacts(character, bones)
+        else:
+            characters = scene.softground.characters
+            things = [thing for thing in context.selected_objects if all(thing != one.armature for one in characters)]
+            wearer = next(
+                (one for one in characters if any(one.armature in ancestors(thing) for thing in things)), None
+            )
+            character = wearer or active_character(scene)
+            added = character_setup.add_object_contacts(scene, character, things)
+        self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")
+        return {"FINISHED"}
+
+
 class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
     """Add something that prints: a foot, a hand, a snowshoe"""
 
@@ -106,6 +138,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
 CLASSES = (
     SOFTGROUND_OT_remove_character,
     SOFTGROUND_OT_detect_bones,
+    SOFTGROUND_OT_add_contact,
     SOFTGROUND_OT_add_sole,
     SOFTGROUND_OT_remove_sole,
 )

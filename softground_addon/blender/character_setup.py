@@ -65,7 +65,13 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
     if not things:
         raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
     for thing in things:
-        _check_addable(scene, thing)
+        _check_printable(scene, thing)
+        for character in scene.softground.characters:
+            if character.armature and character.armature in ancestors(thing):
+                raise InputError(
+                    f"'{thing.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
+                    "Contact."
+                )
     groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     for thing in things:
         groups.setdefault(_root(thing), []).append(thing)
@@ -84,7 +90,7 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
     return added
 
 
-def _check_addable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     if thing.type != "MESH":
         raise InputError(
             f"'{thing.name}' is a {thing.type.lower()}: select an animated armature, or mesh objects that fall or roll."
@@ -95,15 +101,10 @@ def _check_addable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
         raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or select another object.")
     for character in scene.softground.characters:
         if any(sole.object == thing for sole in character.soles):
-            raise InputError(f"'{thing.name}' prints already, as a sole of '{character.name}'.")
-        if character.armature and character.armature in _ancestors(thing):
-            raise InputError(
-                f"'{thing.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
-                "Contact."
-            )
+            raise InputError(f"'{thing.name}' prints already, as a sole of '{title_of(character)}'.")
 
 
-def _ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
+def ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
     """An object's parents, nearest first."""
     found, parent = [], thing.parent
     while parent is not None:
@@ -113,7 +114,7 @@ def _ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def _root(thing: bpy.types.Object) -> bpy.types.Object:
-    return ([thing, *_ancestors(thing)])[-1]
+    return ([thing, *ancestors(thing)])[-1]
 
 
 def _guessed_mass(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> float:
@@ -149,7 +150,7 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
 
 
 def detect_bones(character: SoftGroundCharacter) -> None:
-    """Set a character's joints and soles as they are recognised, in place of those in the list.
+    """Set a character's joints and feet as they are recognised, in place of those in the list; other soles stay.
 
     Raises
     ------
@@ -162,7 +163,9 @@ def detect_bones(character: SoftGroundCharacter) -> None:
 
 def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
     character.joints.clear()
-    character.soles.clear()
+    for number in reversed(range(len(character.soles))):
+        if character.soles[number].kind == "FOOT" and not character.soles[number].object:
+            character.soles.remove(number)
     character.active_sole = 0
     for joint, (bone, end) in mapping.joints.items():
         entry = character.joints.add()
@@ -171,6 +174,59 @@ def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
         sole = character.soles.add()
         sole.name, sole.bone, sole.toe_bone = source.name, source.bone, source.toe_bone
         sole.side = _SIDE_TO_ENUM[source.side]
+
+
+def add_bone_contacts(character: SoftGroundCharacter, bones: Iterable[str]) -> list[str]:
+    """Let limbs of a character print, by whatever side of them faces down; names of the soles that were added.
+
+    Raises
+    ------
+    InputError
+        If there is none, or all print already.
+    """
+    taken = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone)}
+    fresh = [bone for bone in bones if bone not in taken]
+    if not fresh:
+        raise InputError(
+            f"No further bone of '{title_of(character)}' is selected: select the bones that touch the ground, in pose "
+            "mode."
+        )
+    for bone in fresh:
+        sole = character.soles.add()
+        sole.name, sole.bone, sole.kind = bone, bone, "LIMB"
+        sole.side = _side_of(bone)
+    character.active_sole = len(character.soles) - 1
+    return fresh
+
+
+def add_object_contacts(
+    scene: bpy.types.Scene, character: SoftGroundCharacter, things: Iterable[bpy.types.Object]
+) -> list[str]:
+    """Let objects print as soles of a character: canes, snowshoes, wheels; names of those that were added.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one is no mesh, the ground, or printing already.
+    """
+    things = list(things)
+    if not things:
+        raise InputError(
+            "No object is selected: select the meshes that touch the ground, such as a cane or a snowshoe."
+        )
+    for thing in things:
+        _check_printable(scene, thing)
+    for thing in things:
+        sole = character.soles.add()
+        sole.name, sole.object = thing.name, thing
+        sole.side = _side_of(thing.name)
+    character.active_sole = len(character.soles) - 1
+    return [thing.name for thing in things]
+
+
+def _side_of(name: str) -> str:
+    """Side that a name tells by its end, as Blender's own mirror names do."""
+    return next((side for end, side in ((".L", "LEFT"), (".R", "RIGHT")) if name.upper().endswith(end)), "NONE")
 
 
 def is_thing(character: SoftGroundCharacter) -> bool:
@@ -206,7 +262,12 @@ def mapping_of(character: SoftGroundCharacter) -> RigMapping:
     joints = {entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone}
     soles = tuple(
         SoleSource(
-            sole.name, _SIDE_TO_CODE[sole.side], sole.bone, sole.toe_bone, sole.object.name_full if sole.object else ""
+            sole.name,
+            _SIDE_TO_CODE[sole.side],
+            sole.bone,
+            sole.toe_bone,
+            sole.object.name_full if sole.object else "",
+            sole.kind == "LIMB",
         )
         for sole in character.soles
         if sole.object or (sole.bone and character.armature)

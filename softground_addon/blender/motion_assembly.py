@@ -19,8 +19,10 @@ from ..core.foot_attitude import (
     standing_up,
 )
 from ..core.motion import Array, CharacterMotion, SoleMotion
+from ..core.soles import solid_sole
+from ..core.solids import capsule
 from .rig_mapping import RigMapping, SoleSource
-from .sole_extraction import find_foot_meshes, foot_sole
+from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
 
 STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
@@ -84,7 +86,7 @@ def assemble_motion(
     frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
     leg = rest.leg_length(mapping)
 
-    sources = [source for source in mapping.soles if not source.object]
+    sources = [source for source in mapping.soles if not source.object and not source.limb]
     feet = [_Foot.of(source, recording, rest) for source in sources]
     step = float(recording.frames[1] - recording.frames[0]) if len(recording.frames) > 1 else 1.0
     planted = planted_instants(
@@ -116,6 +118,7 @@ def assemble_motion(
         carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
         transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
         motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))
+    motions.update(_limb_motions(scene, mapping, recording, rest))
     motions.update(carried)
 
     return CharacterMotion(
@@ -132,6 +135,43 @@ def assemble_motion(
         gravity=gravity,
         four_legged=rest.is_four_legged(mapping),
     )
+
+
+LIMB_THICKNESS = 0.2
+"""Radius of a limb without a skin over the length of its bone."""
+
+GIVE = 0.04
+"""How far flesh gives way where it touches, over the size of the limb: 3 mm for a hand, 1 cm for a trunk."""
+
+
+def _limb_motions(
+    scene: bpy.types.Scene, mapping: RigMapping, recording: Recording, rest: RestPose
+) -> dict[str, SoleMotion]:
+    """Limbs that print by whatever side faces down: the skin that moves with the bone, or a bar around it."""
+    meshes = find_limb_meshes(scene, rest.armature, mapping, rest.world)
+    motions = {}
+    for source in mapping.soles:
+        if not source.limb or source.object:
+            continue
+        head, tail = rest.end(source.bone, "head"), rest.end(source.bone, "tail")
+        if source.name in meshes:
+            vertices, triangles = meshes[source.name].vertices, meshes[source.name].triangles
+            vertices, triangles = _used(vertices, triangles)
+        else:
+            length = float(np.linalg.norm(tail - head))
+            vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
+        middle = vertices.mean(axis=0)
+        sole = solid_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
+        transforms = _rigid_motion(recording.bones[source.bone], rest.matrix(source.bone))
+        transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
+        motions[source.name] = SoleMotion(sole, transforms[:, None])
+    return motions
+
+
+def _used(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """A mesh without the vertices that no triangle uses."""
+    kept, index = np.unique(triangles, return_inverse=True)
+    return vertices[kept], index.reshape(-1, 3)
 
 
 def frame_rate_of(scene: bpy.types.Scene) -> float:

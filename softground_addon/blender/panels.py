@@ -9,6 +9,7 @@ import bpy
 from ..core.motion import JOINTS
 from . import analysis, bake_report, baked_ground, ground_mesh, response_job, session, settings
 from .character_editing import active_character, active_sole
+from .character_setup import is_set_up, is_thing
 from .translation import iface_
 
 CATEGORY = "SoftGround"
@@ -47,7 +48,7 @@ class SOFTGROUND_UL_characters(bpy.types.UIList):
         _property: Any,
         _index: int = 0,
     ) -> None:
-        icon = "ARMATURE_DATA" if item.armature else "ERROR"
+        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_thing(item) else "ERROR"
         layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
 
 
@@ -65,7 +66,8 @@ class SOFTGROUND_UL_soles(bpy.types.UIList):
         _property: Any,
         _index: int = 0,
     ) -> None:
-        layout.prop(item, "name", text="", emboss=False, icon="MOD_DYNAMICPAINT")
+        icon = "MESH_CUBE" if item.object else "BONE_DATA" if item.kind == "LIMB" else "MOD_DYNAMICPAINT"
+        layout.prop(item, "name", text="", emboss=False, icon=icon)
         layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
 
 
@@ -91,7 +93,8 @@ class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
         buttons.operator("softground.remove_character", text="", icon="REMOVE")
         character = active_character(settings.scene_of(context))
         if character:
-            layout.prop(character, "armature")
+            if not is_thing(character):
+                layout.prop(character, "armature")
             layout.prop(character, "mass")
             layout.prop(character, "force_model")
 
@@ -104,7 +107,7 @@ class _OfCharacter(_Panel):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a character is chosen."""
         character = active_character(settings.scene_of(context))
-        return bool(character and character.armature)
+        return bool(character and is_set_up(character))
 
 
 class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
@@ -121,15 +124,19 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
         buttons = row.column(align=True)
         buttons.operator("softground.add_sole", text="", icon="ADD")
         buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        layout.operator("softground.add_contact", icon="PLUS")
         sole = active_sole(scene)
         if not sole:
             return
-        bones = character.armature.data
-        layout.prop(sole, "side")
-        column = layout.column(align=True)
-        column.active = sole.object is None
-        column.prop_search(sole, "bone", bones, "bones")
-        column.prop_search(sole, "toe_bone", bones, "bones")
+        if character.armature:
+            bones = character.armature.data
+            layout.prop(sole, "side")
+            column = layout.column(align=True)
+            column.active = sole.object is None
+            column.prop(sole, "kind")
+            column.prop_search(sole, "bone", bones, "bones")
+            if sole.kind == "FOOT":
+                column.prop_search(sole, "toe_bone", bones, "bones")
         layout.prop(sole, "object")
 
 
@@ -137,6 +144,12 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
     """Where the body's mass is"""
 
     bl_label = "Hips and Limbs"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character with an armature is chosen."""
+        character = active_character(settings.scene_of(context))
+        return bool(character and character.armature)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.column()

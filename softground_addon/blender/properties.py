@@ -78,11 +78,21 @@ class SoftGroundSole(bpy.types.PropertyGroup):
         items=[("LEFT", "Left", ""), ("RIGHT", "Right", ""), ("NONE", "None", "Neither left nor right")],
         default="NONE",
     )
-    bone: StringProperty(name="Foot", description="Bone that carries the sole from heel to ball")
+    kind: EnumProperty(
+        name="Kind",
+        description="How the bone prints",
+        items=[
+            ("FOOT", "Foot", "With a sole from heel to toes: feet, paws and hooves"),
+            ("LIMB", "Limb", "With whatever side of it faces down: hands, knees, elbows, backs"),
+        ],
+        default="FOOT",
+    )
+    bone: StringProperty(name="Bone", description="Bone that carries the sole; of a foot, from heel to ball")
     toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
     object: PointerProperty(
         name="Object",
-        description="Object that prints with its own mesh in place of a bone, such as a snowshoe or a wheel",
+        description="Object that prints in place of a bone, with whatever side of its mesh faces down: a snowshoe, a "
+        "cane, a ball, a wheel",
         type=bpy.types.Object,
         poll=_is_mesh,
     )
@@ -93,13 +103,13 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
 
     armature: PointerProperty(
         name="Armature",
-        description="Animated armature that leaves the prints",
+        description="Animated armature that leaves the prints; empty for things that fall, roll and slide",
         type=bpy.types.Object,
         poll=_is_armature,
     )
     mass: FloatProperty(
         name="Mass (kg)",
-        description="Body mass in kilograms, with clothes and load. The depth of the prints grows with it",
+        description="Mass in kilograms; of a character, with clothes and load. The depth of the prints grows with it",
         default=DEFAULT_MASS,
         min=0.0,
         soft_min=0.1,

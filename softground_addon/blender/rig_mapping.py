@@ -35,6 +35,8 @@ class SoleSource:
         Bone of the toes; empty for a sole of one piece.
     object : str
         Name of an object that prints with its own mesh instead; empty if a bone does.
+    limb : bool
+        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
     """
 
     name: str
@@ -42,6 +44,7 @@ class SoleSource:
     bone: str = ""
     toe_bone: str = ""
     object: str = ""
+    limb: bool = False
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,12 @@ from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
 from . import ground_mesh, painted_ground, settings
 from .bake_checks import check_contacts
-from .character_setup import characters_of, mapping_of
+from .character_setup import characters_of, mapping_of, title_of
 from .ground_mesh import GroundPlan, GroundSurface
 from .jobs import Job, Progress, aside
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character, sample_thing
+from .solid_extraction import check_things
 
 Array = NDArray[np.float64]
 
@@ -109,10 +110,17 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
     lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
     upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
     margin = GROUND_MARGIN * max(sole.sole.length for motion in motions for sole in motion.soles)
-    low = float(np.median([_standing_height(motion, sole) for motion in motions for sole in motion.soles]))
-    floats = [detect_contacts(motion, FlatTerrain(low)).offset for motion in motions if motion.centre is None]
-    float_above = float(np.median(np.concatenate(floats))) if floats else 0.0
-    return GroundPlan(lower - margin, upper + margin, low + float_above)
+    low = float(np.median([_standing_height(motion, sole) for motion in motions for sole in _feet(motion)]))
+    floats = []
+    for motion in (motion for motion in motions if motion.centre is None):
+        feet = replace(motion, soles=tuple(_feet(motion)))
+        floats.append(detect_contacts(feet, FlatTerrain(low)).offset)
+    return GroundPlan(lower - margin, upper + margin, low + float(np.median(np.concatenate(floats))) if floats else low)
+
+
+def _feet(motion: CharacterMotion) -> list[SoleMotion]:
+    """The soles that tell where the ground is: hands and canes need not ever touch it."""
+    return [sole for sole in motion.soles if sole.sole.solid is None] or list(motion.soles)
 
 
 def _standing_height(motion: CharacterMotion, sole: SoleMotion) -> float:
@@ -124,17 +132,19 @@ def _standing_height(motion: CharacterMotion, sole: SoleMotion) -> float:
 def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
     """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
     options = scene.softground
-    if not characters:
-        raise InputError(
-            "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
-            "Character."
-        )
     for character in options.characters:
         if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
             raise InputError(
                 f"The object of '{character.name}' is gone: choose another one in Soles, or remove '{character.name}' "
                 "from the characters."
             )
+    if not characters:
+        raise InputError(
+            "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
+            "Character."
+        )
+    for character in characters:
+        check_things(scene, title_of(character), mapping_of(character).soles)
     if options.frame_end <= options.frame_start:
         raise InputError(
             f"The frame range {options.frame_start}-{options.frame_end} is empty: set End after Start in the Bake "

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..core.foot_attitude import FlatFoot, FootSize
 from ..core.motion import Array
 from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
-from .rig_mapping import SoleSource
+from .rig_mapping import RigMapping, SoleSource
 
 _REACH = 2.0
 """How far around a bone of the foot its skin is looked for, in its lengths; at least as far as the shank is long."""
@@ -115,8 +115,42 @@ def find_foot_meshes(
     rest_world : (4, 4) float array
         Armature space to world in the rest pose [m].
     """
+    return _find_meshes(
+        scene,
+        armature,
+        {source.name: _bone_families(armature, source) for source in sources if source.bone},
+        rest_world,
+    )
+
+
+def find_limb_meshes(
+    scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, rest_world: Array
+) -> dict[str, FootMesh]:
+    """The meshes on each limb that prints, by name of the sole: what moves with its bone, up to the next joints."""
+    joints = {bone for bone, end in mapping.joints.values() if end == "head"}
+    soles = {bone for source in mapping.soles for bone in (source.bone, source.toe_bone) if bone}
+    families: dict[str, tuple[frozenset[str], frozenset[str]]] = {}
+    for source in mapping.soles:
+        if source.limb and not source.object:
+            family, waiting = set(), [armature.data.bones[source.bone]]
+            while waiting:
+                bone = waiting.pop()
+                family.add(bone.name)
+                waiting += [child for child in bone.children if child.name not in joints | soles]
+            families[source.name] = frozenset(family), frozenset()
+    return _find_meshes(scene, armature, families, rest_world)
+
+
+def _find_meshes(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    groups: Mapping[str, tuple[frozenset[str], frozenset[str]]],
+    rest_world: Array,
+) -> dict[str, FootMesh]:
+    """The meshes on some families of bones."""
     pieces: dict[str, list[FootMesh]] = {}
-    groups = {source.name: _bone_families(armature, source) for source in sources if source.bone}
+    if not groups:
+        return {}
     for thing in scene.objects:
         if thing.type != "MESH" or thing.hide_render:
             continue

@@ -60,6 +60,7 @@ def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, 
     InputError
         If it has no faces.
     """
+    scene.view_layers[0].update()
     depsgraph = scene.view_layers[0].depsgraph
     evaluated = thing.evaluated_get(depsgraph) if depsgraph else thing
     mesh = evaluated.to_mesh()
@@ -76,9 +77,7 @@ def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, 
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
 
 
-def solid_motion(
-    scene: bpy.types.Scene, source: SoleSource, matrices: Array, *, give: float = 0.0
-) -> tuple[SoleMotion, float]:
+def solid_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
     """An object that prints with its own mesh, and its volume [m³].
 
     Its scale may differ along its axes, mirror or shear it, as long as it stays as it is.
@@ -90,8 +89,6 @@ def solid_motion(
         Names the object.
     matrices : (F, 4, 4) float array
         Its frame to the world over time [m].
-    give : float
-        See `core.solids.Solid`.
 
     Raises
     ------
@@ -121,5 +118,5 @@ def solid_motion(
     transforms[:, :3, :3] = rotation
     transforms[:, :3, 3] = matrices[:, :3, 3] + rotation @ mass.centre
     transforms[:, 3, 3] = 1.0
-    sole = solid_sole(vertices - mass.centre, triangles, name=source.name, side=source.side, give=give)
+    sole = solid_sole(vertices - mass.centre, triangles, name=source.name, side=source.side)
     return SoleMotion(sole, transforms[:, None]), mass.volume

@@ -35,6 +35,8 @@ LANDED_HEIGHT = 0.01
 """A sole has landed when one of its landmarks is this near to where it will stand, in leg lengths."""
 REST_SPEED = 0.15
 """A sole slower than this may be standing: such samples tell the float, in sqrt(gravity·leg length)."""
+SOLID_FLOAT_LIMIT = 0.03
+"""The same for what is not a foot: hands, knees and canes come near the ground without touching it, in leg lengths."""
 FLOAT_PERCENTILE = 10.0
 """The clearance of a standing sole that counts as float or sink: low, but no single outlier."""
 FLOAT_LIMIT = 0.15
@@ -96,10 +98,15 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     Contacts
     """
     tracks = [_track(sole, motion, terrain) for sole in motion.soles]
-    drift = _ground_drift(tracks, motion)
+    feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.solid is None]
+    drift = _ground_drift(feet or tracks, motion)
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
     limit = np.maximum(TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length), body_speed)
-    touching, offset = zip(*(_detect(track, drift, limit, motion) for track in tracks), strict=True)
+    found = [
+        _detect(track, drift, limit, motion, FLOAT_LIMIT if sole.sole.solid is None else SOLID_FLOAT_LIMIT)
+        for track, sole in zip(tracks, motion.soles, strict=True)
+    ]
+    touching, offset = zip(*found, strict=True)
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
     return Contacts(np.stack(touching, axis=1), np.array(offset), normal, clearance)
@@ -227,11 +234,13 @@ def _low(clearance: Array, leg_length: float) -> float:
     return float(np.percentile(finite, FLOAT_PERCENTILE)) + TOUCH_HEIGHT * leg_length if len(finite) else 0.0
 
 
-def _detect(track: _Track, drift: Array, limit: Array, motion: CharacterMotion) -> tuple[Mask, float]:
+def _detect(
+    track: _Track, drift: Array, limit: Array, motion: CharacterMotion, float_limit: float
+) -> tuple[Mask, float]:
     """When one sole touches, and the float that was removed."""
     leg = motion.leg_length
     speed = np.linalg.norm(track.velocity - drift, axis=-1)
-    offset = _float(track.clearance, speed / np.sqrt(motion.gravity * leg), leg)
+    offset = _float(track.clearance, speed / np.sqrt(motion.gravity * leg), float_limit * leg)
     height = (track.clearance - offset) / leg
     touching = hysteresis(
         (height < TOUCH_HEIGHT) & (speed < limit), (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED * limit)
@@ -263,9 +272,9 @@ def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
     return sharp
 
 
-def _float(height: Array, speed: Array, leg_length: float) -> float:
+def _float(height: Array, speed: Array, limit: float) -> float:
     """The clearance at which a sole stands [m], 0 when it never does."""
-    near = np.abs(height) < FLOAT_LIMIT * leg_length
+    near = np.abs(height) < limit
     standing = near & (speed < REST_SPEED)
     if not standing.any():
         standing = near

@@ -195,12 +195,20 @@ class CharacterMotion:
 
     def at_frames(self) -> CharacterMotion:
         """The samples at scene frames alone."""
-        samples = self.on_frames
+        return self.of(self.on_frames)
+
+    def first(self, count: int) -> CharacterMotion:
+        """The first `count` samples."""
+        return self.of(slice(count))
+
+    def of(self, samples: slice | NDArray[np.bool_]) -> CharacterMotion:
+        """Some of the samples."""
         return dataclasses.replace(
             self,
             frames=self.frames[samples],
             soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[samples]) for sole in self.soles),
             joints={name: path[samples] for name, path in self.joints.items()},
+            centre=None if self.centre is None else self.centre[samples],
         )
 
     def resampled(self, steps_per_frame: int) -> CharacterMotion:
@@ -218,16 +226,6 @@ class CharacterMotion:
             soles=tuple(sole.at(position) for sole in self.soles),
             joints={name: _interpolate(path, position) for name, path in self.joints.items()},
             centre=None if self.centre is None else _linear(self.centre, position),
-        )
-
-    def first(self, count: int) -> CharacterMotion:
-        """The first `count` samples of the motion."""
-        return dataclasses.replace(
-            self,
-            frames=self.frames[:count],
-            soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[:count]) for sole in self.soles),
-            joints={name: path[:count] for name, path in self.joints.items()},
-            centre=None if self.centre is None else self.centre[:count],
         )
 
 

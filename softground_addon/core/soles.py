@@ -5,6 +5,7 @@ Everything is built in the *sole frame*: x toward the toes, y left, z up, as the
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -175,7 +176,7 @@ def solid_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side:
     name, side : str
         As in `Sole`.
     give : float
-        See `solids.Solid`.
+        How far its surface itself gives way, over its size; see `solids.Solid`.
 
     Raises
     ------
@@ -184,7 +185,8 @@ def solid_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side:
     """
     if not len(triangles):
         raise InputError(f"The mesh of '{name}' has no faces to print with: choose another object.")
-    solid = Solid(np.asarray(vertices, dtype=float), triangles, give)
+    hard = Solid(np.asarray(vertices, dtype=float), triangles)
+    solid = dataclasses.replace(hard, give=give * hard.size)
     landmarks = supports(solid.probes)
     outline = convex_hull(solid.probes[:, :2])
     return Sole(name, side, (), landmarks, np.zeros(len(landmarks), dtype=np.intp), outline, solid)

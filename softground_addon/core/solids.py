@@ -15,6 +15,8 @@ Indices = NDArray[np.intp]
 
 FEW_VERTICES = 400
 """Meshes with fewer vertices are probed between them too: the faces of a box are larger than bumps of the ground."""
+_CAPSULE_RINGS, _CAPSULE_SIDES = 6, 24
+"""Rings of each round end of a capsule, and corners of each."""
 _FLATTEST = 0.1
 """Least size of a body over its longest extent: a sheet has no volume."""
 
@@ -113,6 +115,28 @@ def mass_properties(vertices: Array, triangles: Indices) -> MassProperties:
         return MassProperties(0.0, origin + middle)
     centre = (parts[:, None] * (a + b + c)).sum(axis=0) / (4 * volume)
     return MassProperties(abs(volume), origin + centre)
+
+
+def capsule(start: Array, end: Array, radius: float) -> tuple[Array, Indices]:
+    """Vertices (V, 3) and triangles (T, 3) of a rounded bar around a segment: a limb without a skin [m]."""
+    along = np.asarray(end, float) - start
+    length = float(np.linalg.norm(along))
+    axis = along / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    aside /= np.linalg.norm(aside)
+    frame = np.stack([aside, np.cross(axis, aside), axis])
+    rings, around = _CAPSULE_RINGS, np.arange(_CAPSULE_SIDES) / _CAPSULE_SIDES * 2 * np.pi
+    latitude = np.concatenate([np.linspace(-np.pi / 2, 0, rings), np.linspace(0, np.pi / 2, rings)])
+    height = radius * np.sin(latitude) + np.repeat([0.0, length], rings)
+    wide = radius * np.cos(latitude)
+    circle = np.stack([np.cos(around), np.sin(around)], -1)
+    points = np.concatenate(
+        [wide[:, None, None] * circle, np.broadcast_to(height[:, None, None], (2 * rings, len(around), 1))], axis=-1
+    )
+    row, column = np.indices((2 * rings - 1, len(around)))
+    a, b = row * len(around) + column, row * len(around) + (column + 1) % len(around)
+    halves = [np.stack([a, b, a + len(around)], -1), np.stack([b, b + len(around), a + len(around)], -1)]
+    return points.reshape(-1, 3) @ frame + start, np.concatenate(halves).reshape(-1, 3)
 
 
 def supports(points: Array, count: int = 64) -> Array:
