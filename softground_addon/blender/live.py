@@ -266,6 +266,8 @@ def _why_not(context: bpy.types.Context) -> str:
     options = settings.scene_of(context).softground
     if session.current().is_baking:
         return "A bake is running"
+    if session.is_rendering():
+        return "A render is running: wait until it has ended"
     if not characters_of(settings.scene_of(context)):
         return "Add a character first: select its armature and press Add Character"
     if options.ground and baked_ground.is_baked(options.ground):

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import SoftGroundError
+from ..core.errors import InputError, SoftGroundError
 from . import bake_job, jobs, session, settings, sink_feet
 from .character_setup import characters_of
 from .operators import reports_errors
@@ -67,7 +67,8 @@ class _Bake(bpy.types.Operator):
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
         self._job = self._job_of(settings.scene_of(context))
-        self._started = time.perf_counter()
+        self._needed = _read_by_bake(settings.scene_of(context))
+        self._started = self._ticked = time.perf_counter()
         next(self._job)  # what cannot be baked is refused before anything moves
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
@@ -95,8 +96,16 @@ class _Bake(bpy.types.Operator):
         self._end()
 
     def _tick(self) -> set[str]:
-        until = time.perf_counter() + TICK
+        now = time.perf_counter()
+        waited, self._ticked = now - self._ticked, now
+        if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
+            self._started += waited
+            session.current().status = iface_("Waiting for the render")
+            self._show_status()
+            return {"PASS_THROUGH"}
+        until = now + TICK
         try:
+            _check_still_there(self._needed)
             progress = next(self._job)
             while time.perf_counter() < until or progress.overall >= 1.0:  # what is written is not to be cancelled
                 progress = next(self._job)
@@ -104,10 +113,9 @@ class _Bake(bpy.types.Operator):
             self._end()
             self._show(finished.value)
             return {"FINISHED"}
-        except (SoftGroundError, ReferenceError) as error:
+        except SoftGroundError as error:
             self._end()
-            gone = rpt_("Something that the bake needs was removed while it ran: bake again")
-            self.report({"ERROR"}, str(error) if isinstance(error, SoftGroundError) else gone)
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except BaseException:
             self._end()
@@ -124,6 +132,10 @@ class _Bake(bpy.types.Operator):
             stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))
         )
         bpy.context.window_manager.progress_update(state.progress)
+        self._show_status()
+
+    def _show_status(self) -> None:
+        state = session.current()
         label, way_out = iface_("Bake Footprints"), iface_("Cancel")
         self._write_status_bar(f"{label} {state.progress:.0%}  |  {state.status}  |  [Esc] {way_out}")
         session.redraw()
@@ -215,6 +227,8 @@ def _why_not(context: bpy.types.Context) -> str:
     state = session.current()
     if state.is_baking:
         return "A bake is running"
+    if session.is_rendering():
+        return "A render is running: wait until it has ended"
     if state.is_live:
         return "Live mode is on: stop it first"
     if not characters_of(settings.scene_of(context)):
@@ -222,10 +236,28 @@ def _why_not(context: bpy.types.Context) -> str:
     return ""
 
 
+def _read_by_bake(scene: bpy.types.Scene) -> dict[int, str]:
+    """Scene, ground, armatures and soles of a bake: their names, by their identifiers in this session."""
+    options = scene.softground
+    soles = [sole.object for character in options.characters for sole in character.soles]
+    blocks = (scene, options.ground, *(character.armature for character in options.characters), *soles)
+    return {block.session_uid: block.name for block in blocks if block}
+
+
+def _check_still_there(needed: dict[int, str]) -> None:
+    """Raise InputError if something that a bake reads was deleted meanwhile: Blender does not survive its use."""
+    found = {block.session_uid for blocks in (bpy.data.scenes, bpy.data.objects) for block in blocks}
+    gone = [name for uid, name in needed.items() if uid not in found]
+    if gone:
+        raise InputError(f"'{gone[0]}' was deleted while the bake read it: nothing was changed. Bake again.")
+
+
 def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
-    """Whether an event cannot edit the file: it navigates, or it is meant for the panel with the Cancel button."""
+    """Whether an event neither edits, saves nor renders: it navigates, or clicks in the panel (it can cancel)."""
     if event.type.startswith(_NAVIGATION):
         return True
+    if event.type != "LEFTMOUSE":
+        return False
     for area in context.screen.areas if context.screen else ():
         for region in area.regions:
             if (

@@ -46,6 +46,11 @@ def current() -> Any:
     return bpy.context.window_manager.softground
 
 
+def is_rendering() -> bool:
+    """Whether Blender renders beside what its user does."""
+    return bool(bpy.app.is_job_running("RENDER"))
+
+
 def redraw(*, region_type: str = "UI") -> None:
     """Have the regions of one type drawn again in all editors that show something of the add-on."""
     for window in bpy.context.window_manager.windows:

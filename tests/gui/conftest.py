@@ -77,7 +77,9 @@ def told(suite: str, story: str) -> dict:
     printed = blender(suite, "gui", *arguments, seconds=STORY_SECONDS)
     (folder / "printed.txt").write_text(printed, encoding="utf-8")
     facts = folder / "facts.json"
-    found = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {"error": "it ended before the story"}
+    found = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {}
+    if not found.keys() & {"finished", "error"}:
+        found["error"] = f"Blender ended before the story, which knew {found}"
     return {**found, "printed": printed}
 
 

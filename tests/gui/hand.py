@@ -128,23 +128,31 @@ class Hand:
         yield from self.key(letter)
         yield 0.5
 
-    def find_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Any:
+    def click_down_from(self, place: tuple[int, int], *, until: Callable[[], bool]) -> Steps:
+        """Click at a place and, row by row, below it, where keys such as those of `find_button` are not taken."""
+        x, y = place
+        while not until() and y > self.region().y:
+            yield from self.click(x, y)
+            yield 0.1
+            y -= ROW
+
+    def find_button(self, operator: str, offset: float = 0.5) -> Any:
         """Place of the button that runs an operator, by what Ctrl-C copies from it; None where there is none.
 
         A generator like the others: `place = yield from hand.find_button(...)`. Scrolls down if it is not in sight.
         """
-        for page in range(PAGES):
-            place = yield from self._find_in_sight(operator, offset, below if page == 0 else None)
+        for _ in range(PAGES):
+            place = yield from self._find_in_sight(operator, offset)
             if place:
                 return place
-            for _ in range(6):
+            for _turn in range(6):
                 yield from self.key("WHEELDOWNMOUSE")
         return None
 
-    def _find_in_sight(self, operator: str, offset: float, below: int | None) -> Any:
+    def _find_in_sight(self, operator: str, offset: float) -> Any:
         region = self.region()
         x = region.x + int(region.width * offset)
-        for y in range(below or region.y + region.height - ROW, region.y, -ROW):
+        for y in range(region.y + region.height - ROW, region.y, -ROW):
             bpy.context.window_manager.clipboard = ""
             yield from self.move(x, y)
             yield from self.key("C", ctrl=True)
@@ -152,8 +160,8 @@ class Hand:
                 return x, y
         return None
 
-    def press_button(self, operator: str, offset: float = 0.5, *, below: int | None = None) -> Steps:
-        place = yield from self.find_button(operator, offset, below=below)
+    def press_button(self, operator: str, offset: float = 0.5) -> Steps:
+        place = yield from self.find_button(operator, offset)
         if place is None:
             raise LookupError(f"there is no button for {operator} in the sidebar")
         yield from self.click(*place)

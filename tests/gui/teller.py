@@ -30,14 +30,21 @@ def tell():
 telling = tell()
 
 
+def note() -> None:
+    """Write down what is known, as Blender might not live until the end."""
+    (folder / "facts.json").write_text(json.dumps(facts, indent=2, default=str), encoding="utf-8")
+
+
 def go_on() -> float | None:
     try:
-        return next(telling)
+        pause = next(telling)
+        note()
+        return pause
     except StopIteration:
         facts["finished"] = True
     except Exception:
         facts["error"] = traceback.format_exc()
-    (folder / "facts.json").write_text(json.dumps(facts, indent=2, default=str), encoding="utf-8")
+    note()
     bpy.ops.wm.quit_blender()
     return None
 

@@ -39,7 +39,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
             yield from hand.picture("panel_baking")
             yield from hand.key("ESC")
         else:
-            yield from hand.press_button("softground.cancel_bake", below=button[1])
+            yield from hand.click_down_from(button, until=lambda: not session().is_baking)
         yield from hand.wait_for(lambda: not session().is_baking, 5)
         facts[f"{way_out}: as before"] = fingerprints.of_file() == before
     scene().softground.cell_size = CELLS
