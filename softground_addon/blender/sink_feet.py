@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 
 from . import bake_report, baked_ground, ground_mesh, staleness
@@ -37,7 +39,8 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
         done = True
     finally:
         if not done:
-            options.grounding.use, options.output = settings
+            with suppress(ReferenceError):  # the scene itself may have been deleted
+                scene.softground.grounding.use, scene.softground.output = settings
     _note(scene, result, up_to_date)
     return result
 
