@@ -70,3 +70,26 @@ def clamped_spline(
     a, b, da, db = flat[i], flat[i + 1], slope[i] * w, slope[i + 1] * w
     result = a + s * (da + s * (3 * (b - a) - 2 * da - db + s * (2 * (a - b) + da + db)))
     return result.reshape(*u.shape, *shape)
+
+
+def quintic_path(
+    times: ArrayLike, knots: ArrayLike, values: ArrayLike, slopes: ArrayLike, curvatures: ArrayLike
+) -> Array:
+    """Path through values (K, ...) at increasing knots with given slopes and curvatures there, fifth degree between.
+
+    Outside the knots the end values continue. Where slopes and curvatures are those of a fall, so is the path.
+    """
+    t, knots = np.asarray(times, float), np.asarray(knots, float)
+    p, v, a = (np.asarray(part, float) for part in (values, slopes, curvatures))
+    t = np.clip(t, knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
+    shape = (-1, *[1] * (p.ndim - 1))
+    width = (knots[i + 1] - knots[i]).reshape(shape)
+    u = (t - knots[i]).reshape(shape) / width
+    p0, p1, v0, v1 = p[i], p[i + 1], v[i] * width, v[i + 1] * width
+    a0, a1 = a[i] * width**2, a[i + 1] * width**2
+    rise = p1 - p0
+    c3 = 10 * rise - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15 * rise + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+    c5 = 6 * rise - 3 * (v0 + v1) - 0.5 * (a0 - a1)
+    return p0 + u * (v0 + u * (a0 / 2 + u * (c3 + u * (c4 + u * c5))))

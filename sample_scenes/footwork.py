@@ -74,6 +74,14 @@ class Roll:
     toe_bend: float
     held_toes: bool = False
 
+    def stance_phase(self, part: Array, fall: Footfall) -> Array:  # noqa: ARG002  (the same in every stance)
+        """Phase at parts (F,) of a stance."""
+        return self.duty_factor * part
+
+    def swing_phase(self, part: Array, fall: Footfall, following: Footfall) -> Array:  # noqa: ARG002  (in every swing)
+        """Phase at parts (F,) of the swing between two footfalls."""
+        return self.duty_factor + (1 - self.duty_factor) * part
+
     def pitch(self, phase: Array) -> Array:
         """Foot pitch at phases of the stride, 0 at heel strike [rad]."""
         duty = self.duty_factor
@@ -86,20 +94,62 @@ class Roll:
             swing = np.clip((phase - self.duty_factor) / (1 - self.duty_factor), 0.0, 1.0)
             return -self.pitch(phase) + np.radians(7.0) * np.sin(np.pi * swing) ** 2
         duty, landing_bend = self.duty_factor, np.radians(8.0)
-        limit, give = np.radians(self.toe_bend), np.radians(10.0)
 
         def planted(at: Array) -> Array:
             pitch = self.pitch(at)
-            heel_up = np.maximum(-pitch, 0.0)
-            beyond = np.maximum(heel_up - limit, 0.0)
-            flat = np.where(heel_up < limit, heel_up, limit + give * (1 - np.exp(-beyond / give)))
             strike = max(np.radians(self.stance[1][0]), 1e-9)
-            return flat + landing_bend * np.clip(pitch / strike, 0.0, 1.0)
+            return _toes_up(-pitch, np.radians(self.toe_bend)) + landing_bend * np.clip(pitch / strike, 0.0, 1.0)
 
         swing = np.clip((phase - duty) / (1 - duty), 0.0, 1.0)
         relax = monotone_cubic(swing, (0.0, 0.12, 0.6, 1.0), (1.0, 0.95, 0.1, 0.0))
         landing = landing_bend * (3 * swing**2 - 2 * swing**3) * (self.stance[1][0] > 0)
-        return np.where(phase < duty, planted(phase), planted(np.array([duty - 1e-9])) * relax + landing)
+        return np.where(phase < duty, planted(phase), planted(np.array([duty * (1 - 1e-12)])) * relax + landing)
+
+
+def _toes_up(heel_up: Array, limit: float) -> Array:
+    """Bend of toes that stay flat under a lifted heel until they can bend no further [rad]."""
+    give = np.radians(10.0)
+    beyond = np.maximum(heel_up - limit, 0.0)
+    return np.where(heel_up < limit, np.maximum(heel_up, 0.0), limit + give * (1 - np.exp(-beyond / give)))
+
+
+@dataclass(frozen=True)
+class KeyedRoll:
+    """Pitch of a foot over a motion that does not repeat; its phase is the time [s].
+
+    Attributes
+    ----------
+    keys : tuple of (float, float)
+        Times [s] and the pitch there, toes up positive [degrees].
+    footfalls : tuple of Footfall
+        When the foot is on the ground, and its toes flat.
+    toe_bend : float
+        Bend of the toes beyond which they lift too [degrees].
+    """
+
+    keys: tuple[tuple[float, float], ...]
+    footfalls: tuple[Footfall, ...]
+    toe_bend: float = 38.0
+
+    def stance_phase(self, part: Array, fall: Footfall) -> Array:
+        """Times at parts (F,) of a stance [s]."""
+        return fall.strike + part * (fall.leave - fall.strike)
+
+    def swing_phase(self, part: Array, fall: Footfall, following: Footfall) -> Array:
+        """Times at parts (F,) of the swing between two footfalls [s]."""
+        return fall.leave + part * (following.strike - fall.leave)
+
+    def pitch(self, phase: Array) -> Array:
+        """Foot pitch at times [rad]."""
+        times, values = np.transpose(self.keys)
+        return monotone_cubic(phase, times, np.radians(values))
+
+    def bend(self, phase: Array) -> Array:
+        """Toes up relative to the foot [rad]: flat in stance, relaxed in the air."""
+        away = np.min([np.maximum(np.maximum(f.strike - phase, phase - f.leave), 0.0) for f in self.footfalls], axis=0)
+        relaxed = np.clip(away / 0.25, 0.0, 1.0)
+        flat = 1 - relaxed**2 * (3 - 2 * relaxed)
+        return flat * _toes_up(-self.pitch(phase), np.radians(self.toe_bend))
 
 
 class FootCourse:
@@ -114,7 +164,9 @@ class FootCourse:
         Velocity of the ankle at landing beyond that of the rolling foot, in the footfall's frame [m/s].
     """
 
-    def __init__(self, shape: Foot, roll: Roll, swing_path: SwingPath, touch_down: tuple[float, float, float]) -> None:
+    def __init__(
+        self, shape: Foot, roll: Roll | KeyedRoll, swing_path: SwingPath, touch_down: tuple[float, float, float]
+    ) -> None:
         self.shape, self.roll, self.swing_path = shape, roll, swing_path
         self.touch_down = np.array(touch_down)
 
@@ -123,15 +175,15 @@ class FootCourse:
         count = len(times)
         phase, ankle = np.zeros(count), np.zeros((count, 3))
         tilt = np.zeros((count, 3))  # heading, slope, bank
-        duty = self.roll.duty_factor
         for fall, following in pairwise(footfalls):
             here = (times >= fall.strike) & (times < following.strike)
             stance = (times[here] - fall.strike) / (fall.leave - fall.strike)
             swing = np.clip((times[here] - fall.leave) / (following.strike - fall.leave), 0.0, 1.0)
-            phase[here] = np.where(stance < 1, duty * stance, duty + (1 - duty) * swing)
+            planted = self.roll.stance_phase(np.minimum(stance, 1 - 1e-12), fall)
+            phase[here] = np.where(stance < 1, planted, self.roll.swing_phase(swing, fall, following))
             ankle[here] = np.where(
                 (stance < 1)[:, None],
-                fall.place + self._rolling(duty * np.minimum(stance, 1 - 1e-9)) @ ground_frame(fall).T,
+                fall.place + self._rolling(planted) @ ground_frame(fall).T,
                 self.swing_path(swing, self._swing(fall, following)),
             )
             eased = (3 * swing**2 - 2 * swing**3)[:, None]
@@ -142,10 +194,10 @@ class FootCourse:
         return FootPoses(ankle, foot, toe, tilt[:, 0])
 
     def _swing(self, fall: Footfall, following: Footfall) -> Swing:
-        duty, time = self.roll.duty_factor, following.strike - fall.leave
+        time = following.strike - fall.leave
         here, there = ground_frame(fall), ground_frame(following)
-        leaving = self._rolling(duty * np.array((1 - _INSTANT, 1 - 1e-9))) @ here.T
-        landing = self._rolling(duty * np.array((0.0, _INSTANT))) @ there.T
+        leaving = self._rolling(self.roll.stance_phase(np.array((1 - _INSTANT, 1 - 1e-12)), fall)) @ here.T
+        landing = self._rolling(self.roll.stance_phase(np.array((0.0, _INSTANT)), following)) @ there.T
         leave_velocity = (leaving[1] - leaving[0]) / (_INSTANT * (fall.leave - fall.strike))
         land_velocity = (landing[1] - landing[0]) / (_INSTANT * (following.leave - following.strike))
         land_velocity = land_velocity + there @ self.touch_down
