@@ -159,6 +159,8 @@ class Press:
 
     def _found(self, stance: Stance, window: Window, state: Array) -> Array:
         """Compression of a window that a stance found when it began: all but its own (rows, columns) [m]."""
+        if stance.pressed is None and stance.earlier is not None:
+            stance.pressed = stance.earlier.pressed
         if stance.pressed is None:
             stance.pressed = SparseGrid(self.cell_size, channels=1)
         return np.maximum(state[0] - stance.pressed.read(window)[0], 0.0)

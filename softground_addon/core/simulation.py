@@ -20,7 +20,7 @@ from .forces import ContactForces, impulse_forces, whole_body_forces
 from .free_bodies import free_loads
 from .heightfield import HeightField, Terrain, Window
 from .imprint import sole_points
-from .motion import CharacterMotion, steps_per_frame
+from .motion import CharacterMotion, SoleMotion, steps_per_frame
 from .pressing import Press
 from .pressure import Pressure
 from .solid_stance import SolidStance
@@ -28,6 +28,9 @@ from .stance import SoleStance, Stance, Steps, Timing
 from .variation import Variation
 
 Array = NDArray[np.float64]
+
+LONGEST_TRACK = 8.0
+"""Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
 
 ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
 
@@ -239,13 +242,16 @@ class Simulation:
         for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True)):
             for index, motion in enumerate(character.motion.soles):
                 points = None
-                for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
+                stance: Stance | None = None
+                for first, end in _tracks(motion, character.contacts.touching[:, index]):
+                    earlier = stance if stance and stance.end == first + offset else None
                     begin = max(int(first), 1 - offset)  # the first step of the grid is a state, it presses nothing
                     if begin == end:
                         continue
                     stance = before.pop((number, index), None) if first + offset == 0 else None
                     if stance is None and motion.sole.solid:
                         stance = SolidStance(character.motion.name, motion.sole)
+                        stance.earlier = earlier
                     elif stance is None:
                         points = points or sole_points(motion.sole, motion.transforms)
                         stance = SoleStance(character.motion.name, motion.sole, points)
@@ -266,6 +272,20 @@ class Simulation:
                     stances.append(stance)
         stances.sort(key=lambda stance: stance.first)  # stable: in the order of the scene where they start together
         return stances, list(before.values())
+
+
+def _tracks(motion: SoleMotion, touching: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First steps of the contacts, and the steps after their last; those of a body that travels far are cut."""
+    solid = motion.sole.solid
+    for first, end in zip(*runs(touching), strict=True):
+        begin = int(first)
+        if solid is not None:
+            place = motion.transforms[:, 0, :2, 3]
+            for step in range(begin + 1, int(end)):
+                if np.abs(place[step] - place[begin]).max() > LONGEST_TRACK * solid.extent.max():
+                    yield begin, step
+                    begin = step
+        yield begin, int(end)
 
 
 @dataclass(frozen=True)

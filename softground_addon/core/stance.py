@@ -182,6 +182,13 @@ class Stance(ABC):
     ----------
     character : str
     sole : Sole
+
+    Attributes
+    ----------
+    earlier : Stance or None
+        The stance that this one goes on from without leaving the ground, where a long track is cut into several.
+    pressed : SparseGrid or None
+        What it compressed itself, kept where the ground hardens.
     """
 
     def __init__(self, character: str, sole: Sole) -> None:
@@ -190,6 +197,7 @@ class Stance(ABC):
         self.compressed = self.raised = self.unplaced = 0.0
         self.recorder: FootprintRecorder | None = None
         self.pressed: SparseGrid | None = None
+        self.earlier: Stance | None = None
         self._frames: list[Array] = []
         self._forces: list[Array] = []
         self._peak = self._heading = self._area = self._sinkage = self._load = self._descent = 0.0

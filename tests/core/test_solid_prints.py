@@ -188,3 +188,17 @@ def test_twenty_times_on_one_spot_stays_stable(hardening):
     assert added[1:].sum() <= added[0] * 0.6
     if hardening:
         assert added[1] < 0.3 * added[0]
+
+
+@pytest.mark.parametrize("hardening", [0.0, 10.0])
+def test_a_long_track_is_cut_into_prints_that_join_without_a_seam(hardening, monkeypatch):
+    material = replace(GROUND, hardening=hardening)
+    loads = rolling(24, speed=2.0)
+    ground, prints = pressed(loads, material)
+    monkeypatch.setattr("softground_addon.core.simulation.LONGEST_TRACK", 1.0)
+    cut, pieces = pressed(loads, material)
+    assert len(prints) == 1
+    assert len(pieces) > 3
+    assert cut.volumes() == pytest.approx(ground.volumes(), rel=1e-5)
+    x = np.arange(0.1, 2.9, 0.01)
+    assert cut.sample(x, 0 * x) == pytest.approx(ground.sample(x, 0 * x), abs=1e-5)
