@@ -1,0 +1,33 @@
+"""What the user sets: `scene.softground`, saved with the .blend. Lengths are metres whatever the scene's units."""
+
+from __future__ import annotations
+
+from .character import DEFAULT_MASS, SoftGroundCharacter, SoftGroundJoint, SoftGroundSole
+from .material import SoftGroundMaterial, SoftGroundPainted
+from .response import SoftGroundGrounding, SoftGroundTilt
+from .scene import DEFAULT_CELL_SIZE, SoftGroundSettings
+
+CLASSES = (
+    SoftGroundJoint,
+    SoftGroundSole,
+    SoftGroundCharacter,
+    SoftGroundMaterial,
+    SoftGroundPainted,
+    SoftGroundTilt,
+    SoftGroundGrounding,
+    SoftGroundSettings,
+)
+
+__all__ = [
+    "CLASSES",
+    "DEFAULT_CELL_SIZE",
+    "DEFAULT_MASS",
+    "SoftGroundCharacter",
+    "SoftGroundGrounding",
+    "SoftGroundJoint",
+    "SoftGroundMaterial",
+    "SoftGroundPainted",
+    "SoftGroundSettings",
+    "SoftGroundSole",
+    "SoftGroundTilt",
+]

@@ -1,0 +1,110 @@
+"""What the user sets of characters: what prints, how heavy it is, where its joints are."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from .. import nla_layer, settings
+from .fields import is_mesh
+
+DEFAULT_MASS = 77.5
+"""Body mass of the paper's character [kg]."""
+
+
+def _is_armature(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "ARMATURE"
+
+
+def _show_response(character: SoftGroundCharacter, _context: bpy.types.Context) -> None:
+    if character.armature:
+        nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
+
+
+class SoftGroundJoint(bpy.types.PropertyGroup):
+    """Which bone carries one joint of the body; `name` is the joint."""
+
+    bone: StringProperty(name="Bone", description="Bone that carries this joint")
+    end: EnumProperty(
+        name="End",
+        description="Which end of the bone is the joint",
+        items=[
+            ("HEAD", "Head", "The joint is at the bone's head"),
+            ("TAIL", "Tail", "The joint is at the bone's tail"),
+        ],
+    )
+
+
+class SoftGroundSole(bpy.types.PropertyGroup):
+    """One thing that prints; `name` is what the report calls it."""
+
+    side: EnumProperty(
+        name="Side",
+        description="Side of the body",
+        items=[("LEFT", "Left", ""), ("RIGHT", "Right", ""), ("NONE", "None", "Neither left nor right")],
+        default="NONE",
+    )
+    kind: EnumProperty(
+        name="Kind",
+        description="How the bone prints",
+        items=[
+            ("FOOT", "Foot", "With a sole from heel to toes: feet, paws and hooves"),
+            ("LIMB", "Limb", "With whatever side of it faces down: hands, knees, elbows, backs"),
+        ],
+        default="FOOT",
+    )
+    bone: StringProperty(name="Bone", description="Bone that carries the sole; of a foot, from heel to ball")
+    toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
+    object: PointerProperty(
+        name="Object",
+        description="Object that prints in place of a bone, with whatever side of its mesh faces down: a snowshoe, a "
+        "cane, a ball, a wheel",
+        type=bpy.types.Object,
+        poll=is_mesh,
+    )
+
+
+class SoftGroundCharacter(bpy.types.PropertyGroup):
+    """A rig that walks on the ground."""
+
+    armature: PointerProperty(
+        name="Armature",
+        description="Animated armature that leaves the prints; empty for things that fall, roll and slide",
+        type=bpy.types.Object,
+        poll=_is_armature,
+    )
+    mass: FloatProperty(
+        name="Mass (kg)",
+        description="Mass in kilograms; of a character, with clothes and load. The depth of the prints grows with it",
+        default=DEFAULT_MASS,
+        min=0.0,
+        soft_min=0.1,
+        soft_max=500.0,
+        precision=1,
+    )
+    force_model: EnumProperty(
+        name="Forces",
+        description="How the force under each foot is estimated from the animation",
+        items=[
+            ("WHOLE_BODY", "Whole Body", "From the acceleration of the body's centre of mass: best for baking"),
+            (
+                "IMPULSE",
+                "Impulse",
+                "Weight plus the momentum of the landing foot, as in the paper; needs no look-ahead",
+            ),
+        ],
+        default="WHOLE_BODY",
+    )
+    response_strength: FloatProperty(
+        name="Response",
+        description="How much of the baked response shows: 0 is the animation as it was made, 1 the response as baked. "
+        "Needs no new bake",
+        default=1.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+        update=_show_response,
+    )
+    joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
+    soles: CollectionProperty(name="Soles", type=SoftGroundSole)
+    active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})

@@ -1,0 +1,190 @@
+"""What the user sets of the ground's material. Lengths are metres whatever the scene's units."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, StringProperty
+
+from ...core.presets import MATERIAL_RANGES, SURFACES
+from .fields import in_unit
+
+
+def _limits(field: str) -> dict[str, float]:
+    low, high = MATERIAL_RANGES[field]
+    return {"min": low, "max": high}
+
+
+class SoftGroundMaterial(bpy.types.PropertyGroup):
+    """The ground's physics; see `core.deformation.GroundMaterial`."""
+
+    preset: StringProperty(name="Preset", description="Preset that was loaded last", default="Snow")
+    surface: EnumProperty(
+        name="Look",
+        description="Render material that a created ground gets",
+        items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
+        default="snow",
+    )
+    youngs_modulus: FloatProperty(
+        name="Young's Modulus (Pa)",
+        description=(
+            "Stiffness of the loose layer, in pascals: prints are half as deep at twice the value. An effective "
+            "modulus for compaction, far below the elastic one from textbooks"
+        ),
+        default=375e3,
+        precision=0,
+        step=1000000,
+        **_limits("youngs_modulus"),
+    )
+    poisson_ratio: FloatProperty(
+        name="Poisson's Ratio",
+        description="How much of the pressed-down volume rises around the foot: none at 0, all of it at 0.5 (sand)",
+        default=0.05,
+        precision=3,
+        **_limits("poisson_ratio"),
+    )
+    characteristic_time: FloatProperty(
+        name="Time",
+        description="How long the ground takes to give way under a steady load",
+        default=0.2,
+        precision=3,
+        unit="TIME_ABSOLUTE",
+        **_limits("characteristic_time"),
+    )
+    layer_depth: FloatProperty(
+        name="Layer Depth (m)",
+        description="Thickness of the loose layer, in metres. No print is deeper",
+        default=0.3,
+        precision=3,
+        soft_max=2.0,
+        **_limits("layer_depth"),
+    )
+    rim_reach: FloatProperty(
+        name="Rim Reach (m)",
+        description="How far around the foot the displaced ground rises, in metres",
+        default=0.04,
+        precision=3,
+        soft_max=0.5,
+        **_limits("rim_reach"),
+    )
+    blur_sigma: FloatProperty(
+        name="Smoothing (m)",
+        description="Width of the blur that the shown ground gets, in metres. Forces and depths do not see it",
+        default=0.005,
+        precision=4,
+        soft_max=0.05,
+        **_limits("blur_sigma"),
+    )
+    rim_bias: FloatProperty(
+        name="Rim Ahead",
+        description="How much more of the rim rises ahead of a moving foot than behind it: 0 none, 1 all of it",
+        default=0.0,
+        subtype="FACTOR",
+        **_limits("rim_bias"),
+    )
+    repose_angle: FloatProperty(
+        name="Angle of Repose",
+        description="Steepest slope that loose ground keeps: rims and walls slide down to it. 0 keeps them as pressed; "
+        "dry sand has 32°",
+        default=0.0,
+        subtype="ANGLE",
+        **_limits("repose_angle"),
+    )
+    shortest_time: FloatProperty(
+        name="Shortest Time",
+        description="Under a fast landing the ground gives way within the time that the foot takes to stop, down to "
+        "this. 0 always takes the full time",
+        default=0.0,
+        precision=3,
+        soft_max=0.2,
+        unit="TIME_ABSOLUTE",
+        **_limits("shortest_time"),
+    )
+    hardening: FloatProperty(
+        name="Hardening",
+        description="How much stiffer trodden ground is under the next foot: at 10, a second step like the first adds "
+        "less than a third of it. 0 turns it off",
+        default=0.0,
+        precision=1,
+        soft_max=50.0,
+        **_limits("hardening"),
+    )
+    crust_stress: FloatProperty(
+        name="Crust (Pa)",
+        description="Pressure at which the crust on untouched ground breaks, in pascals; what presses less leaves no "
+        "print. A person stands with about 20 kPa, walks with 40. 0 is no crust",
+        default=0.0,
+        precision=0,
+        soft_max=100e3,
+        step=100000,
+        **_limits("crust_stress"),
+    )
+    firm_depth: FloatProperty(
+        name="Firm Below (m)",
+        description="Depth of compression below which the ground is ten times stiffer, in metres. 0 is loose all "
+        "through",
+        default=0.0,
+        precision=3,
+        soft_max=0.3,
+        **_limits("firm_depth"),
+    )
+
+    stiffness_mpa: FloatProperty(
+        name="Stiffness (MPa)",
+        description=(
+            "Young's modulus of the loose layer, in megapascals: prints are half as deep at twice the value. An "
+            "effective modulus for compaction, far below the elastic one from textbooks"
+        ),
+        min=1e-3,
+        soft_min=0.02,
+        soft_max=5.0,
+        precision=3,
+        step=1,
+        **in_unit("youngs_modulus", 1e6),
+    )
+    layer_depth_cm: FloatProperty(
+        name="Layer Depth (cm)",
+        description="Thickness of the loose layer, in centimetres. No print is deeper",
+        min=0.1,
+        soft_max=100.0,
+        precision=1,
+        **in_unit("layer_depth", 0.01),
+    )
+    rim_reach_cm: FloatProperty(
+        name="Rim Reach (cm)",
+        description="How far around the foot the displaced ground rises, in centimetres",
+        min=0.0,
+        soft_max=20.0,
+        precision=1,
+        **in_unit("rim_reach", 0.01),
+    )
+    blur_sigma_cm: FloatProperty(
+        name="Smoothing (cm)",
+        description="Width of the blur that the shown ground gets, in centimetres. Forces and depths do not see it",
+        min=0.0,
+        soft_max=5.0,
+        precision=2,
+        **in_unit("blur_sigma", 0.01),
+    )
+
+
+class SoftGroundPainted(bpy.types.PropertyGroup):
+    """Vertex groups or float attributes of the ground's mesh that scale its material; see `core.variation`."""
+
+    stiffness: StringProperty(
+        name="Stiffness",
+        description="Vertex group or float attribute of the ground by which its stiffness is multiplied: 1 is as the "
+        "material says, 0.5 half as stiff. Vertices outside the group are as the material says",
+        default="softground_stiffness",
+    )
+    layer_depth: StringProperty(
+        name="Layer Depth",
+        description="Vertex group or float attribute of the ground by which the depth of its loose layer is "
+        "multiplied: 1 is as the material says, 0 takes no print",
+        default="softground_layer_depth",
+    )
+    rim: StringProperty(
+        name="Rim",
+        description="Vertex group or float attribute of the ground by which the volume of its rims is multiplied: 1 is "
+        "as the material says, 0 raises no rim",
+        default="softground_rim_factor",
+    )

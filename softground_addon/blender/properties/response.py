@@ -1,0 +1,112 @@
+"""What the user sets of how characters answer the ground."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+
+class SoftGroundTilt(bpy.types.PropertyGroup):
+    """How bodies lean on sloping and yielding ground; see `core.tilt`."""
+
+    use: BoolProperty(
+        name="Tilt",
+        description="Let the body lean into slopes and sway over the ground that gives way, as a layer of keys above "
+        "the animation",
+        default=False,
+    )
+    frequency: FloatProperty(
+        name="Frequency (Hz)",
+        description="How fast the body swings back to balance, in swings per second",
+        default=0.6,
+        min=0.02,
+        max=5.0,
+        soft_min=0.2,
+        soft_max=2.0,
+        precision=2,
+    )
+    damping: FloatProperty(
+        name="Damping",
+        description="1 comes to rest without swinging past, less swings on, more is sluggish",
+        default=0.85,
+        min=0.0,
+        max=5.0,
+        soft_min=0.1,
+        soft_max=1.5,
+        precision=2,
+    )
+    strength: FloatProperty(
+        name="Strength",
+        description="How much of a slope the body leans by: 1 by as much as the ground rises",
+        default=0.5,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    lateral: FloatProperty(
+        name="Sideways",
+        description="How much of that it also leans on slopes across its way",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+
+
+class SoftGroundGrounding(bpy.types.PropertyGroup):
+    """How feet, legs and hips follow the pressed ground; see `core.grounding`."""
+
+    use: BoolProperty(
+        name="Grounding",
+        description="Let the feet sink with the ground they press and stand on its slopes, with hips and knees to "
+        "match, as a layer of keys above the animation",
+        default=False,
+    )
+    align: FloatProperty(
+        name="Align Feet",
+        description="How much of the ground's slope the feet take on, within what an ankle can bend",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    lock: FloatProperty(
+        name="Lock Slides",
+        description="How much of the animation's sliding is taken out of feet that stand",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    knee_lift: FloatProperty(
+        name="Lift Knees",
+        description="Lift swinging feet higher, at 1 by as much as they had sunk",
+        default=0.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    hold: FloatProperty(
+        name="Hold Feet",
+        description="Let feet stay longer in deep ground and catch up in their swing",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    crouch: FloatProperty(
+        name="Bend Knees",
+        description="Bring the hips down in deep ground, at 1 by half the sinkage",
+        default=0.0,
+        min=0.0,
+        max=2.0,
+        subtype="FACTOR",
+    )
+    arms: FloatProperty(
+        name="Arms Out",
+        description="Raise the arms sideways for balance in deep ground",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )

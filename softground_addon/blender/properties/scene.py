@@ -1,0 +1,97 @@
+"""What the user sets of a scene: `scene.softground`, saved with the .blend."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+from .character import SoftGroundCharacter
+from .fields import in_unit, is_mesh
+from .material import SoftGroundMaterial, SoftGroundPainted
+from .response import SoftGroundGrounding, SoftGroundTilt
+
+DEFAULT_CELL_SIZE = 0.01
+"""Fine enough for the edge of a human print [m]."""
+
+
+class SoftGroundSettings(bpy.types.PropertyGroup):
+    """Everything that a bake reads."""
+
+    ground: PointerProperty(
+        name="Ground", description="Mesh that gives way under the characters", type=bpy.types.Object, poll=is_mesh
+    )
+    characters: CollectionProperty(name="Characters", type=SoftGroundCharacter)
+    active_character: IntProperty(name="Active Character", options={"HIDDEN"})
+    material: PointerProperty(name="Material", type=SoftGroundMaterial)
+    cell_size: FloatProperty(
+        name="Cell Size (m)",
+        description="Size of the cells in which the ground is computed, in metres",
+        default=DEFAULT_CELL_SIZE,
+        min=1e-4,
+        max=1.0,
+        soft_min=0.002,
+        soft_max=0.05,
+        precision=4,
+    )
+    cell_size_cm: FloatProperty(
+        name="Cell Size (cm)",
+        description="Size of the cells in which the ground is computed, in centimetres. Half the size takes four times "
+        "the memory; the depth of the prints does not depend on it",
+        min=0.01,
+        max=100.0,
+        soft_min=0.2,
+        soft_max=5.0,
+        precision=2,
+        **in_unit("cell_size", 0.01),
+    )
+    shape_keys: BoolProperty(
+        name="Shape Keys",
+        description=(
+            "Keep the raw and the smoothed heights as shape keys, to sculpt or blend. "
+            "Without them a dense ground plays several times faster"
+        ),
+        default=True,
+    )
+    detail: EnumProperty(
+        name="Detail",
+        description="Whether a fine copy of the ground along the trail takes the prints, with the ground hidden",
+        items=[
+            ("AUTO", "Automatic", "Where the ground is too coarse to show the prints"),
+            ("ALWAYS", "Always", "Fine along the trail even where the ground itself could show the prints"),
+            ("NEVER", "Never", "Press the ground's own vertices"),
+        ],
+        default="AUTO",
+    )
+    output: EnumProperty(
+        name="Bake",
+        description="What a bake makes",
+        items=[
+            ("BOTH", "Prints and Response", "Footprints in the ground, and the characters' response where it is on"),
+            ("PRINTS", "Prints Only", "Footprints in the ground; the characters stay as they are animated"),
+            ("RESPONSE", "Response Only", "The characters' response; the ground stays as it is"),
+        ],
+        default="BOTH",
+    )
+    painted: PointerProperty(name="Painted", type=SoftGroundPainted)
+    pressure: EnumProperty(
+        name="Pressure",
+        description="How the force on a foot spreads over its contact",
+        items=[
+            ("UNIFORM", "Even", "The same pressure under all of the foot that touches, as in the paper"),
+            (
+                "CENTRE_OF_PRESSURE",
+                "Rolling",
+                "Most pressure where the force acts, from the heel to the toes: steps have deep heels and toes",
+            ),
+        ],
+        default="UNIFORM",
+    )
+    tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
+    grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
+    frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
+    frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    keep_forces: BoolProperty(
+        name="Forces in Report",
+        description="Write the force under each sole at each frame into the report",
+        default=False,
+    )
