@@ -3,26 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.cell_keys import AROUND, among, cells_at, keys_at, keys_of
 from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
-from ..core.heightfield import Terrain
+from ..core.heightfield import TILE, Terrain
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads
 from ..core.terrain import MeshTerrain
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 COARSEST_SPACING = 0.25
 """Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""
 
-DETAIL_FROM = 4.0
+DETAIL_FROM = 4
 """Spacing of ground vertices under the prints from which the ground is refined along the trail, in cells."""
+
+CROWD = 4
+"""Vertices in a square of `DETAIL_FROM` cells from which the ground counts as fine there."""
+
+MOST_MISSED = 0.02
+"""Share of the prints' area that may lie far from any vertex before the ground is refined along the trail."""
 
 RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
@@ -51,28 +60,73 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: bp
         )
 
 
-def vertex_spacing(vertices: Array, pressed: PressedGround) -> float:
-    """Distance between the ground's vertices under the prints [m], infinite where there are none."""
-    compression = pressed.raw.sample(*vertices[:, :2].T)[0]
-    cells = sum(int((tile[0] > 0).sum()) for tile in pressed.raw.tiles.values())
-    under_prints = cells * pressed.raw.cell_size**2
-    return float(np.sqrt(under_prints / max(1e-9, float((compression > 0).sum()))))
+@dataclass(frozen=True)
+class Coverage:
+    """How densely the ground's vertices lie under the prints.
+
+    Attributes
+    ----------
+    spacing : float
+        Distance between them on average [m], infinite where there are none.
+    missed : float
+        Share of the prints' area that is far from any of them.
+    is_fine_somewhere : bool
+        Whether the ground is fine enough anywhere, such as under other prints.
+    """
+
+    spacing: float
+    missed: float
+    is_fine_somewhere: bool
+
+
+def coverage(vertices: Array, index: Indices, pressed: PressedGround) -> Coverage:
+    """How densely vertices (V, 3), of which those in `index` are moved, lie under the prints."""
+    place = vertices[index, :2]
+    compression = pressed.raw.sample(*place.T)[0]
+    cell_size = pressed.raw.cell_size
+    printed = np.concatenate(
+        [np.zeros((0, 2), dtype=np.intp)]
+        + [
+            np.argwhere(pressed.raw.tiles[tile][0] > 0)[:, ::-1] + np.array(tile) * TILE
+            for tile in sorted(pressed.raw.tiles)
+        ]
+    )
+    spacing = float(np.sqrt(len(printed) * cell_size**2 / max(1e-9, float((compression > 0).sum()))))
+    block = DETAIL_FROM * cell_size
+    near = np.unique(cells_at(place, block)[:, None] + AROUND)
+    missed = ~among(near, keys_of(printed // DETAIL_FROM))
+    _, crowd = np.unique(keys_at(vertices[:, :2], block), return_counts=True)
+    return Coverage(spacing, float(missed.mean()) if len(missed) else 0.0, bool(crowd.max(initial=0) >= CROWD))
 
 
 def wants_detail(
-    ground: bpy.types.Object, spacing: float, detail: str, cell_size: float, loads: Sequence[CharacterLoads]
+    ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, loads: Sequence[CharacterLoads]
 ) -> bool:
     """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
-    if detail == "ALWAYS" or (detail == "AUTO" and spacing > DETAIL_FROM * cell_size):
+    coarse = cover.spacing > DETAIL_FROM * cell_size or cover.missed > MOST_MISSED
+    if detail == "ALWAYS" or (detail == "AUTO" and coarse):
         return True
     length = min(sole.sole.length for character in loads for sole in character.motion.soles)
-    if spacing > COARSEST_SPACING * length:
+    if cover.spacing > COARSEST_SPACING * length:
         raise InputError(
             f"Ground '{ground.name}' is too coarse: its vertices are more than {COARSEST_SPACING * length * 100:.0f} "
             f"cm apart under soles of {length * 100:.0f} cm. Set Detail to Automatic in the Ground panel, or Subdivide "
             "the ground."
         )
     return False
+
+
+def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str) -> list[str]:
+    """What the user should know about prints that leave the fine part of a ground."""
+    if cover.missed <= MOST_MISSED or not cover.is_fine_somewhere:
+        return []
+    left = f"{cover.missed:.0%} of the prints' area lies where ground '{ground.name}' has few vertices"
+    if detail == "NEVER":
+        return [f"{left} and is not shown: set Detail to Automatic in the Ground panel, or create the ground anew."]
+    return [
+        f"{left}: a finer copy, '{ground.name} Trail', takes the prints. To have them on '{ground.name}' itself, clear "
+        "the bake and create the ground anew."
+    ]
 
 
 def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 import zlib
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -21,15 +22,23 @@ from ..core.cell_limits import check_cell_size
 from ..core.footprints import Footprint
 from ..core.histories import histories
 from ..core.pressed_ground import PressedGround
+from ..core.refinement import refine
 from ..core.simulation import CharacterLoads, simulate
-from . import bake_report, baked_ground, ground_mesh, response_job, settings, staleness
-from .bake_checks import check_volumes, vertex_spacing, wants_detail
+from . import (
+    bake_report,
+    baked_ground,
+    created_ground,
+    ground_mesh,
+    response_job,
+    settings,
+    staleness,
+    trail_detail,
+)
+from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detail
 from .character_setup import characters_of, movers_of
-from .ground_mesh import GroundPlan
 from .jobs import Job, Progress, aside
-from .materials import ensure_material
 from .properties import SoftGroundCharacter
-from .shots import Shot, check_settings, estimate_shot, plan_ground, read_shot, sample_characters
+from .shots import Shot, estimate_shot, read_shot
 
 Array = NDArray[np.float64]
 
@@ -49,9 +58,7 @@ class BakeResult:
     footprints: tuple[Footprint, ...]
 
 
-def bake(  # noqa: PLR0915  (one stage after the other)
-    scene: bpy.types.Scene, *, write: bool = True, response_only: bool = False
-) -> Job[BakeResult]:
+def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = False) -> Job[BakeResult]:
     """Bake the scene's characters into its ground.
 
     Without a ground in the settings, one is created that fits the walk.
@@ -75,11 +82,7 @@ def bake(  # noqa: PLR0915  (one stage after the other)
     started = time.perf_counter()
     options = scene.softground
     characters = characters_of(scene)
-    material, cell_size = settings.material_of(scene), settings.cell_size_of(scene)
-    unit_scale = scene.unit_settings.scale_length
     shot = yield from read_shot(scene)
-    motions, plan, surface, terrain = shot.motions, shot.plan, shot.surface, shot.terrain
-    ground: bpy.types.Object | None = options.ground
     sampled = time.perf_counter()
 
     loads, footprints, forces, answers = yield from _press(scene, shot)
@@ -87,53 +90,22 @@ def bake(  # noqa: PLR0915  (one stage after the other)
 
     yield Progress("write", 0.0)
     layers = (yield from _layers(scene, characters, answers)) if write else []
-    write_ground = write and not response_only and options.output != "RESPONSE"
-    at_the_end = partial(
-        PressedGround.at,
-        footprints,
-        frame=float(options.frame_end),
-        frame_rate=motions[0].frame_rate,
-        cell_size=cell_size,
-        blur_sigma=material.blur_sigma,
-    )
-    pressed = yield from aside("write", 0.1, at_the_end)
-    vertices = surface.vertices if surface else None
-    index = np.zeros(0, dtype=np.intp)
-    refine = False
-    if ground and surface and write_ground:
-        index = yield from aside("write", 0.2, surface.pressed_vertices, pressed, terrain)
-        refine = wants_detail(
-            ground, vertex_spacing(surface.vertices[index], pressed), options.detail, cell_size, loads
-        )
-    elif write_ground:
-        ground = create_ground(scene, plan)
-        vertices = ground_mesh.rest_vertices(ground, unit_scale)
-        index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
     inputs = bake_report.inputs_of(scene)
-    if surface and surface.factors is not None:
-        inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
-    created = surface is None and write_ground
-    input_hash = yield from aside("write", 0.3, report.hash_inputs, inputs, motions, vertices, written=created)
-    playback_error: float | None = None
-    if write_ground and ground and vertices is not None:
-        about = {"inputs": inputs, "input_hash": input_hash}
-        stored = yield from aside("write", 0.4, record.dump, footprints, about, written=created)
-        fitting = partial(histories, footprints, blur_sigma=material.blur_sigma)
-        if refine:
-            place = baked_ground.on_detail(ground, pressed, terrain, cell_size, unit_scale)
-            over_time = fitting(*place.position[:, :2].T)
-        else:
-            over_time = yield from aside("write", 0.6, fitting, *vertices[index, :2].T, written=created)
-            place = baked_ground.on_itself(ground, index, vertices)
-        baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale, shape_keys=options.shape_keys)
-        playback_error = over_time.error
+    if shot.surface and shot.surface.factors is not None:
+        inputs["painted_crc32"] = f"{zlib.crc32(shot.surface.factors.tobytes()):08x}"
+    written: _Written | None = None
+    if write and not response_only and options.output != "RESPONSE":
+        written = yield from _write(scene, shot, loads, footprints, inputs)
+    else:
+        vertices = shot.surface.vertices if shot.surface else None
+        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
     if write and options.output != "PRINTS":
         response_job.put_layers(scene, characters, layers)
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
     result = report.build(
         inputs=inputs,
-        input_hash=input_hash,
+        input_hash=written.input_hash if written else input_hash,
         footprints=footprints,
         offsets_mm=bake_report.offsets_mm(loads),
         timings={
@@ -142,18 +114,100 @@ def bake(  # noqa: PLR0915  (one stage after the other)
             "write": finished - simulated,
             "frames_per_second": frames / (finished - started),
         },
-        playback_error_m=playback_error,
-        warnings=bake_report.warnings(footprints, loads, cell_size) + response_job.warnings(answers),
+        playback_error_m=written.error if written else None,
+        warnings=[
+            *bake_report.warnings(
+                footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
+            ),
+            *(written.warnings if written else ()),
+            *response_job.warnings(answers),
+        ],
         forces=forces if options.keep_forces else None,
-        gaps_mm=response_job.gap_table(answers) or response_job.gaps_left(loads, motions, terrain, footprints),
+        gaps_mm=response_job.gap_table(answers)
+        or response_job.gaps_left(loads, shot.motions, shot.terrain, footprints),
         worst_gaps=response_job.worst_gaps(answers),
-        suggested_speed=response_job.suggested_speeds(motions, footprints),
+        suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
     )
-    if write_ground and ground:
-        ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.SUMMARY] = bake_report.summary(result)
-        staleness.store(bake_report.inputs_of(scene), ground, movers_of(scene))
+    if written:
+        ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
+        staleness.store(bake_report.inputs_of(scene), written.ground, movers_of(scene))
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
+
+
+@dataclass(frozen=True)
+class _Written:
+    """What was written to the ground."""
+
+    ground: bpy.types.Object
+    carrier: bpy.types.Object
+    input_hash: str
+    error: float
+    warnings: list[str]
+
+
+def _write(
+    scene: bpy.types.Scene,
+    shot: Shot,
+    loads: Sequence[CharacterLoads],
+    footprints: Sequence[Footprint],
+    inputs: dict[str, object],
+) -> Job[_Written]:
+    """Put the prints on the ground, all of them in the last step."""
+    options = scene.softground
+    blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
+    frame_rate, unit_scale = shot.motions[0].frame_rate, scene.unit_settings.scale_length
+    at_the_end = partial(
+        PressedGround.at,
+        footprints,
+        frame=float(options.frame_end),
+        frame_rate=frame_rate,
+        cell_size=cell_size,
+        blur_sigma=blur_sigma,
+    )
+    pressed = yield from aside("write", 0.1, at_the_end)
+    warnings: list[str] = []
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        if shot.surface is None:
+            lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
+            layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, unit_scale)
+            ground = drafts.enter_context(created_ground.draft(layout))
+            inputs["ground"] = ground.name
+            vertices = layout.vertices
+            yield Progress("write", 0.3)
+            place = baked_ground.on_created(scene, ground, layout, pressed)
+        else:
+            ground, vertices = options.ground, shot.surface.vertices
+            index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, pressed, shot.terrain)
+            cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
+            place = baked_ground.on_itself(ground, index, vertices)
+            if wants_detail(ground, cover, options.detail, cell_size, loads):
+                surface = trail_detail.surface_of(ground, unit_scale)
+                region = trail_detail.region_of(pressed)
+                refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
+                mesh = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
+                yield Progress("write", 0.4)
+                fine = refinement.vertices(surface)
+                place = yield from aside(
+                    "write", 0.4, baked_ground.on_detail, ground, mesh, fine, pressed, shot.terrain
+                )
+            warnings += coverage_warnings(ground, cover, options.detail)
+        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
+        stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
+        across = place.position[:, :2].T
+        sample = yield from aside("write", 0.6, pressed.sample, *across)
+        over_time = yield from aside("write", 0.7, partial(histories, footprints, *across, blur_sigma=blur_sigma))
+        yield Progress("write", 0.9)
+        carrier = yield from baked_ground.write(
+            place,
+            sample,
+            over_time,
+            stored,
+            frame_rate=frame_rate,
+            unit_scale=unit_scale,
+            shape_keys=options.shape_keys,
+        )
+    return _Written(ground, carrier, input_hash, over_time.error, warnings)
 
 
 def _press(
@@ -194,30 +248,6 @@ def _layers(
         except StopIteration as finished:
             layers: list[response_job.Layer] = finished.value
             return layers
-
-
-def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
-    """A new flat ground with the material of the scene's preset, set as the scene's ground."""
-    ground = ground_mesh.create_grid(scene, plan, settings.cell_size_of(scene), scene.unit_settings.scale_length)
-    ground_mesh.mesh_of(ground).materials.append(ensure_material(scene.softground.material.surface))
-    scene.softground.ground = ground
-    for layer in scene.view_layers:
-        layer.update()
-    return ground
-
-
-def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
-    """The flat ground that fits the walk of the scene's characters.
-
-    Raises
-    ------
-    InputError
-        If the characters cannot be read.
-    """
-    characters = characters_of(scene)
-    check_settings(scene, characters)
-    motions = yield from sample_characters(scene, characters)
-    return plan_ground(motions)
 
 
 def _simulate(

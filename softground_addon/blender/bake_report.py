@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.footprints import Footprint
+from ..core.missed_steps import advice, missed_steps
 from ..core.simulation import CharacterLoads
 from . import properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, movers_of, title_of
@@ -31,9 +32,15 @@ MASS_RANGE = 4.0
 """Ratio of mass to that of a person of the same leg length beyond which it is asked about."""
 
 
-def warnings(footprints: Sequence[Footprint], loads: Sequence[CharacterLoads], cell_size: float) -> list[str]:
-    """What the user should know of the footprints, with the remedy."""
+def warnings(
+    footprints: Sequence[Footprint], loads: Sequence[CharacterLoads], cell_size: float, ground: str
+) -> list[str]:
+    """What the user should know of the footprints, with the remedy; the ground by its name."""
     found = []
+    for character in loads:
+        missed = missed_steps(character.motion, character.contacts)
+        if missed:
+            found.append(advice(character.motion.name, missed, f"'{ground}'"))
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         found.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +13,12 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
+from ..core.heightfield import Terrain
 from ..core.histories import Histories
-from ..core.pressed_ground import PressedGround
-from . import ground_mesh, playback, trail_detail
+from ..core.pressed_ground import GroundSample, PressedGround
+from . import created_ground, ground_mesh, playback, trail_detail
+from .created_ground import Layout
+from .jobs import Job, Progress
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -22,21 +26,24 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a bake is written.
+    """Where a bake is to be written. Nothing that the user sees is changed before `publish`.
 
     Attributes
     ----------
-    carrier : bpy.types.Object
-        The object that takes the prints.
     index : (K,) int array
-        Vertices of its mesh that the bake moves.
+        Vertices of the carrier's mesh that the bake moves.
     position : (K, 3) float array
         Their undisturbed world positions [m].
+    publish : callable
+        Takes away what stands there now, and returns the carrier: the object that takes the prints.
+    draft : bpy.types.Object, optional
+        The carrier where it is a new object, in no scene yet.
     """
 
-    carrier: bpy.types.Object
     index: Indices
     position: Array
+    publish: Callable[[], bpy.types.Object]
+    draft: bpy.types.Object | None = None
 
 
 def carrier_of(ground: bpy.types.Object) -> bpy.types.Object:
@@ -55,52 +62,92 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
+def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, pressed: PressedGround) -> Place:
+    """A ground that is not in the scene yet."""
+
+    def publish() -> bpy.types.Object:
+        created_ground.publish(scene, draft)
+        return draft
+
+    index = np.flatnonzero(pressed.covers(*layout.vertices[:, :2].T))
+    return Place(index, layout.vertices[index], publish, draft)
+
+
 def on_detail(
-    ground: bpy.types.Object, pressed: PressedGround, terrain: Any, spacing: float, unit_scale: float
+    ground: bpy.types.Object, draft: bpy.types.Object, vertices: Array, pressed: PressedGround, terrain: Terrain
 ) -> Place:
-    """Refine the ground along the trail; a bake that lies on the ground itself is taken off."""
-    ground_mesh.restore(ground)
-    detail = trail_detail.refine_ground(ground, trail_detail.region_of(pressed), spacing, unit_scale)
-    surface = ground_mesh.undisturbed_surface(detail, unit_scale)
-    index = surface.pressed_vertices(pressed, terrain)
-    return Place(detail, index, surface.vertices[index])
+    """The ground refined along the trail; a bake that lies on the ground itself is taken off.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    draft : bpy.types.Object
+        A draft of the refined ground.
+    vertices : (V, 3) float array
+        World positions of its vertices [m].
+    pressed : PressedGround
+    terrain : Terrain
+    """
+
+    def publish() -> bpy.types.Object:
+        ground_mesh.restore(ground)
+        return trail_detail.publish(ground, draft)
+
+    index = ground_mesh.pressed_vertices(vertices, pressed, terrain)
+    is_first = trail_detail.detail_of(ground) is None
+    return Place(index, vertices[index], publish, draft if is_first else None)
 
 
 def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """The ground itself; a detail that stood in for it is taken away."""
-    trail_detail.remove(ground)
-    return Place(ground, index, vertices[index])
+
+    def publish() -> bpy.types.Object:
+        trail_detail.remove(ground)
+        return ground
+
+    return Place(index, vertices[index], publish)
 
 
 def write(
     place: Place,
-    pressed: PressedGround,
+    sample: GroundSample,
     over_time: Histories,
     stored: bytes,
     *,
+    frame_rate: float,
     unit_scale: float,
     shape_keys: bool = True,
-) -> None:
-    """Put a bake on its place: the finished ground, the record, and the playback.
+) -> Job[bpy.types.Object]:
+    """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
+
+    What is there already is written in the last step, a new object in steps before it gets into the scene.
 
     Parameters
     ----------
     place : Place
-    pressed : PressedGround
-        The finished ground.
+    sample : GroundSample
+        The finished ground at the place's positions.
     over_time : Histories
         Of the place's positions.
     stored : bytes
         The footprints, from `core.record`.
+    frame_rate : float
+        Scene frames per second [Hz].
     unit_scale : float
         Metres per Blender unit.
     shape_keys : bool
         See `ground_mesh.write`.
     """
-    sample = pressed.sample(*place.position[:, :2].T)
-    ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
-    up = ground_mesh.up_of(place.carrier, unit_scale)
-    playback.install(place.carrier, place.index, over_time, up=up, frame_rate=pressed.frame_rate)
+    carrier = place.draft or place.publish()
+    ground_mesh.write(carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+    up = ground_mesh.up_of(carrier, unit_scale)
+    if place.draft:
+        yield Progress("write", 0.9)
+    playback.install(carrier, place.index, over_time, up=up, frame_rate=frame_rate)
+    if place.draft:
+        yield Progress("write", 0.9)
+        place.publish()
+    return carrier
 
 
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import bpy
 import numpy as np
@@ -41,9 +41,6 @@ PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
 ON_SURFACE = 2e-3
 """Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
 
-MAX_GRID_VERTICES = 4_000_000
-"""Most vertices that a created grid gets; a larger walk gets a coarser mesh (the physics keeps its cells)."""
-
 
 @dataclass(frozen=True)
 class GroundSurface:
@@ -66,15 +63,16 @@ class GroundSurface:
     triangles: Indices
     factors: Array | None = None
 
-    def pressed_vertices(self, pressed: PressedGround, terrain: Terrain) -> Indices:
-        """Vertices that lie on top of the surface where the ground may have changed, (K,)."""
-        near = np.flatnonzero(pressed.covers(self.vertices[:, 0], self.vertices[:, 1]))
-        x, y, z = self.vertices[near].T
-        return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
-
     def terrain(self, bounds: Array | None = None) -> MeshTerrain:
         """The surface as a function of place, within bounds in the plane [m]."""
         return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors)
+
+
+def pressed_vertices(vertices: Array, pressed: PressedGround, terrain: Terrain) -> Indices:
+    """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
+    near = np.flatnonzero(pressed.covers(vertices[:, 0], vertices[:, 1]))
+    x, y, z = vertices[near].T
+    return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
 
 
 def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
@@ -232,76 +230,6 @@ def _drop_shape_keys(mesh: bpy.types.Mesh) -> None:
     bpy.data.objects.remove(holder)
 
 
-@dataclass(frozen=True)
-class GroundPlan:
-    """A flat ground that fits a walk.
-
-    Attributes
-    ----------
-    lower, upper : (2,) float arrays
-        Corners of the area to cover, in world space [m].
-    height : float
-        World height of the ground [m].
-    """
-
-    lower: Array
-    upper: Array
-    height: float
-
-
-def create_grid(scene: bpy.types.Scene, plan: GroundPlan, cell_size: float, unit_scale: float) -> bpy.types.Object:
-    """A new flat ground whose vertices sit on the centres of the cells.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        Gets the object in its master collection.
-    plan : GroundPlan
-    cell_size : float
-        Size of the physics' cells [m]; the mesh takes a whole multiple of it where it would exceed
-        `MAX_GRID_VERTICES`.
-    unit_scale : float
-        Metres per Blender unit.
-    """
-    cells = np.ceil((plan.upper - plan.lower) / cell_size)
-    stride = int(np.ceil(np.sqrt(max(1.0, cells.prod() / MAX_GRID_VERTICES))))
-    spacing = cell_size * stride
-    first = np.floor(plan.lower / spacing - 0.5)
-    columns, rows = (np.ceil(plan.upper / spacing - 0.5) - first).astype(int) + 1
-    x = (first[0] + np.arange(columns) + 0.5) * spacing
-    y = (first[1] + np.arange(rows) + 0.5) * spacing
-    centre = np.array([x.mean(), y.mean(), plan.height])
-    positions = np.zeros((rows, columns, 3), dtype=np.float32)
-    positions[..., 0] = (x - centre[0]) / unit_scale
-    positions[..., 1] = ((y - centre[1]) / unit_scale)[:, None]
-
-    mesh = bpy.data.meshes.new("SoftGround")
-    mesh.vertices.add(rows * columns)
-    write_positions(mesh, positions.reshape(-1, 3))
-    faces = (rows - 1) * (columns - 1)
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    quads = corner[:, None] + np.array([0, 1, columns + 1, columns])
-    mesh.loops.add(faces * 4)
-    mesh.loops.foreach_set("vertex_index", quads.ravel().astype(np.int32))
-    mesh.polygons.add(faces)
-    mesh.polygons.foreach_set("loop_start", np.arange(faces, dtype=np.int32) * 4)
-    mesh.update(calc_edges=True)
-    mesh.shade_smooth()
-    _add_uv(mesh, quads, positions.reshape(-1, 3))
-    ground = bpy.data.objects.new("SoftGround", mesh)
-    ground.location = tuple(centre / unit_scale)
-    scene.collection.objects.link(ground)
-    return ground
-
-
-def _add_uv(mesh: bpy.types.Mesh, quads: Indices, positions: NDArray[np.float32]) -> None:
-    """A UV map over the whole grid, its longer side from 0 to 1."""
-    place = positions[:, :2] - positions[:, :2].min(axis=0)
-    uv = (place / place.max()).astype(np.float32)
-    layer = mesh.uv_layers.new(name="UVMap")
-    layer.uv.foreach_set("vector", uv[quads.ravel()].ravel())
-
-
 def write(
     ground: bpy.types.Object,
     index: Indices,
@@ -429,6 +357,15 @@ def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> Non
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
     mesh.update()
+
+
+def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """Vertex of each corner, face by face, (L,)."""
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    if len(corners):
+        attribute: Any = mesh.attributes[".corner_vert"]  # a hundred times faster than `loops`
+        attribute.data.foreach_get("value", corners)
+    return corners
 
 
 def _triangles(mesh: bpy.types.Mesh) -> Indices:

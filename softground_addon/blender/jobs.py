@@ -54,15 +54,8 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
             show(progress)
 
 
-def aside(
-    stage: str, fraction: float, function: Callable[..., Result], *arguments: object, written: bool = False
-) -> Job[Result]:
-    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering.
-
-    Once anything is `written` to the scene, it is computed at once: a job is left only where it has changed nothing.
-    """
-    if written:
-        return function(*arguments)
+def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
+    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering."""
     with ThreadPoolExecutor(1) as thread:
         outcome = thread.submit(function, *arguments)
         while not wait([outcome], timeout=PATIENCE).done:

@@ -19,8 +19,9 @@ from ..core.heightfield import Window
 from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
-from . import analysis, bake_job, baked_ground, ground_mesh, session, settings
+from . import analysis, baked_ground, ground_mesh, jobs, session, settings
 from .character_setup import characters_of
+from .created_ground import create_ground
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .translation import rpt_
@@ -45,7 +46,7 @@ class LiveMode:
         options = scene.softground
         known = analysis.read(scene)
         if options.ground is None:
-            bake_job.create_ground(scene, known.shot.plan)
+            create_ground(scene, known.shot.plan)
             known = analysis.read(scene)
         self.scene = scene.session_uid
         self.rendering = False
@@ -121,9 +122,13 @@ class LiveMode:
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
         stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
-        place = baked_ground.Place(ground, index, vertices[index])
-        over_time = histories(footprints, *place.position[:, :2].T, blur_sigma=sigma)
-        baked_ground.write(place, pressed, over_time, stored, unit_scale=unit_scale)
+        place = baked_ground.on_itself(ground, index, vertices)
+        across = place.position[:, :2].T
+        over_time = histories(footprints, *across, blur_sigma=sigma)
+        sample = pressed.sample(*across)
+        jobs.run(
+            baked_ground.write(place, sample, over_time, stored, frame_rate=self._frame_rate, unit_scale=unit_scale)
+        )
 
     def settle(self) -> None:
         """Make the mesh what a bake would have made of it, as it is about to be saved."""

@@ -14,7 +14,8 @@ import bpy
 from ..core.errors import InputError, SoftGroundError
 from ..core.manifest import BatchShot
 from ..core.shell import command_line
-from . import analysis, bake_job, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, settings
+from . import analysis, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, settings, shots
+from .created_ground import create_ground
 from .translation import rpt_
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
@@ -70,7 +71,7 @@ def _armature_of(thing: bpy.types.Object | None) -> bpy.types.Object | None:
 
 
 class SOFTGROUND_OT_create_ground(bpy.types.Operator):
-    """Take the selected mesh as the ground as it is; with none selected, create a grid that fits the walk"""
+    """Take the selected mesh as the ground as it is; with none selected, create one that fits the walk"""
 
     bl_idname = "softground.create_ground"
     bl_label = "Create Ground"
@@ -84,8 +85,10 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
             settings.scene_of(context).softground.ground = chosen
             self.report({"INFO"}, f"'{chosen.name}' is the ground")
             return {"FINISHED"}
-        plan = jobs.run(bake_job.fit_ground(settings.scene_of(context)))
-        ground = bake_job.create_ground(settings.scene_of(context), plan)
+        plan = jobs.run(shots.fit_ground(settings.scene_of(context)))
+        ground = create_ground(settings.scene_of(context), plan)
+        for warning in plan.warnings:
+            self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
         return {"FINISHED"}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import bpy
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.refinement import Refinement, Surface
+from .ground_mesh import corner_vertices
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -42,17 +44,30 @@ def surface_of(mesh: bpy.types.Mesh, to_world: Array) -> Surface:
     size = _bulk(mesh.polygons, "loop_total")
     return Surface(
         vertices=positions @ to_world[:3, :3].T + to_world[:3, 3],
-        corner_vertex=_bulk(mesh.loops, "vertex_index"),
+        corner_vertex=corner_vertices(mesh).astype(np.intp),
         face_start=np.concatenate([[0], np.cumsum(size)]),
         triangle_corners=_bulk(triangles, "loops", 3),
         triangle_face=_bulk(triangles, "polygon_index"),
     )
 
 
-def build(name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refinement) -> bpy.types.Mesh:
+def build(
+    name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refinement, groups: Sequence[str] = ()
+) -> bpy.types.Mesh:
     """A new mesh: the kept faces of the source and the new triangles, with all that the source carries.
 
     Vertices of the source keep their numbers and their positions, bit for bit.
+
+    Parameters
+    ----------
+    name : str
+    source : bpy.types.Mesh
+    surface : Surface
+        Of the source.
+    refinement : Refinement
+        Of the surface.
+    groups : sequence of str
+        Names of the vertex groups of the source, which only its object knows.
     """
     mesh = bpy.data.meshes.new(name)
     kept = refinement.kept_faces
@@ -90,31 +105,32 @@ def build(name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refin
             values = np.where((edges >= 0).reshape(-1, *[1] * (values.ndim - 1)), values[edges], 0).astype(values.dtype)
         _write(mesh, attribute, values)
     _copy_choices(mesh, source)
+    if groups:
+        _copy_vertex_groups(mesh, source, surface, refinement, groups)
     mesh.update()
     return mesh
 
 
-def copy_vertex_groups(
-    ground: bpy.types.Object, target: bpy.types.Object, source: bpy.types.Mesh, surface: Surface, refinement: Refinement
+def _copy_vertex_groups(
+    mesh: bpy.types.Mesh, source: bpy.types.Mesh, surface: Surface, refinement: Refinement, groups: Sequence[str]
 ) -> None:
-    """Give the refined object the vertex groups of the ground, with the weights of the source."""
-    groups = ground.vertex_groups
-    target.vertex_groups.clear()
-    if not len(groups):
-        return
-    weights = np.zeros((len(groups), len(source.vertices)), dtype=np.float32)
-    for vertex in source.vertices:
-        for membership in vertex.groups:
-            weights[membership.group, vertex.index] = membership.weight
-    vertices, shares = refinement.vertex_sources(surface)
-    for group, own in zip(groups, weights, strict=True):
-        copy = target.vertex_groups.new(name=group.name)
-        everywhere = np.concatenate([own, (own[vertices] * shares).sum(axis=1)])
-        members = np.flatnonzero(everywhere)
-        order = members[np.argsort(everywhere[members], kind="stable")]
+    """Give the refined mesh the vertex groups of its source, which Blender reads vertex by vertex only."""
+    members = [(item.group, vertex.index, item.weight) for vertex in source.vertices for item in vertex.groups]
+    of_group, vertex, weight = np.array(members, dtype=np.float64).reshape(-1, 3).T
+    sources, shares = refinement.vertex_sources(surface)
+    holder = bpy.data.objects.new("SoftGround Groups", mesh)  # the names are the mesh's, but only objects give them
+    for number, name in enumerate(groups):
+        group = holder.vertex_groups.new(name=name)
+        chosen = of_group == number
+        own = np.zeros(len(source.vertices))
+        own[vertex[chosen].astype(np.intp)] = weight[chosen]
+        everywhere = np.concatenate([own, (own[sources] * shares).sum(axis=1)]).astype(np.float32)
+        inside = np.flatnonzero(everywhere)
+        order = inside[np.argsort(everywhere[inside], kind="stable")]
         levels, first = np.unique(everywhere[order], return_index=True)
-        for weight, alike in zip(levels.tolist(), np.split(order, first[1:]), strict=True):
-            copy.add(alike.tolist(), weight, "REPLACE")
+        for level, alike in zip(levels.tolist(), np.split(order, first[1:]), strict=True):
+            group.add(alike.tolist(), level, "REPLACE")
+    bpy.data.objects.remove(holder)
 
 
 def _comes_along(name: str) -> bool:

@@ -10,29 +10,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.contacts import detect_contacts
 from ..core.errors import InputError
-from ..core.heightfield import FlatTerrain, Terrain
-from ..core.motion import CharacterMotion, SoleMotion
+from ..core.ground_plan import GroundPlan, plan_ground
+from ..core.heightfield import Terrain
+from ..core.motion import CharacterMotion
 from ..core.simulation import CharacterLoads, estimate_loads
 from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
 from . import ground_mesh, painted_ground, settings
 from .bake_checks import check_contacts
 from .character_setup import characters_of, mapping_of, title_of
-from .ground_mesh import GroundPlan, GroundSurface
+from .ground_mesh import GroundSurface
 from .jobs import Job, Progress, aside
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character, sample_thing
 from .solid_extraction import check_things
 
 Array = NDArray[np.float64]
-
-GROUND_MARGIN = 2.0
-"""How far a created ground reaches beyond the feet, in lengths of the longest sole."""
-
-LOW_PERCENTILE = 10.0
-"""A sole is on its ground for at least this share of a shot, so that its lowest points tell the ground's height."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ class Shot:
     motions : tuple of CharacterMotion
         At scene frames.
     plan : GroundPlan
-        Area and height of the walk.
+        Where the walk goes, and the ground that fits it.
     surface : GroundSurface or None
         The scene's ground, if it has one.
     terrain : Terrain
@@ -77,7 +71,7 @@ def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
     motions = yield from sample_characters(scene, characters)
     plan = yield from aside("sample", 1.0, plan_ground, motions)
     if options.ground is None:
-        return Shot(tuple(motions), plan, None, FlatTerrain(plan.height))
+        return Shot(tuple(motions), plan, None, plan.terrain)
     painted = painted_ground.names_of(scene)
     surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
     yield Progress("sample", 1.0)
@@ -104,29 +98,18 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
     return loads
 
 
-def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
-    """The flat ground under the lowest positions of the soles, with a margin around all of their paths."""
-    paths = [sole.landmark_positions() for motion in motions for sole in motion.soles]
-    lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
-    upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
-    margin = GROUND_MARGIN * max(sole.sole.length for motion in motions for sole in motion.soles)
-    low = float(np.median([_standing_height(motion, sole) for motion in motions for sole in _feet(motion)]))
-    floats = []
-    for motion in (motion for motion in motions if motion.centre is None):
-        feet = replace(motion, soles=tuple(_feet(motion)))
-        floats.append(detect_contacts(feet, FlatTerrain(low)).offset)
-    return GroundPlan(lower - margin, upper + margin, low + float(np.median(np.concatenate(floats))) if floats else low)
+def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
+    """The ground that fits the walk of the scene's characters.
 
-
-def _feet(motion: CharacterMotion) -> list[SoleMotion]:
-    """The soles that tell where the ground is: hands and canes need not ever touch it."""
-    return [sole for sole in motion.soles if sole.sole.solid is None] or list(motion.soles)
-
-
-def _standing_height(motion: CharacterMotion, sole: SoleMotion) -> float:
-    """Height at which a sole is on its ground [m]: a thing may fly for most of a shot, and its mesh touches exactly."""
-    percentile = LOW_PERCENTILE if motion.centre is None else 0.0
-    return float(np.percentile(sole.lowest(), percentile))
+    Raises
+    ------
+    InputError
+        If the characters cannot be read.
+    """
+    characters = characters_of(scene)
+    check_settings(scene, characters)
+    motions = yield from sample_characters(scene, characters)
+    return (yield from aside("sample", 1.0, plan_ground, motions))
 
 
 def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:

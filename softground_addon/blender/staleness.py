@@ -85,8 +85,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 
 
 def _of_topology(mesh: bpy.types.Mesh) -> str:
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
+    corners = ground_mesh.corner_vertices(mesh)
     return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.tobytes()):08x}"
 
 

@@ -5,6 +5,8 @@ The user's ground is hidden and otherwise left alone; removing the copy shows it
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.pressed_ground import PressedGround
-from ..core.refinement import Region, refine
+from ..core.refinement import Refinement, Region, Surface
 from . import ground_mesh, playback, refined_mesh
 
 Array = NDArray[np.float64]
@@ -44,30 +46,47 @@ def region_of(pressed: PressedGround) -> Region:
     return Region(np.concatenate(columns), np.concatenate(rows), pressed.smooth.cell_size)
 
 
-def refine_ground(ground: bpy.types.Object, region: Region, spacing: float, unit_scale: float) -> bpy.types.Object:
-    """Make the copy that is fine where the region is, or give the one that is there a new mesh.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-        Its evaluated surface is what is refined; it is hidden.
-    region : Region
-    spacing : float
-        Distance between vertices in the region [m].
-    unit_scale : float
-        Metres per Blender unit.
-    """
+def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:
+    """The faces of the ground as its modifiers leave it, in world space [m]."""
     with ground_mesh.undisturbed_copy(ground) as source:
-        surface = refined_mesh.surface_of(source, ground_mesh.to_world_of(ground, unit_scale))
-        refinement = refine(surface, region, spacing)
-        mesh = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement)
-        detail = detail_of(ground)
-        if detail is None:
-            detail = _stand_in(ground, mesh)
-        else:
-            _exchange_mesh(detail, mesh)
-        refined_mesh.copy_vertex_groups(ground, detail, source, surface, refinement)
-    return detail
+        return refined_mesh.surface_of(source, ground_mesh.to_world_of(ground, unit_scale))
+
+
+@contextmanager
+def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Iterator[bpy.types.Object]:
+    """The refined ground as an object that is in no scene yet; one that is in none at the end is taken away."""
+    with ground_mesh.undisturbed_copy(ground) as source:
+        groups = [group.name for group in ground.vertex_groups]
+        mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
+    detail = ground.copy()
+    detail.name = f"{ground.name} Trail"
+    detail.modifiers.clear()
+    detail.data = mesh
+    try:
+        yield detail
+    finally:
+        if not detail.users_collection:
+            playback.remove(detail)
+            bpy.data.objects.remove(detail)
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
+
+
+def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:
+    """Show the refined ground in place of the ground, which is hidden.
+
+    Where there is a copy already, it gets the mesh, and the draft stays out.
+    """
+    detail = detail_of(ground)
+    if detail is not None:
+        _exchange_mesh(detail, ground_mesh.mesh_of(draft))
+        return detail
+    draft[DETAIL_OF] = ground
+    draft[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
+    for collection in ground.users_collection:
+        collection.objects.link(draft)
+    ground.hide_viewport = ground.hide_render = True
+    return draft
 
 
 def remove(ground: bpy.types.Object) -> None:
@@ -81,20 +100,6 @@ def remove(ground: bpy.types.Object) -> None:
     bpy.data.objects.remove(detail)
     if not mesh.users:
         bpy.data.meshes.remove(mesh)
-
-
-def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    """A copy of the ground with another mesh, in its place and collections."""
-    detail = ground.copy()
-    detail.name = f"{ground.name} Trail"
-    detail.modifiers.clear()
-    detail.data = mesh
-    detail[DETAIL_OF] = ground
-    detail[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
-    for collection in ground.users_collection:
-        collection.objects.link(detail)
-    ground.hide_viewport = ground.hide_render = True
-    return detail
 
 
 def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:

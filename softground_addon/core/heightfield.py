@@ -52,6 +52,26 @@ class FlatTerrain:
         return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), float(self.height))
 
 
+class SlopingTerrain:
+    """An endless inclined plane.
+
+    Parameters
+    ----------
+    height : float
+        Its height at the origin of the world [m].
+    slope : (2,) float array
+        Rise along x and y.
+    """
+
+    def __init__(self, height: float, slope: Array) -> None:
+        self.height = height
+        self.slope = np.asarray(slope, dtype=np.float64)
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m]."""
+        return np.asarray(self.height + self.slope[0] * np.asarray(x) + self.slope[1] * np.asarray(y))
+
+
 class Window(NamedTuple):
     """A rectangle of cells: its first column and row, and how many of each."""
 

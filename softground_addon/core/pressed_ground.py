@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .cell_keys import AROUND, ROW, Keys, among, keys_at, keys_of
 from .footprints import NEVER, Footprint, last_contact, recompose
-from .heightfield import TILE, HeightField, SparseGrid, Window
+from .heightfield import TILE, HeightField, SparseGrid
 from .smoothing import blurred
 
 Array = NDArray[np.float64]
-
-_AROUND = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
 
 
 @dataclass(frozen=True)
@@ -71,38 +70,30 @@ class PressedGround:
 
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
-        near = np.flatnonzero(self._near_tiles(x, y))
-        covered = np.zeros(len(x), dtype=bool)
-        covered[near] = self._changed().nearest(x[near], y[near])[0] > 0
+        place = np.stack([x, y], axis=-1)
+        near = np.flatnonzero(among(self._tiles(), keys_at(place, TILE * self.smooth.cell_size)))
+        covered = np.zeros(len(place), dtype=bool)
+        covered[near] = among(self._changed(), keys_at(place[near], self.smooth.cell_size))
         return covered
 
-    def _near_tiles(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Which places lie in a tile of the ground or one beside it: leaves few for the closer look."""
-        size = TILE * self.smooth.cell_size
-        tiles = np.array(sorted(self.smooth.tiles), dtype=np.int64).reshape(-1, 2)
-        if not len(tiles):
-            return np.zeros(len(x), dtype=bool)
-        first = tiles.min(axis=0) - 1
-        known = np.zeros(tiles.max(axis=0) - first + 2, dtype=bool)
-        for i, j in _AROUND:
-            known[tuple((tiles - first + (i, j)).T)] = True
-        place = np.stack([np.floor(x / size), np.floor(y / size)], axis=-1).astype(np.int64) - first
-        inside = ((place >= 0) & (place < known.shape)).all(axis=1)
-        near = np.zeros(len(x), dtype=bool)
-        near[inside] = known[tuple(place[inside].T)]
-        return near
+    def _tiles(self) -> Keys:
+        """Keys of the tiles of the ground and of those beside them."""
+        tiles = np.array(sorted({*self.smooth.tiles, *self.contact.tiles}), dtype=np.int64).reshape(-1, 2)
+        return np.unique(keys_of(tiles)[:, None] + AROUND)
 
-    def _changed(self) -> SparseGrid:
-        """1 in cells that changed and in those around them, whose look-ups reach them."""
-        changed = SparseGrid(self.smooth.cell_size, channels=1)
-        for column, row in {(c + i, r + j) for c, r in self.smooth.tiles for i, j in _AROUND}:
-            window = Window(column * TILE, row * TILE, TILE, TILE)
-            near = window.expanded(1)
-            touched = (self.smooth.read(near) != 0).any(axis=0) | np.isfinite(self.contact.read(near)[0])
-            if touched.any():
-                wide = touched[:-2] | touched[1:-1] | touched[2:]
-                changed.write(window, (wide[:, :-2] | wide[:, 1:-1] | wide[:, 2:])[None].astype(float))
-        return changed
+    def _changed(self) -> Keys:
+        """Keys of the cells that changed and of those around them, whose look-ups reach them."""
+        changed = [
+            keys_of(np.argwhere(mask)[:, ::-1] + np.array(tile) * TILE)
+            for tile, mask in (
+                *((tile, values.any(axis=0)) for tile, values in self.smooth.tiles.items()),
+                *((tile, np.isfinite(values[0])) for tile, values in self.contact.tiles.items()),
+            )
+        ]
+        cells = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *changed]))
+        for along in (1, ROW):  # one direction after the other keeps the intermediate sets small
+            cells = np.unique(np.concatenate([cells - along, cells, cells + along]))
+        return cells
 
     def sample(self, x: Array, y: Array) -> GroundSample:
         """Look the ground up at places (K,), bilinear between the centres of cells."""

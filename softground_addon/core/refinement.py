@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .cell_keys import Keys, among, keys_of, parents_of
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -25,9 +27,6 @@ COARSEST_LEG = 2.0**0.25
 
 _CURVE_BITS = 24
 """Bits of a coordinate along the curve by which vertices are ordered: 6 cm of 1,000 km."""
-
-_ROW = 1 << 32
-"""Cells are found by row·_ROW + column."""
 
 
 class Region:
@@ -43,7 +42,7 @@ class Region:
 
     def __init__(self, columns: Indices, rows: Indices, cell_size: float) -> None:
         self.cell_size = cell_size
-        self._levels = [np.unique(np.asarray(rows, dtype=np.int64) * _ROW + np.asarray(columns, dtype=np.int64))]
+        self._levels = [np.unique(keys_of(np.stack([columns, rows], axis=-1)))]
 
     def touches(self, low: Array, high: Array) -> Mask:
         """Which of the boxes from `low` to `high`, (N, 2) [m], reach into the region, to about a cell."""
@@ -59,21 +58,14 @@ class Region:
             found = np.zeros(len(boxes), dtype=bool)
             for row in (first[:, 1], (first[:, 1] + last[:, 1]) // 2, last[:, 1]):
                 for column in (first[:, 0], (first[:, 0] + last[:, 0]) // 2, last[:, 0]):
-                    found |= self._holds(row * _ROW + column, int(number))
+                    found |= self._holds(keys_of(np.stack([column, row], axis=-1)), int(number))
             touched[boxes] = found
         return touched
 
-    def _holds(self, cells: NDArray[np.int64], level: int) -> Mask:
+    def _holds(self, cells: Keys, level: int) -> Mask:
         while len(self._levels) <= level:
-            row, column = _row_and_column(self._levels[-1])
-            self._levels.append(np.unique((row >> 1) * _ROW + (column >> 1)))
-        known = self._levels[level]
-        return np.asarray(known[np.minimum(np.searchsorted(known, cells), len(known) - 1)] == cells)
-
-
-def _row_and_column(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    row = (cells + _ROW // 2) // _ROW
-    return row, cells - row * _ROW
+            self._levels.append(parents_of(self._levels[-1]))
+        return among(self._levels[level], cells)
 
 
 @dataclass(frozen=True)
@@ -138,6 +130,12 @@ class Refinement:
         """Vertices of the surface that each new vertex lies between, (M, 3), and their weights (M, 3)."""
         triangle, corner = np.divmod(self.new_vertex, 3)
         return surface.corner_vertex[self.corners[triangle]], self.weights[triangle, corner]
+
+    def vertices(self, surface: Surface) -> Array:
+        """World positions of all vertices, those of the surface first, (V + M, 3) [m]."""
+        sources, weights = self.vertex_sources(surface)
+        between = np.einsum("nk,nki->ni", weights.astype(np.float64), surface.vertices[sources])
+        return np.concatenate([surface.vertices, between])
 
 
 def refine(surface: Surface, region: Region, spacing: float) -> Refinement:

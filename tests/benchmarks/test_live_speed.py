@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import softground_addon
-from softground_addon.blender import ground_mesh, live
-from softground_addon.blender.ground_mesh import GroundPlan
+from softground_addon.blender import created_ground, live
+from softground_addon.core.ground_plan import GroundPlan
+from softground_addon.core.heightfield import FlatTerrain
 from tests.blender.shots import walker
 
 pytestmark = pytest.mark.benchmark
@@ -33,7 +34,9 @@ def scene():
 def ground_of(scene):
     scene.softground.cell_size = EXTENT / SIDE
     half = np.array([EXTENT / 2 - 0.02, EXTENT / 2 - 0.02])
-    ground = ground_mesh.create_grid(scene, GroundPlan(-half, half, 0.0), EXTENT / SIDE, 1.0)
+    layout = created_ground.lay_out(GroundPlan(-half, half, FlatTerrain()), EXTENT / SIDE, 1.0)
+    with created_ground.draft(layout) as ground:
+        scene.collection.objects.link(ground)
     scene.softground.ground = ground
     bpy.context.view_layer.update()
     return ground

@@ -349,6 +349,54 @@ def test_a_created_ground_fits_the_walk_with_a_margin(walk):
     assert (corner.max(axis=0) > place.max(axis=0) + 0.3).all()
 
 
+def test_a_created_ground_is_fine_under_the_prints_only(walk):
+    result = bake(walk)
+    ground = walk.softground.ground
+    assert baked_ground.carrier_of(ground) == ground
+    spacing = walk.softground.cell_size
+    area = np.ptp(rest(ground)[:, 0]) * np.ptp(rest(ground)[:, 1])
+    assert len(ground.data.vertices) < 0.5 * area / spacing**2
+    footprints, _ = baked_ground.load(ground)
+    deepest = max(print_.max_depth_m for print_ in footprints)
+    assert (rest(ground) - heights(ground))[:, 2].max() == pytest.approx(deepest, rel=5e-3)
+    assert not result.report["warnings"]
+
+
+def test_prints_beside_the_fine_part_of_a_created_ground_get_detail_and_a_word(walk):
+    bpy.ops.softground.create_ground()
+    ground = walk.softground.ground
+    walk.softground.characters[0].armature.location.x += 0.35
+    bpy.context.view_layer.update()
+    result = bake(walk)
+    carrier = baked_ground.carrier_of(ground)
+    assert carrier != ground
+    footprints, _ = baked_ground.load(ground)
+    deepest = max(print_.max_depth_m for print_ in footprints)
+    assert (rest(carrier) - heights(carrier))[:, 2].max() == pytest.approx(deepest, rel=0.02)
+    assert any("'SoftGround Trail'" in warning for warning in result.report["warnings"])
+    assert any("not shown" in warning for warning in bake(walk, detail="NEVER").report["warnings"])
+    assert baked_ground.carrier_of(ground) == ground
+
+
+def test_steps_off_the_ground_are_told_of_with_the_remedy(walk):
+    field = plane(walk, size=2.0)
+    bpy.context.view_layer.update()
+    warnings = bake(walk, ground=field).report["warnings"]
+    assert any("steps of 'Walker' meet no ground on 'Field'" in warning for warning in warnings)
+
+
+def test_a_climb_gets_a_created_ground_that_climbs(walk):
+    flat = bake(walk, ground=None).report["totals"]["steps"]
+    bpy.ops.softground.clear_bake()
+    walk.softground.characters[0].armature.rotation_euler.x = np.radians(8.0)
+    bpy.context.view_layer.update()
+    result = bake(walk, ground=None)
+    assert result.report["totals"]["steps"] == flat
+    place = rest(walk.softground.ground)
+    assert np.ptp(place[:, 2]) == pytest.approx(np.tan(np.radians(8.0)) * np.ptp(place[:, 1]), rel=0.05)
+    assert not result.report["warnings"]
+
+
 @pytest.mark.parametrize("model", ["IMPULSE", "WHOLE_BODY"])
 @pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))
 def test_every_reference_motion_bakes_with_the_automatic_set_up(scene, name, model):

@@ -5,15 +5,19 @@ import numpy as np
 import pytest
 from mathutils import Euler
 
-from softground_addon.blender import ground_mesh
+from softground_addon.blender import created_ground, ground_mesh
 from softground_addon.core.errors import InputError
+from softground_addon.core.ground_plan import GroundPlan
+from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.pressed_ground import GroundSample
 from tests.blender import fingerprints
 
 
 def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
     half = np.array([size, size]) / 2
-    ground = ground_mesh.create_grid(scene, ground_mesh.GroundPlan(-half, half, height), spacing, unit_scale)
+    plan = GroundPlan(-half, half, FlatTerrain(height))
+    with created_ground.draft(created_ground.lay_out(plan, spacing, unit_scale)) as ground:
+        scene.collection.objects.link(ground)
     bpy.context.view_layer.update()
     return ground
 
@@ -52,9 +56,9 @@ def test_a_created_grid_is_a_valid_mesh_of_upward_quads_with_uvs(scene):
 
 
 def test_an_absurdly_large_grid_is_made_coarser_instead_of_filling_the_memory(scene, monkeypatch):
-    monkeypatch.setattr(ground_mesh, "MAX_GRID_VERTICES", 10_000)
-    mesh = ground_mesh.create_grid(scene, ground_mesh.GroundPlan(np.zeros(2), np.full(2, 10.0), 0.0), 0.01, 1.0).data
-    assert len(mesh.vertices) < 11_000
+    monkeypatch.setattr(created_ground, "MAX_GRID_VERTICES", 10_000)
+    plan = GroundPlan(np.zeros(2), np.full(2, 10.0), FlatTerrain())
+    assert len(created_ground.lay_out(plan, 0.01, 1.0).vertices) < 11_000
 
 
 @pytest.mark.parametrize("transform", ["plain", "tilted", "scaled", "mirrored", "parented"])

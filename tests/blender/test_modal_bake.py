@@ -1,5 +1,7 @@
 """A bake that is left at any of its steps has changed nothing."""
 
+from itertools import islice
+
 import bpy
 import pytest
 
@@ -84,3 +86,18 @@ def test_what_was_deleted_under_a_bake_is_named(scene):
     bpy.data.objects.remove(armature)
     with pytest.raises(InputError, match="'Walker' was deleted"):
         modal_bake._check_still_there(needed)
+
+
+def test_a_bake_with_detail_left_before_its_last_step_leaves_nothing(scene):
+    walker(scene, frames=24)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    scene.softground.ground = bpy.context.object
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    for writing_steps in (1, 3, 6, 9, 12):
+        job = bake_job.bake(scene)
+        written = (progress for progress in job if progress.stage == "write")
+        last = list(islice(written, writing_steps))[-1]
+        job.close()
+        assert fingerprints.of_file() == before, last

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import ground_mesh, refined_mesh, trail_detail
-from softground_addon.core.refinement import Region
+from softground_addon.core.refinement import Region, refine
 from tests.blender import fingerprints
 
 
@@ -65,8 +65,10 @@ def dress(ground):
         edge.use_edge_sharp = bool(rng.random() < 0.3)
 
 
-def refined(ground, spacing=0.02):
-    return trail_detail.refine_ground(ground, region(), spacing, 1.0)
+def refined(ground, spacing=0.02, where=None):
+    surface = trail_detail.surface_of(ground, 1.0)
+    with trail_detail.draft(ground, surface, refine(surface, where or region(), spacing)) as draft:
+        return trail_detail.publish(ground, draft)
 
 
 def triangles_of(mesh):
@@ -248,7 +250,7 @@ def test_another_trail_reuses_the_copy(scene):
     detail = refined(ground)
     bevel = detail.modifiers.new("Mine", "BEVEL")
     first = len(detail.data.vertices)
-    again = trail_detail.refine_ground(ground, region(0.04), 0.04, 1.0)
+    again = refined(ground, 0.04, region(0.04))
     assert again == detail
     assert bevel.name in detail.modifiers
     assert len(detail.data.vertices) < first

@@ -1,0 +1,235 @@
+"""The ground that fits a walk: how far it reaches, how high it lies, and where the feet come down on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cell_keys import Keys, cells_at, cells_of, keys_of
+from .contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
+from .heightfield import FlatTerrain, SlopingTerrain, Terrain
+from .missed_steps import advice, missed_steps
+from .motion import CharacterMotion, SoleMotion
+from .solids import posed
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MARGIN = 2.0
+"""How far the ground reaches beyond the feet, in lengths of the longest sole."""
+
+LOW_PERCENTILE = 10.0
+"""A sole is on its ground for at least this share of a shot, so that its lowest points tell the ground's height."""
+
+POINTS_ALONG_SOLE = 24
+"""Points along a sole by which the ground under it is told: about 1 cm apart for a foot."""
+
+NEAR_GROUND = 0.15
+"""Parts of a sole that are higher than this above the ground do not press it at the time, in lengths of the sole."""
+
+STEEPER_KEEPS = 0.25
+"""Share of the moments of standing that an inclined ground has to keep beyond what a level one keeps: less is noise
+of the animation."""
+
+LEAST_SPREAD = 0.5
+"""Standard deviation of the footholds along a direction from which its slope can be told, in leg lengths: the distance
+between the feet is less."""
+
+BLOCKS_IN_REACH = 3
+"""Blocks that the reach beyond a sole is made of at least: they cover little more than what is asked for."""
+
+SOLID_REACH = 0.3
+"""Part of a body that may sink in, in its size."""
+
+PARTS_OF_A_FRAME = 4
+"""Poses of a body that are looked at in each frame: it may be fast."""
+
+_FRAMES_AT_ONCE = 256
+_ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class GroundPlan:
+    """A plane ground that fits a walk.
+
+    Attributes
+    ----------
+    lower, upper : (2,) float arrays
+        Corners of the area to cover, in world space [m].
+    terrain : FlatTerrain or SlopingTerrain
+        The ground as a function of place.
+    footfalls : (N, 2) float array, optional
+        Places that lie under a sole at some time of a contact [m], about `raster` apart.
+    raster : float
+        [m]
+    warnings : tuple of str
+        Steps that find no ground on it.
+    """
+
+    lower: Array
+    upper: Array
+    terrain: FlatTerrain | SlopingTerrain
+    footfalls: Array | None = None
+    raster: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+    def fine_blocks(self, spacing: float, reach: float) -> tuple[Indices, int]:
+        """The squares that hold all places within reach of a footfall.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a grid's cells [m].
+        reach : float
+            How far beyond the soles the ground changes [m].
+
+        Returns
+        -------
+        blocks : (N, 2) int array
+            Column and row of squares of 2^level cells.
+        level : int
+        """
+        assert self.footfalls is not None, "where the feet come down is not known"
+        reach += self.raster + spacing / 2
+        level = max(0, int(np.floor(np.log2(reach / BLOCKS_IN_REACH / spacing))))
+        side = spacing * 2**level
+        far = reach / side + np.sqrt(0.5)  # from the middle of a block to where the place may be
+        row, column = np.mgrid[-int(far) : int(far) + 1, -int(far) : int(far) + 1]
+        disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
+        return cells_of(np.unique(cells_at(self.footfalls, side)[:, None] + disc)), level
+
+
+def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
+    """The plane under the lowest positions of the soles, with a margin around all of their paths.
+
+    It is level, unless the soles stand on a slope.
+    """
+    soles = [(motion, sole) for motion in motions for sole in motion.soles]
+    paths = [sole.landmark_positions() for _, sole in soles]
+    lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
+    upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
+    lengths = [sole.sole.length for _, sole in soles]
+    slope = _slope([motion for motion in motions if motion.centre is None])
+    low = float(np.median([_standing_height(motion, sole, slope) for motion in motions for sole in _feet(motion)]))
+    contacts = [detect_contacts(motion, _terrain(low, slope)) for motion in motions]
+    floats = [
+        offset
+        for motion, found in zip(motions, contacts, strict=True)
+        for sole, offset in zip(motion.soles, found.offset, strict=True)
+        if motion.centre is None and any(sole is foot for foot in _feet(motion))
+    ]
+    height = low + (float(np.median(floats)) if floats else 0.0)
+    raster = min(lengths) / POINTS_ALONG_SOLE
+    footfalls = [
+        _places_under_solid(sole, _terrain(height, slope), raster)
+        if sole.sole.solid
+        else _places_under(sole, touching, _terrain(low + offset, slope), raster)
+        for motion, found in zip(motions, contacts, strict=True)
+        for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True)
+    ]
+    missed = [(motion.name, missed_steps(motion, found)) for motion, found in zip(motions, contacts, strict=True)]
+    margin = MARGIN * max(lengths)
+    return GroundPlan(
+        lower - margin,
+        upper + margin,
+        _terrain(height, slope),
+        np.concatenate(footfalls),
+        raster,
+        tuple(advice(name, steps, "the created ground") for name, steps in missed if steps),
+    )
+
+
+def _terrain(height: float, slope: Array) -> FlatTerrain | SlopingTerrain:
+    return SlopingTerrain(height, slope) if slope.any() else FlatTerrain(height)
+
+
+def _feet(motion: CharacterMotion) -> list[SoleMotion]:
+    """The soles that tell where the ground is: hands and canes need not ever touch it."""
+    return [sole for sole in motion.soles if sole.sole.solid is None] or list(motion.soles)
+
+
+def _standing_height(motion: CharacterMotion, sole: SoleMotion, slope: Array) -> float:
+    """Height at which a sole is on its ground, where that would be at the origin [m].
+
+    A thing may fly for most of a shot, and its mesh touches exactly.
+    """
+    if motion.centre is not None:
+        return float((sole.lowest() - sole.transforms[:, 0, :2, 3] @ slope).min())
+    points = sole.landmark_positions()
+    return float(np.percentile((points[..., 2] - points[..., :2] @ slope).min(axis=1), LOW_PERCENTILE))
+
+
+def _slope(motions: Sequence[CharacterMotion]) -> Array:
+    """Rise along x and y of the ground that the soles stand on, (2,): 0 unless a level one would lose many of them."""
+    holds = np.concatenate([np.zeros((0, 3)), *(_footholds(motion) for motion in motions)])
+    if len(holds) < 2:
+        return np.zeros(2)
+    leg = float(np.median([motion.leg_length for motion in motions]))
+    place = holds[:, :2] - holds[:, :2].mean(axis=0)
+    _, spread, axes = np.linalg.svd(place / np.sqrt(len(place)), full_matrices=False)
+    along = axes[spread > LEAST_SPREAD * leg]
+    terms = np.column_stack([place @ along.T, np.ones(len(place))])
+    height = holds[:, 2]
+    weight = np.ones(len(height))
+    for _ in range(_ROUNDS):  # the least sum of distances, which single footholds off the ground do not tilt
+        fit, *_ = np.linalg.lstsq(terms * weight[:, None], height * weight, rcond=None)
+        weight = 1.0 / np.sqrt(np.maximum(np.abs(height - terms @ fit), 1e-3 * leg))
+    near = TOUCH_HEIGHT * leg
+    on_slope = (np.abs(height - terms @ fit) < near).mean()
+    on_level = max((np.abs(height - level) < near).mean() for level in np.percentile(height, np.arange(0, 101, 5)))
+    slope: Array = fit[:-1] @ along
+    return slope if on_slope > on_level + STEEPER_KEEPS else np.zeros(2)
+
+
+def _footholds(motion: CharacterMotion) -> Array:
+    """Lowest point of each sole whenever it rests, (N, 3) [m]."""
+    limit = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
+    found = [np.zeros((0, 3))]
+    for sole in motion.soles:
+        points = sole.landmark_positions()
+        lowest = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
+        speed = np.linalg.norm(np.gradient(lowest, motion.time_step, axis=0), axis=-1) if len(lowest) > 1 else 0.0
+        found.append(lowest[speed < limit])
+    return np.concatenate(found)
+
+
+def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrain, raster: float) -> Array:
+    """Places under a sole while it touches, (N, 2) [m], one in each square of a raster.
+
+    Contacts begin and end between frames: it counts as touching until halfway to the next.
+    """
+    edge = np.flatnonzero(touching[1:] != touching[:-1])
+    poses = np.concatenate([sole.transforms[touching], (sole.transforms[edge] + sole.transforms[edge + 1]) / 2])
+    found: Keys = np.zeros(0, dtype=np.int64)
+    for number, patch in enumerate(sole.sole.patches):
+        stride = max(1, round(raster / patch.spacing))
+        row, column = np.nonzero(patch.signed_distance[::stride, ::stride] < raster)
+        points = patch.origin + np.stack([column, row], axis=-1) * (stride * patch.spacing)
+        points = np.column_stack([points, np.nan_to_num(patch.heights[::stride, ::stride][row, column])])
+        for first in range(0, len(poses), _FRAMES_AT_ONCE):
+            pose = poses[first : first + _FRAMES_AT_ONCE, number, :3]
+            places = points @ pose[..., :3].transpose(0, 2, 1) + pose[:, None, :, 3]
+            x, y, z = np.moveaxis(places, -1, 0)
+            near = z - terrain.heights(x, y) < NEAR_GROUND * sole.sole.length
+            found = np.union1d(found, cells_at(places[near, :2], raster))
+    return (cells_of(found) + 0.5) * raster
+
+
+def _places_under_solid(sole: SoleMotion, terrain: Terrain, raster: float) -> Array:
+    """Places under the lower part of a body whenever it is near the ground, (N, 2) [m]: it may roll and sink in."""
+    solid = sole.sole.solid
+    assert solid is not None, sole.sole.name
+    near = SOLID_REACH * solid.size
+    count = (len(sole.transforms) - 1) * PARTS_OF_A_FRAME + 1
+    found: Keys = np.zeros(0, dtype=np.int64)
+    for pose in sole.at(np.arange(count) / PARTS_OF_A_FRAME).transforms[:, 0]:
+        place = posed(solid.vertices, pose)
+        place = place[place[:, 2] < terrain.heights(*place[:, :2].T) + near, :2]
+        if len(place):
+            low, high = np.floor(place.min(axis=0) / raster), np.floor(place.max(axis=0) / raster) + 1
+            box = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1)
+            found = np.union1d(found, keys_of(box.astype(np.int64)).ravel())
+    return (cells_of(found) + 0.5) * raster
