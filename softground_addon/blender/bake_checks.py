@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.cell_keys import AROUND, among, cells_at, keys_at, keys_of
+from ..core.cell_keys import AROUND, keys_at, keys_of
 from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
@@ -27,8 +27,9 @@ COARSEST_SPACING = 0.25
 DETAIL_FROM = 4
 """Spacing of ground vertices under the prints from which the ground is refined along the trail, in cells."""
 
-CROWD = 4
-"""Vertices in a square of `DETAIL_FROM` cells from which the ground counts as fine there."""
+FEW = 5
+"""A square of 3·`DETAIL_FROM` cells that holds fewer vertices is not fine: where they are `DETAIL_FROM` cells apart, it
+holds 9."""
 
 MOST_MISSED = 0.02
 """Share of the prints' area that may lie far from any vertex before the ground is refined along the trail."""
@@ -69,7 +70,7 @@ class Coverage:
     spacing : float
         Distance between them on average [m], infinite where there are none.
     missed : float
-        Share of the prints' area that is far from any of them.
+        Share of the prints' area that has few of them around.
     is_fine_somewhere : bool
         Whether the ground is fine enough anywhere, such as under other prints.
     """
@@ -78,33 +79,34 @@ class Coverage:
     missed: float
     is_fine_somewhere: bool
 
+    def is_coarse(self, cell_size: float) -> bool:
+        """Whether prints are not well shown."""
+        return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
+
 
 def coverage(vertices: Array, index: Indices, pressed: PressedGround) -> Coverage:
     """How densely vertices (V, 3), of which those in `index` are moved, lie under the prints."""
-    place = vertices[index, :2]
-    compression = pressed.raw.sample(*place.T)[0]
+    compression = pressed.raw.sample(*vertices[index, :2].T)[0]
     cell_size = pressed.raw.cell_size
-    printed = np.concatenate(
-        [np.zeros((0, 2), dtype=np.intp)]
-        + [
-            np.argwhere(pressed.raw.tiles[tile][0] > 0)[:, ::-1] + np.array(tile) * TILE
-            for tile in sorted(pressed.raw.tiles)
-        ]
-    )
-    spacing = float(np.sqrt(len(printed) * cell_size**2 / max(1e-9, float((compression > 0).sum()))))
-    block = DETAIL_FROM * cell_size
-    near = np.unique(cells_at(place, block)[:, None] + AROUND)
-    missed = ~among(near, keys_of(printed // DETAIL_FROM))
-    _, crowd = np.unique(keys_at(vertices[:, :2], block), return_counts=True)
-    return Coverage(spacing, float(missed.mean()) if len(missed) else 0.0, bool(crowd.max(initial=0) >= CROWD))
+    printed = [
+        np.argwhere(values[0] > 0)[:, ::-1] + np.array(tile) * TILE for tile, values in pressed.raw.tiles.items()
+    ]
+    cells = np.concatenate([np.zeros((0, 2), dtype=np.intp), *printed])
+    spacing = float(np.sqrt(len(cells) * cell_size**2 / max(1e-9, float((compression > 0).sum()))))
+    blocks, crowd = np.unique(keys_at(vertices[:, :2], DETAIL_FROM * cell_size), return_counts=True)
+    under, share = np.unique(keys_of(cells // DETAIL_FROM), return_counts=True)
+    around = under[:, None] + AROUND
+    place = np.minimum(np.searchsorted(blocks, around), len(blocks) - 1)
+    near = np.where(blocks[place] == around, crowd[place], 0).sum(axis=1)
+    missed = float(share[near < FEW].sum()) / max(1, len(cells))
+    return Coverage(spacing, missed, bool(crowd.max() >= FEW))
 
 
 def wants_detail(
     ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, loads: Sequence[CharacterLoads]
 ) -> bool:
     """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
-    coarse = cover.spacing > DETAIL_FROM * cell_size or cover.missed > MOST_MISSED
-    if detail == "ALWAYS" or (detail == "AUTO" and coarse):
+    if detail == "ALWAYS" or (detail == "AUTO" and cover.is_coarse(cell_size)):
         return True
     length = min(sole.sole.length for character in loads for sole in character.motion.soles)
     if cover.spacing > COARSEST_SPACING * length:
@@ -116,16 +118,18 @@ def wants_detail(
     return False
 
 
-def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str) -> list[str]:
+def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[str]:
     """What the user should know about prints that leave the fine part of a ground."""
-    if cover.missed <= MOST_MISSED or not cover.is_fine_somewhere:
+    if not (cover.is_fine_somewhere and cover.is_coarse(cell_size)):
         return []
-    left = f"{cover.missed:.0%} of the prints' area lies where ground '{ground.name}' has few vertices"
     if detail == "NEVER":
-        return [f"{left} and is not shown: set Detail to Automatic in the Ground panel, or create the ground anew."]
+        return [
+            f"Prints lie where ground '{ground.name}' is too coarse to show them: set Detail to Automatic in the "
+            "Ground panel, or create the ground anew."
+        ]
     return [
-        f"{left}: a finer copy, '{ground.name} Trail', takes the prints. To have them on '{ground.name}' itself, clear "
-        "the bake and create the ground anew."
+        f"Prints lie where ground '{ground.name}' is coarse: a finer copy, '{ground.name} Trail', takes them. To have "
+        f"them on '{ground.name}' itself, clear the bake and create the ground anew."
     ]
 
 

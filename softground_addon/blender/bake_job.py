@@ -191,7 +191,7 @@ def _write(
                 place = yield from aside(
                     "write", 0.4, baked_ground.on_detail, ground, mesh, fine, pressed, shot.terrain
                 )
-            warnings += coverage_warnings(ground, cover, options.detail)
+            warnings += coverage_warnings(ground, cover, options.detail, cell_size)
         input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
         stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
         across = place.position[:, :2].T
