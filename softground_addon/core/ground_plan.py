@@ -156,10 +156,12 @@ def _standing_height(motion: CharacterMotion, sole: SoleMotion, slope: Array) ->
 
     A thing may fly for most of a shot, and its mesh touches exactly.
     """
-    if motion.centre is not None:
-        return float((sole.lowest() - sole.transforms[:, 0, :2, 3] @ slope).min())
-    points = sole.landmark_positions()
-    return float(np.percentile((points[..., 2] - points[..., :2] @ slope).min(axis=1), LOW_PERCENTILE))
+    if sole.sole.solid:
+        lifts = sole.lowest() - sole.transforms[:, 0, :2, 3] @ slope
+    else:
+        points = sole.landmark_positions()
+        lifts = (points[..., 2] - points[..., :2] @ slope).min(axis=1)
+    return float(np.percentile(lifts, LOW_PERCENTILE if motion.centre is None else 0.0))
 
 
 def _slope(motions: Sequence[CharacterMotion]) -> Array:
@@ -185,10 +187,10 @@ def _slope(motions: Sequence[CharacterMotion]) -> Array:
 
 
 def _footholds(motion: CharacterMotion) -> Array:
-    """Lowest point of each sole whenever it rests, (N, 3) [m]."""
+    """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which rest on each other or on nothing."""
     limit = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
     found = [np.zeros((0, 3))]
-    for sole in motion.soles:
+    for sole in (sole for sole in motion.soles if sole.sole.solid is None):
         points = sole.landmark_positions()
         lowest = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
         speed = np.linalg.norm(np.gradient(lowest, motion.time_step, axis=0), axis=-1) if len(lowest) > 1 else 0.0
