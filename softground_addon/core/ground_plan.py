@@ -187,7 +187,7 @@ def _slope(motions: Sequence[CharacterMotion]) -> Array:
 
 
 def _footholds(motion: CharacterMotion) -> Array:
-    """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which rest on each other or on nothing."""
+    """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which may rest on nothing."""
     limit = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
     found = [np.zeros((0, 3))]
     for sole in (sole for sole in motion.soles if sole.sole.solid is None):
