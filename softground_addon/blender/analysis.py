@@ -14,6 +14,7 @@ import bpy
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
 from ..core.prediction import SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
+from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
 from .character_setup import characters_of
@@ -50,7 +51,7 @@ class Analysis:
 _known: dict[int, Analysis] = {}
 """By session uid of the scene; a cache only: everything in it can be read again."""
 
-_depths: dict[tuple[int, GroundMaterial], float] = {}
+_depths: dict[tuple[int, GroundMaterial, Pressure], float] = {}
 """Depths that were asked for lately, by identity of the analysis; emptied with it."""
 
 
@@ -99,9 +100,10 @@ def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = Non
     analysis = known(scene)
     if analysis is None:
         return None
-    key = (id(analysis), material or settings.material_of(scene))
+    pressure: Pressure = scene.softground.pressure
+    key = (id(analysis), material or settings.material_of(scene), pressure)
     if key not in _depths:
-        _depths[key] = deepest(analysis.stances, key[1])
+        _depths[key] = deepest(analysis.stances, *key[1:])
     return _depths[key]
 
 
@@ -117,7 +119,9 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
     material = settings.material_of(scene)
     aim = depth
     for _ in range(TRIALS):
-        material = replace(material, youngs_modulus=matching_modulus(analysis.stances, material, aim))
+        material = replace(
+            material, youngs_modulus=matching_modulus(analysis.stances, material, aim, scene.softground.pressure)
+        )
         reached = _simulated_depth(scene, analysis, material)
         if abs(reached - depth) <= CLOSE_ENOUGH * depth:
             break

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import runs
-from .deformation import GroundMaterial, compress, compression_rate, sink, touching_fraction
+from .deformation import GroundMaterial, compress, compression_rate, sink, target_compression, touching_fraction
 from .errors import InputError
 from .heightfield import Terrain, TerrainTiles, Window
-from .imprint import contact_window, point_contact, sole_points
+from .imprint import contact_window, places, point_contact, sole_points
 from .indentation import Springs
+from .pressure import Pressure, pressure_field
 from .simulation import CharacterLoads
 from .solid_imprint import ground_under
 from .solids import posed
@@ -50,6 +51,10 @@ class StanceLoad:
         Area that each stands for [m²].
     force : (N,) float array
         Normal force [N].
+    x, y : (N, Q) float arrays
+        Places of the points [m].
+    centre : (N, 2) float array
+        Centre of pressure [m].
     tolerance : float
         See `deformation.touching_fraction` [m].
     step : float
@@ -62,10 +67,13 @@ class StanceLoad:
     clearance: Array
     area: Array
     force: Array
+    x: Array
+    y: Array
+    centre: Array
     tolerance: float
     step: float
 
-    def depth(self, material: GroundMaterial) -> float:
+    def depth(self, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> float:
         """Depth of its print [m]: exact for a foot that rolls, too large for one that slides."""
         sinking = sink(
             self.clearance, self.area, self.force, tolerance=self.tolerance, step=self.step, material=material
@@ -73,8 +81,13 @@ class StanceLoad:
         touching = touching_fraction(self.clearance, sinking.sinkage[:, None], self.tolerance)
         compression = np.zeros(self.clearance.shape[1])
         rate = compression_rate(self.step, material)
+        target = sinking.target[:, None]
+        if pressure == "CENTRE_OF_PRESSURE":
+            field = pressure_field(self.x, self.y, self.area * touching, self.centre, self.tolerance)
+            stress = self.force / np.maximum(sinking.area, 1e-300)
+            target = target_compression(stress[:, None] * field.at(self.x, self.y), material)
         for step in np.flatnonzero(sinking.target):
-            compression = compress(compression, touching[step], sinking.target[step], rate)
+            compression = compress(compression, touching[step], target[step], rate)
         return float(compression.max(initial=0.0))
 
 
@@ -99,8 +112,11 @@ class SolidLoad:
     springs: tuple[Springs, ...]
     force: Array
 
-    def depth(self, material: GroundMaterial) -> float:
-        """Depth to which it sinks if it rests there [m]: too large for one that rolls on before the ground gives."""
+    def depth(self, material: GroundMaterial, _pressure: Pressure = "UNIFORM") -> float:
+        """Depth to which it sinks if it rests there [m]: too large for one that rolls on before the ground gives.
+
+        Its pressure follows from its shape, whatever is chosen for soles.
+        """
         loads = zip(self.springs, self.force.tolist(), strict=True)
         return max((springs.sinkage(force, material) for springs, force in loads), default=0.0)
 
@@ -143,6 +159,8 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
                         contact.clearance,
                         contact.area / normals[:, 2:],
                         np.maximum(force, 0.0),
+                        *places(points, poses),
+                        character.forces.centre_of_pressure[steps, index, :2],
                         points.tolerance,
                         motion.time_step,
                     )
@@ -176,12 +194,16 @@ def _solid_loads(character: CharacterLoads, index: int, tiles: TerrainTiles) -> 
     return found
 
 
-def deepest(stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial) -> float:
+def deepest(
+    stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, pressure: Pressure = "UNIFORM"
+) -> float:
     """Depth of the deepest print [m], 0 if there is none."""
-    return max((stance.depth(material) for stance in stances), default=0.0)
+    return max((stance.depth(material, pressure) for stance in stances), default=0.0)
 
 
-def matching_modulus(stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, depth: float) -> float:
+def matching_modulus(
+    stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, depth: float, pressure: Pressure = "UNIFORM"
+) -> float:
     """The modulus [Pa] at which the deepest print gets a depth, everything else being equal.
 
     Parameters
@@ -190,6 +212,7 @@ def matching_modulus(stances: Sequence[StanceLoad | SolidLoad], material: Ground
     material : GroundMaterial
     depth : float
         Wanted depth of the deepest print [m].
+    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
 
     Raises
     ------
@@ -197,7 +220,7 @@ def matching_modulus(stances: Sequence[StanceLoad | SolidLoad], material: Ground
         If no modulus gives that depth.
     """
     low, high = SOFTEST, STIFFEST
-    if not deepest(stances, replace(material, youngs_modulus=high)) <= depth <= material.layer_depth:
+    if not deepest(stances, replace(material, youngs_modulus=high), pressure) <= depth <= material.layer_depth:
         raise InputError(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and the layer's, "
             f"{material.layer_depth * 100:.3g} cm."
@@ -205,7 +228,7 @@ def matching_modulus(stances: Sequence[StanceLoad | SolidLoad], material: Ground
     modulus = low
     for _ in range(MOST_TRIALS):
         modulus = float(np.sqrt(low * high))
-        reached = deepest(stances, replace(material, youngs_modulus=modulus))
+        reached = deepest(stances, replace(material, youngs_modulus=modulus), pressure)
         if abs(reached - depth) <= MATCH_TOLERANCE * depth:
             return modulus
         low, high = (modulus, high) if reached > depth else (low, modulus)

@@ -21,7 +21,7 @@ from .footprints import Footprint, FootprintRecorder
 from .heightfield import SparseGrid, Surface, Terrain, TerrainTiles, Window
 from .imprint import SolePoints, cell_coverage, centroid, contact_window, places, point_contact
 from .motion import Sole
-from .pressure import Pressure, pressure_slope
+from .pressure import Pressure, pressure_field
 from .variation import Factors, Variation, VariationTiles
 
 Array = NDArray[np.float64]
@@ -376,8 +376,8 @@ class SoleStance(Stance):
             if bed.pressure == "CENTRE_OF_PRESSURE":
                 x, y = places(points, poses)
                 centre = self._steps.centres[steps, :2]
-                slope = pressure_slope(x, y, touching, centre, points.tolerance)
-                stress = stress * slope.over(*window.centres(bed.cell_size), coverage)
+                field = pressure_field(x, y, touching, centre, points.tolerance)
+                stress = stress * field.over(*window.centres(bed.cell_size))
             varying = {"stiffness": factors.stiffness, "depth": factors.depth} if factors else {}
             target = target_compression(stress, material, **varying)
         holds = stress < material.crust_stress if material.crust_stress else None
