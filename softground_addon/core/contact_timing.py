@@ -27,7 +27,9 @@ SEARCH = 0.33
 TIMING_DEVIATION = 0.1
 """Standard deviation of the times found from heights and speeds, in the same unit (30 ms)."""
 SHARE_DEVIATION = 0.07
-"""Standard deviation of the leading foot's share as the point of action tells it."""
+"""Least standard deviation of the leading foot's share as the point of action tells it."""
+SURE = 2.0
+"""How far from the times found the other foot is surely off the ground, in `TIMING_DEVIATION`."""
 SHARE_MEMORY = 0.25
 """Time over which the error of that share is about the same, in the same unit (one period of the low-pass at 4/5)."""
 SHORTEST_OVERLAP = 0.1
@@ -238,7 +240,7 @@ def _fit_overlaps(changes: list[Transition], lowest: Array, body: BodyDynamics, 
         some = np.flatnonzero(width == steps)
         step = begin[some, None] + np.arange(steps)
         feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
-        share, telling = _shares_told(step, end[some], feet, lowest, body, unit)
+        share, telling = _shares_told(step, end[some], found[some], feet, lowest, body, unit)
         fitted[some] = _best_ramps(found[some], step, end[some], share, telling, unit)
     return fitted
 
@@ -246,12 +248,17 @@ def _fit_overlaps(changes: list[Transition], lowest: Array, body: BodyDynamics, 
 def _shares_told(
     step: NDArray[np.intp],
     end: NDArray[np.intp],
+    found: NDArray[np.intp],
     feet: NDArray[np.intp],
     lowest: Array,
     body: BodyDynamics,
     unit: float,
 ) -> tuple[Array, Array]:
-    """The leading foot's share at steps (T, W) as the point of action tells it, and how much that says, both (T, W)."""
+    """The leading foot's share at steps (T, W) as the point of action tells it, and how much that says, both (T, W).
+
+    Surely before the strikes and after the leaves `found` (T, 2) the share is 0 and 1: what the point of action tells
+    there shows how far it can be trusted. A body animated by eye moves with little regard to the foot that bears it.
+    """
     within = np.minimum(step, end[:, None] - 1)
     back, front = lowest[within, feet[:, :1]], lowest[within, feet[:, 1:]]
     target = body.point_of_action((back[..., 2] + front[..., 2]) / 2, within)
@@ -259,9 +266,15 @@ def _shares_told(
     length = (along**2).sum(axis=-1)
     share = ((target - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
     share = np.clip(share, 0.0, 1.0)
+    inside = step < end[:, None]
+    sure = round(SURE * TIMING_DEVIATION * unit)
+    before = step < found.min(axis=1, keepdims=True) - sure
+    after = (step >= found.max(axis=1, keepdims=True) + sure) & inside
+    off = np.select([before, after], [share, 1 - share], 0.0)
+    variance = SHARE_DEVIATION**2 + (off**2).sum(axis=1) / np.maximum((before | after).sum(axis=1), 1)
     # Where one sole bears all, the point of action wanders under that sole and tells nothing about the other.
-    telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * SHARE_DEVIATION**2)
-    return share, np.where(step < end[:, None], telling, 0.0)
+    telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * variance[:, None])
+    return share, np.where(inside, telling, 0.0)
 
 
 def _best_ramps(

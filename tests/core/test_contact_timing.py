@@ -54,6 +54,19 @@ def test_the_point_of_action_corrects_heel_strike_and_toe_off(error):
     assert runs(refined[:, 0])[1][0] == pytest.approx(leave, abs=6)
 
 
+def test_a_body_moved_without_regard_to_its_feet_leaves_them_as_they_were_seen():
+    """Animated by eye, hips glide evenly from one foot to the next: that tells nothing of when the load passes."""
+    step = np.arange(240)
+    hips = np.stack([0.3 + 1.2 * (step - 122) / RATE, 0 * step, np.full(240, 0.9)], axis=1)
+    back = flat_sole(np.zeros((240, 3)), landmarks=((0, 0, 0),))
+    front = flat_sole(np.tile((0.6, 0.0, 0.0), (240, 1)), landmarks=((0, 0, 0),))
+    motion = character([back, front], hips=hips, rate=RATE)
+    seen = np.stack([step < 134, step >= 110], axis=1)
+    refined = refine_contacts(motion, contacts(seen), body_dynamics(motion)).touching
+    assert runs(refined[:, 1])[0][0] == pytest.approx(110, abs=2)
+    assert runs(refined[:, 0])[1][0] == pytest.approx(134, abs=2)
+
+
 def test_a_body_that_is_held_up_stands_on_its_lowest_foot_however_it_floats():
     motion = character([flat_sole(np.zeros((120, 3)), name=side) for side in "lr"], hips=(0, 0, 0.9), rate=RATE)
     clearance = np.tile((0.12, 0.5), (120, 1))
