@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from math import pi, radians, sqrt
 from pathlib import Path
 
-import bmesh
 import bpy
 import numpy as np
 
@@ -24,7 +23,7 @@ DROP = 2.5  # m
 RADIUS = 0.20  # m
 SPACING = 0.75  # m from sphere to sphere
 GRAVITY = 9.81  # m/s²
-PICTURE = (960, 600)
+PICTURE = (896, 560)
 
 MASS, MODULUS, POISSON, TAU = 50.0, 1.0e6, 0.3, 0.2  # kg, Pa, 1, s
 ROWS: dict[str, tuple[float, ...]] = {
@@ -59,7 +58,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     spheres = {}
     for row, values in ROWS.items():
         for value in values:
-            sphere = _sphere(f"{row} {value:g}", scene.collection)
+            sphere = _sphere(f"{row} {value:g}")
             sphere.location.xy = place(row, value)
             _drop(sphere)
             spheres[row, value] = sphere
@@ -85,17 +84,13 @@ def _painted(row: str, x: terrain.Array, y: terrain.Array) -> terrain.Array:
     return np.where(here, values[column], values[1])
 
 
-def _sphere(name: str, collection: bpy.types.Collection) -> bpy.types.Object:
+def _sphere(name: str) -> bpy.types.Object:
     """A ball of steel."""
-    mesh = bpy.data.meshes.new(name)
-    shape = bmesh.new()
-    bmesh.ops.create_uvsphere(shape, u_segments=48, v_segments=24, radius=RADIUS)
-    shape.to_mesh(mesh)
-    shape.free()
-    mesh.shade_smooth()
-    mesh.materials.append(stage.plain_material("SoftGround Sample ball", (0.35, 0.36, 0.38), 0.35))
-    sphere = bpy.data.objects.new(name, mesh)
-    collection.objects.link(sphere)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=RADIUS)
+    sphere = bpy.context.active_object
+    sphere.name = name
+    sphere.data.shade_smooth()
+    sphere.data.materials.append(stage.plain_material("SoftGround Sample ball", (0.35, 0.36, 0.38), 0.35))
     return sphere
 
 

@@ -21,7 +21,7 @@ from softground_addon.core.heightfield import HeightField
 
 CELL_SIZE = 0.0075  # m
 FRAMES = 84  # 3.5 s
-PICTURE = (960, 540)
+PICTURE = (896, 504)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 CELL_SIZE = 0.004  # m
 FRAMES = 48  # 2 s: four steps
 SPACING = 1.2  # m from ground to ground
-PICTURE = (640, 480)
+PICTURE = (480, 360)
 SUN_ELEVATION = radians(22)
 """Low, but the bottom of a print still sees the sun."""
 

@@ -31,7 +31,7 @@ FRAMES = 116
 SPACING = 0.06  # m between the vertices of the landscape; along the tracks the bake makes it finer
 LOW, HIGH = np.array((-3.4, -8.0)), np.array((4.2, 1.4))  # m
 BORDER = -3.6  # m; snow before it, sand beyond
-PICTURE = (1024, 576)
+PICTURE = (896, 504)
 
 SAND_STIFFNESS = 6.0  # times that of snow: 2.25 MPa over 0.375 (the paper, Table 1)
 SAND_RIM = 10.0  # Poisson's ratio 0.5 over 0.05

@@ -72,11 +72,17 @@ class Walker:
         [kg].
     shoes : mapping
         Objects that print in place of the feet, by "L" and "R".
+    with_things : sequence of bpy.types.Object
+        Further mesh objects that are one thing with the first, such as the other wheel.
+    more : sequence of str
+        Bones that print beside the feet, such as hands and forepaws; their names end in their side.
     """
 
     armature: bpy.types.Object
     mass: float
     shoes: Mapping[str, bpy.types.Object] = field(default_factory=dict)
+    with_things: Sequence[bpy.types.Object] = ()
+    more: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -145,15 +151,22 @@ def bake(
     shot.cell_size = cell_size
     for walker in walkers:
         make_active(walker.armature)
+        for thing in walker.with_things:
+            thing.select_set(True)
         bpy.ops.softground.add_character()
         shot.characters[-1].mass = walker.mass
         for sole in shot.characters[-1].soles:
             if shoe := walker.shoes.get(sole.side[:1]):
                 sole.object = shoe
+        for bone in walker.more:
+            sole = shot.characters[-1].soles.add()
+            sole.name, sole.bone = bone, bone
+            sole.side = {"L": "LEFT", "R": "RIGHT"}[bone[-1]]
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)
     if ground is None and write:
+        bpy.ops.object.select_all(action="DESELECT")  # a selected mesh would be taken as the ground
         bpy.ops.softground.create_ground()
     result = jobs.run(bake_job.bake(scene, write=write))
     displaced = 2 * shot.material.poisson_ratio * _painted_range(shot.ground, shot.painted.rim)
@@ -233,7 +246,7 @@ def _parser(name: str, description: str) -> argparse.ArgumentParser:
     parser.add_argument("--output", type=Path, default=OUTPUT, metavar="DIR")
     parser.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of SoftGround")
-    parser.add_argument("--samples", type=int, default=12, metavar="N", help="render samples of the pictures")
+    parser.add_argument("--samples", type=int, default=6, metavar="N", help="render samples of the pictures")
     parser.add_argument("--no-pictures", action="store_true", help="build, bake and check only")
     return parser
 

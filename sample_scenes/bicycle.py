@@ -1,0 +1,153 @@
+"""A bicycle rolls through wet sand: the hind wheel in the groove of the front wheel, then beside it in the bend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from sample_scenes import production, stage
+from sample_scenes.course import Course
+from sample_scenes.production import Bake, Claim, Options, Walker
+from softground_addon.core.footprints import recompose
+
+CELL_SIZE = 0.006  # m
+FRAMES = 60  # 2.5 s
+SPEED = 1.6  # m/s
+MASS = 95.0  # kg, with a rider
+WHEELBASE, WHEEL, TYRE = 1.02, 0.335, 0.024  # m; radius to the ground, radius of the tyre
+WAY = ((0.0, 0.0), (1.6, 0.0), (2.8, 0.35), (4.2, 1.3))  # m
+PICTURE = (896, 504)
+
+
+@dataclass(frozen=True)
+class Bicycle:
+    """The bake and the wheels, the front one first."""
+
+    bakes: dict[str, Bake]
+    wheels: list[bpy.types.Object]
+    course: Course
+
+
+def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> Bicycle:
+    """A frame on two wheels, keyed along a way that bends."""
+    course = Course(WAY)
+    scene.frame_start, scene.frame_end = 1, FRAMES
+    frame = _frame(scene.collection)
+    wheels = [_wheel(name, frame) for name in ("Front Wheel", "Hind Wheel")]
+    for number in range(1, FRAMES + 1):
+        along = SPEED * (number - 1) / scene.render.fps
+        hind, front = course.place(along), _ahead(course, along)
+        heading = np.arctan2(*(front - hind)[::-1])
+        frame.location, frame.rotation_euler.z = (*hind, WHEEL), heading
+        frame.keyframe_insert("location", frame=number)
+        frame.keyframe_insert("rotation_euler", index=2, frame=number)
+        for wheel, place in zip(wheels, (WHEELBASE, 0.0), strict=True):
+            wheel.location.x = place
+            steering = course.heading(along + place) - heading
+            wheel.rotation_euler = (0.0, along / WHEEL, float(steering))
+            wheel.keyframe_insert("rotation_euler", frame=number)
+    chosen = {"shape_keys": "false", "material.surface": "wet_sand"} | dict(options or {})
+    bicycle = Walker(wheels[0], MASS, with_things=wheels[1:])
+    bake = production.bake(scene, [bicycle], "Mud", cell_size, options=chosen)
+    return Bicycle({"sand": bake}, wheels, course)
+
+
+def _ahead(course: Course, along: float) -> np.ndarray:
+    """Where the front wheel is: on the way, a wheelbase from the hind wheel."""
+    hind = course.place(along)
+    further = along + WHEELBASE
+    for _ in range(8):  # the chord of a bend is shorter than the way: a fixed point, reached fast
+        further += WHEELBASE - float(np.linalg.norm(course.place(further) - hind))
+    return np.asarray(course.place(further))
+
+
+def _frame(collection: bpy.types.Collection) -> bpy.types.Object:
+    """Tubes between hubs, crank, saddle and handlebars; its origin is the hub of the hind wheel."""
+    crank, saddle, head = (0.44, 0.0, -0.06), (0.26, 0.0, 0.52), (0.86, 0.0, 0.48)
+    hind, front = (0.0, 0.0, 0.0), (WHEELBASE, 0.0, 0.0)
+    left, right = (0.78, 0.28, 0.60), (0.78, -0.28, 0.60)
+    tubes = [(hind, crank), (hind, saddle), (crank, saddle), (crank, head), (saddle, head), (head, front)]
+    tubes += [(left, right), (head, (0.82, 0.0, 0.60)), (saddle, (0.22, 0.0, 0.62))]
+    curve = bpy.data.curves.new("Bicycle", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.016
+    for ends in tubes:
+        spline = curve.splines.new("POLY")
+        spline.points.add(1)
+        for point, place in zip(spline.points, ends, strict=True):
+            point.co = (*place, 1.0)
+    curve.materials.append(stage.plain_material("SoftGround Sample enamel", (0.02, 0.12, 0.22), 0.3))
+    frame = bpy.data.objects.new("Bicycle", curve)
+    collection.objects.link(frame)
+    return frame
+
+
+def _wheel(name: str, frame: bpy.types.Object) -> bpy.types.Object:
+    """A tyre that turns about its y axis under the frame, with spokes to look at."""
+    bpy.ops.mesh.primitive_torus_add(
+        major_radius=WHEEL - TYRE, minor_radius=TYRE, major_segments=128, minor_segments=20, rotation=(pi / 2, 0.0, 0.0)
+    )
+    wheel = bpy.context.active_object
+    bpy.ops.object.transform_apply(rotation=True)
+    wheel.name, wheel.parent = name, frame
+    wheel.rotation_mode = "YXZ"  # it turns about its axle, which steers
+    wheel.data.materials.append(stage.plain_material("SoftGround Sample rubber", (0.02, 0.02, 0.02), 0.7))
+    spokes = bpy.data.curves.new(f"{name} Spokes", "CURVE")
+    spokes.dimensions, spokes.bevel_depth = "3D", 0.0016
+    for angle in np.linspace(0, 2 * pi, 24, endpoint=False):
+        spline = spokes.splines.new("POLY")
+        spline.points.add(1)
+        spline.points[1].co = (*(WHEEL - TYRE) * np.array((np.cos(angle), 0.0, np.sin(angle))), 1.0)
+    spokes.materials.append(stage.plain_material("SoftGround Sample steel", (0.6, 0.6, 0.6), 0.3))
+    seen = bpy.data.objects.new(spokes.name, spokes)
+    bpy.context.scene.collection.objects.link(seen)
+    seen.parent = wheel
+    return wheel
+
+
+def claims(built: Bicycle) -> list[Claim]:
+    """One groove without gaps, about as deep all along, and two where the way bends."""
+    bake = built.bakes["sand"]
+    ground = recompose(bake.footprints)
+    reach = SPEED * (FRAMES - 1) / 24
+    along = np.arange(0.3, 1.4, bake.footprints[0].cell_size / 2)
+    groove = ground.sample(*built.course.place(along).T)[0]
+    across = np.linspace(-0.15, 0.15, 301)
+    straight, bend = (ground.sample(*built.course.place(place, across).T)[0] for place in (1.0, min(2.6, reach - 0.2)))
+    weight = MASS * 9.81
+    forces = [max(s.peak_force_n for s in bake.footprints if s.sole == wheel.name) for wheel in built.wheels]
+    return [
+        Claim("Part of the straight on which there is a groove", float((groove > 1e-3).mean()), 1.0, 1.0),
+        Claim("Spread of its depth over its depth", float(groove.std() / groove.mean()), 0.0, 0.08),
+        Claim(
+            "Width of the groove over that of the tyre", float((straight > 1e-3).mean() * 0.3 / (2 * TYRE)), 0.4, 1.6
+        ),
+        Claim(
+            "Width of both tracks in the bend over one", float((bend > 1e-3).sum() / (straight > 1e-3).sum()), 1.1, 2.5
+        ),
+        Claim("Largest forces on both wheels over the weight", sum(forces) / weight, 0.95, 1.6),
+    ]
+
+
+def shoot(built: Bicycle, folder: Path, samples: int) -> list[Path]:
+    """The bicycle at the end of its way, and the track behind it."""
+    scene = bpy.context.scene
+    scene.frame_set(FRAMES)
+    stage.add_sun(scene, radians(-115), radians(17))
+    ground = built.bakes["sand"].carrier
+    stage.add_floor(-0.15, scene.collection)
+    stage.add_tray(ground, scene.collection)
+    camera = stage.add_camera(scene, "Bicycle", lens=40.0)
+    end = Vector((*built.course.place(SPEED * (FRAMES - 1) / scene.render.fps), 0.0))
+    stage.aim(camera, (-0.9, 1.5, 1.35), end + Vector((-1.0, -0.2, 0.15)))
+    path = folder / "bicycle.jpg"
+    stage.render(scene, camera, path, PICTURE, samples)
+    return [path]
+
+
+if __name__ == "__main__":
+    production.main(__name__)
