@@ -8,7 +8,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from sample_scenes import production, stage
 from sample_scenes.course import Course
@@ -39,31 +38,38 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     scene.frame_start, scene.frame_end = 1, FRAMES
     frame = _frame(scene.collection)
     wheels = [_wheel(name, frame) for name in ("Front Wheel", "Hind Wheel")]
-    for number in range(1, FRAMES + 1):
-        along = SPEED * (number - 1) / scene.render.fps
-        hind, front = course.place(along), _ahead(course, along)
-        heading = np.arctan2(*(front - hind)[::-1])
-        frame.location, frame.rotation_euler.z = (*hind, WHEEL), heading
-        frame.keyframe_insert("location", frame=number)
-        frame.keyframe_insert("rotation_euler", index=2, frame=number)
-        for wheel, place in zip(wheels, (WHEELBASE, 0.0), strict=True):
-            wheel.location.x = place
-            steering = course.heading(along + place) - heading
-            wheel.rotation_euler = (0.0, along / WHEEL, float(steering))
-            wheel.keyframe_insert("rotation_euler", frame=number)
+    wheels[0].location.x = WHEELBASE
+    front, hind, rolled = ride(course, scene.render.fps)
+    for number in range(FRAMES):
+        heading = float(np.arctan2(*(front[number] - hind[number])[::-1]))
+        frame.location, frame.rotation_euler.z = (*hind[number], WHEEL), heading
+        frame.keyframe_insert("location", frame=number + 1)
+        frame.keyframe_insert("rotation_euler", index=2, frame=number + 1)
+        steering = float(course.heading(WHEELBASE + rolled[number, 0])) - heading
+        for wheel, distance, steered in zip(wheels, rolled[number], (steering, 0.0), strict=True):
+            wheel.rotation_euler = (0.0, distance / WHEEL, steered)
+            wheel.keyframe_insert("rotation_euler", frame=number + 1)
     chosen = {"shape_keys": "false", "material.surface": "wet_sand"} | dict(options or {})
     bicycle = Walker(wheels[0], MASS, with_things=wheels[1:])
     bake = production.bake(scene, [bicycle], "Mud", cell_size, options=chosen)
     return Bicycle({"sand": bake}, wheels, course)
 
 
-def _ahead(course: Course, along: float) -> np.ndarray:
-    """Where the front wheel is: on the way, a wheelbase from the hind wheel."""
-    hind = course.place(along)
-    further = along + WHEELBASE
-    for _ in range(8):  # the chord of a bend is shorter than the way: a fixed point, reached fast
-        further += WHEELBASE - float(np.linalg.norm(course.place(further) - hind))
-    return np.asarray(course.place(further))
+def ride(course: Course, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Front and hind wheel, (F, 2) each [m], and how far each has rolled, (F, 2) [m].
+
+    The front wheel keeps to the way; the hind wheel is drawn after it and cuts the bend (a tractrix).
+    """
+    parts = 40
+    along = WHEELBASE + SPEED * np.arange((FRAMES - 1) * parts + 1) / (rate * parts)
+    front = course.place(along)
+    hind = np.empty_like(front)
+    hind[0] = course.place(0.0)
+    for step in range(1, len(front)):
+        drawn = front[step] - hind[step - 1]
+        hind[step] = front[step] - WHEELBASE * drawn / np.linalg.norm(drawn)
+    rolled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(hind, axis=0), axis=1))])
+    return front[::parts], hind[::parts], np.column_stack([along - WHEELBASE, rolled])[::parts]
 
 
 def _frame(collection: bpy.types.Collection) -> bpy.types.Object:
@@ -113,23 +119,23 @@ def claims(built: Bicycle) -> list[Claim]:
     """One groove without gaps, about as deep all along, and two where the way bends."""
     bake = built.bakes["sand"]
     ground = recompose(bake.footprints)
-    reach = SPEED * (FRAMES - 1) / 24
-    along = np.arange(0.3, 1.4, bake.footprints[0].cell_size / 2)
-    groove = ground.sample(*built.course.place(along).T)[0]
-    across = np.linspace(-0.15, 0.15, 301)
-    straight, bend = (ground.sample(*built.course.place(place, across).T)[0] for place in (1.0, min(2.6, reach - 0.2)))
-    weight = MASS * 9.81
+    size = bake.footprints[0].cell_size
+
+    def groove(low: float, high: float) -> np.ndarray:
+        along = np.arange(low, high, size / 2)
+        return ground.sample(*built.course.place(along).T)[0]
+
+    once, twice = groove(0.3, 0.9), groove(1.15, 1.55)
+    across = np.linspace(-0.3, 0.3, 601)
+    straight, bend = (ground.sample(*built.course.place(place, across).T)[0] > 1e-3 for place in (0.6, 3.2))
     forces = [max(s.peak_force_n for s in bake.footprints if s.sole == wheel.name) for wheel in built.wheels]
     return [
-        Claim("Part of the straight on which there is a groove", float((groove > 1e-3).mean()), 1.0, 1.0),
-        Claim("Spread of its depth over its depth", float(groove.std() / groove.mean()), 0.0, 0.08),
-        Claim(
-            "Width of the groove over that of the tyre", float((straight > 1e-3).mean() * 0.3 / (2 * TYRE)), 0.4, 1.6
-        ),
-        Claim(
-            "Width of both tracks in the bend over one", float((bend > 1e-3).sum() / (straight > 1e-3).sum()), 1.1, 2.5
-        ),
-        Claim("Largest forces on both wheels over the weight", sum(forces) / weight, 0.95, 1.6),
+        Claim("Part of the straight on which there is a groove", float((twice > 1e-3).mean()), 1.0, 1.0),
+        Claim("Spread of its depth over its depth", float(twice.std() / twice.mean()), 0.0, 0.12),
+        Claim("Depth behind both wheels over that behind one", float(twice.mean() / once.mean()), 1.0, 1.9),
+        Claim("Width of the groove over that of the tyre", float(straight.sum() * 1e-3 / (2 * TYRE)), 0.4, 1.6),
+        Claim("Width of both tracks in the bend over one", float(bend.sum() / straight.sum()), 1.3, 2.3),
+        Claim("Largest forces on both wheels over the weight", sum(forces) / (MASS * 9.81), 0.95, 1.6),
     ]
 
 
@@ -142,8 +148,7 @@ def shoot(built: Bicycle, folder: Path, samples: int) -> list[Path]:
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
     camera = stage.add_camera(scene, "Bicycle", lens=40.0)
-    end = Vector((*built.course.place(SPEED * (FRAMES - 1) / scene.render.fps), 0.0))
-    stage.aim(camera, (-0.9, 1.5, 1.35), end + Vector((-1.0, -0.2, 0.15)))
+    stage.aim(camera, (0.2, -1.9, 1.5), (2.5, 0.35, 0.15))
     path = folder / "bicycle.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

@@ -1,6 +1,6 @@
 """Fig. 5, force arrows: weight and momentum under each sole, and the ground's reaction, at moments of a walk.
 
-Orange is the foot's share of the weight, blue what the motion adds to it or takes away, white the force of the ground.
+Orange is the foot's share of the weight, blue what the motion adds to it or takes away, red the force of the ground.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CELL_SIZE = 0.0075  # m
 FRAMES = 72  # 3 s
 PICTURE = (960, 420)
 
-COLOURS = {"weight": (0.85, 0.30, 0.03), "momentum": (0.03, 0.22, 0.85), "total": (0.9, 0.9, 0.9)}
+COLOURS = {"weight": (0.85, 0.30, 0.03), "momentum": (0.03, 0.22, 0.85), "total": (0.75, 0.02, 0.02)}
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _ghost() -> bpy.types.Material:
     """Figures that let the arrows through."""
     material = stage.plain_material("SoftGround Sample ghost", (0.55, 0.55, 0.58), 0.7)
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Alpha"].default_value = 0.35
+    shader.inputs["Alpha"].default_value = 0.22
     return material
 
 

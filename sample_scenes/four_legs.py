@@ -12,7 +12,7 @@ import numpy as np
 
 from sample_scenes import production, stage
 from sample_scenes.character import create_character
-from sample_scenes.dog import Dog
+from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.four_legged import TROT, WALK, go_on_four_legs
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
@@ -83,7 +83,7 @@ def claims(built: FourLegs) -> list[Claim]:
         left = (load["hand.L"] + load["foot.L"]) / vertical.sum()
         result += [
             Claim(f"Mean force of the {name} [body weights]", float(vertical.sum()), 0.95, 1.05),
-            Claim(f"Share of the forepaws in the {name}", float(front), 0.25, 0.75),
+            Claim(f"Share of the forepaws in the {name}", float(front), FRONT_SHARE - 0.1, FRONT_SHARE + 0.1),
             Claim(f"Share of the left paws in the {name}", float(left), 0.45, 0.55),
         ]
     return result

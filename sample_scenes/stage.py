@@ -147,7 +147,7 @@ def add_arrow(
 ) -> bpy.types.Object:
     """An arrow of a round shaft and a cone, its point at `end`."""
     way = Vector(end) - Vector(start)
-    length, radius, head = way.length, 0.012, min(0.08, 0.5 * way.length)
+    length, radius, head = way.length, 0.016, min(0.09, 0.5 * way.length)
     profile = [(0.0, 0.0), (radius, 0.0), (radius, length - head), (2.6 * radius, length - head), (0.0, length)]
     around = np.linspace(0.0, 2 * pi, 16, endpoint=False)
     vertices = [(r * cos(a), r * sin(a), z) for r, z in profile for a in around]
