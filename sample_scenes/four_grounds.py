@@ -56,7 +56,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     for number, preset in enumerate(PRESETS):
         walker = copy_character(first, f"Hiker {preset}", scene.collection)
         walker.location.x = number * SPACING
-        chosen = {"shape_keys": "false"} | _LOOKS[preset] | (options or {})
+        chosen = {"shape_keys": "false", "tread": "0.003"} | _LOOKS[preset] | (options or {})
         bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], preset, cell_size, options=chosen)
         bakes[preset].ground.name = f"{preset} Ground"
         walkers.append(walker)

@@ -98,7 +98,7 @@ def shoot(built: FourLegs, folder: Path, samples: int) -> list[Path]:
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
     camera = stage.add_camera(scene, "Dogs", lens=45.0)
-    stage.aim(camera, (-2.1, -4.4, 1.5), (0.35, -1.7, 0.2))
+    stage.aim(camera, (-3.0, -6.9, 1.9), (0.5, -2.9, 0.15))
     path = folder / "four_legs.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

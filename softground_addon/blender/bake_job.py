@@ -24,6 +24,7 @@ from ..core.histories import histories
 from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
 from ..core.simulation import CharacterLoads, simulate
+from ..core.sole_marks import sole_marks
 from . import (
     bake_report,
     baked_ground,
@@ -197,6 +198,7 @@ def _write(
         across = place.position[:, :2].T
         sample = yield from aside("write", 0.6, pressed.sample, *across)
         over_time = yield from aside("write", 0.7, partial(histories, footprints, *across, blur_sigma=blur_sigma))
+        marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
         yield Progress("write", 0.9)
         carrier = yield from baked_ground.write(
             place,
@@ -207,7 +209,16 @@ def _write(
             unit_scale=unit_scale,
             shape_keys=options.shape_keys,
         )
+        ground_mesh.write_soles(carrier, place.index, marks)
     return _Written(ground, carrier, input_hash, over_time.error, warnings)
+
+
+def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:
+    """What `ground_mesh.SOLE` says of places (K, 3), for a tread of some depth [m]; None without a tread."""
+    if not depth > 0 or not footprints:
+        return None
+    marks: Array = sole_marks(footprints, footprints[0].cell_size).sample(*position[:, :2].T)
+    return marks.T * (1.0, 1.0, depth)
 
 
 def _press(

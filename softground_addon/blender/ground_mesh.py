@@ -33,6 +33,8 @@ COMPRESSION = "softground_compression"
 RIM = "softground_rim"
 AGE = "softground_age"
 SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
+SOLE = "softground_sole"
+"""Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
 RECORD = "softground_record"
 SUMMARY = "softground_summary"
 PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
@@ -286,6 +288,19 @@ def write(
     write_positions(mesh, raw if shape_keys else display)
 
 
+def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -> None:
+    """Say of vertices (K,) where under a sole they lay, (K, 3) as in `SOLE`, and of all others that under none."""
+    mesh = mesh_of(ground)
+    if marks is None:
+        if SOLE in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[SOLE])
+        return
+    whole = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+    whole[index] = marks
+    attribute = mesh.attributes.get(SOLE) or _add_attribute(mesh, SOLE, "FLOAT_VECTOR")
+    attribute.data.foreach_set("vector", whole.ravel())
+
+
 def _write_shape_keys(ground: bpy.types.Object, raw: NDArray[np.float32], display: NDArray[np.float32]) -> None:
     mesh = mesh_of(ground)
     if not mesh.shape_keys:
@@ -320,7 +335,7 @@ def restore(ground: bpy.types.Object) -> None:
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
     ground.shape_key_clear()
-    for name in (REST, *SHADING_ATTRIBUTES):
+    for name in (REST, *SHADING_ATTRIBUTES, SOLE):
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
     for key in PROPERTIES:

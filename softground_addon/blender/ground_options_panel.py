@@ -39,6 +39,7 @@ class SOFTGROUND_PT_behaviour(_Panel, bpy.types.Panel):
         column.prop(options, "pressure")
         for field in ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress", "firm_depth"):
             column.prop(options.material, field)
+        column.prop(options, "tread")
 
 
 class SOFTGROUND_PT_painted(_Panel, bpy.types.Panel):

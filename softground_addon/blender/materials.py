@@ -13,7 +13,10 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from .ground_mesh import COMPRESSION, RIM
+from .ground_mesh import COMPRESSION, RIM, SOLE
+
+TREAD_PITCH = 0.017
+"""From bar to bar of a tread [m]."""
 
 MARK = "softground_surface"
 """Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
@@ -120,14 +123,15 @@ class Ground:
         World place [m].
     pressed, deep, risen : Socket
         From 0 to 1: whether a foot was here, whether it left a hollow, whether the ground stands up as a rim.
-    edge : Socket
-        1 halfway down the wall of a print, 0 on level ground.
+    tread : Socket
+        Height of the bars that the tread of a shoe left in the print [m].
     """
 
     place: Socket
     pressed: Socket
     deep: Socket
     risen: Socket
+    tread: Socket
 
     @property
     def edge(self) -> Socket:
@@ -220,7 +224,19 @@ def _ground(graph: Graph) -> Ground:
         pressed=graph.ramp(compression, 0.0004, 0.004),
         deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
+        tread=_tread(graph),
     )
+
+
+def _tread(graph: Graph) -> Socket:
+    """Ridges that bow across the print where the sole has grooves, beside a plain edge [m]."""
+    place = graph.node("ShaderNodeAttribute", attribute_name=SOLE)
+    separate = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(place, 1)})
+    along, across, depth = (graph.out(separate, axis) for axis in range(3))
+    aside = graph.math("ABSOLUTE", across, 0.0)
+    phase = graph.math("FRACT", (along + aside * 0.35) * (1.0 / TREAD_PITCH), 0.0)
+    ridge = graph.ramp(graph.math("ABSOLUTE", phase + -0.5, 0.0), 0.12, 0.24, 1.0, 0.0)
+    return ridge * graph.ramp(aside, 0.030, 0.034, 1.0, 0.0) * depth
 
 
 def _shaded(graph: Graph, look: Look) -> tuple[Socket, Socket]:
@@ -242,7 +258,7 @@ def _snow(graph: Graph, ground: Ground) -> Look:
     tilt = graph.node("ShaderNodeVectorMath", {0: graph.out(glints, 1), 1: (0.5, 0.5, 0.0)}, operation="SUBTRACT")
     facet = graph.node("ShaderNodeVectorMath", {0: graph.out(tilt)}, operation="NORMALIZE")
     return Look(
-        drifts + clumps + crystals + broken,
+        drifts + clumps + crystals + broken + ground.tread,
         {
             "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.74, 0.84, 0.94)),
             "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
@@ -264,7 +280,7 @@ def _grains(graph: Graph, ground: Ground) -> tuple[Socket, Socket]:
     relief = relief + graph.noise(ground.place, 0.0022, 2.0, 0.7) * graph.blend(ground.pressed, 0.0010, 0.0008)
     relief = relief + graph.noise(ground.place, 0.024, 3.0, 0.6) * graph.blend(ground.pressed, 0.0034, 0.0012)
     loose = graph.noise(ground.place, 0.011, 3.0, 0.65) * graph.math("MAXIMUM", ground.risen, ground.edge)
-    return relief + loose * 0.0040, tint
+    return relief + loose * 0.0040 + ground.tread * 0.5, tint
 
 
 def _dry_sand(graph: Graph, ground: Ground) -> Look:
@@ -302,7 +318,7 @@ def _mud(graph: Graph, ground: Ground) -> Look:
     bits = graph.noise(ground.place, 0.008, 3.0, 0.6)
     squeezed = graph.noise(ground.place, 0.020, 2.0, 0.5) * graph.math("MAXIMUM", ground.risen, ground.edge)
     relief = lumps * graph.blend(ground.pressed, 0.008, 0.003) + bits * graph.blend(ground.pressed, 0.0020, 0.0006)
-    relief = relief + squeezed * 0.008
+    relief = relief + squeezed * 0.008 + ground.tread
     damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
     wet = graph.math("MAXIMUM", ground.pressed, damp)
     colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.105, 0.064, 0.036), (0.170, 0.110, 0.066))
@@ -332,7 +348,7 @@ def _soil(graph: Graph, ground: Ground) -> Look:
     clods = graph.math("MAXIMUM", graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.46, 0.62), ground.risen)
     crumbs = large * clods * 0.014 + small * graph.blend(ground.risen, 0.0045, 0.0075)
     relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0026, 0.0014)
-    relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008
+    relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008 + ground.tread
     tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
     colour = graph.mix(tint, (0.050, 0.029, 0.018), (0.190, 0.118, 0.074))
     colour = graph.mix(ground.pressed * 0.5, colour, (0.095, 0.057, 0.034))

@@ -71,6 +71,19 @@ def test_an_unknown_surface_is_refused_with_the_known_ones(ensure_material):
         ensure_material("lava")
 
 
+def test_a_blend_shows_both_surfaces_by_what_is_painted(scene):
+    from softground_addon.blender.materials import BLEND, ensure_blend
+
+    material = ensure_blend("snow", "sand")
+    mix = next(node for node in material.node_tree.nodes if node.type == "MIX_SHADER")
+    assert {link.from_node.type for inlet in mix.inputs[1:] for link in inlet.links} == {"BSDF_PRINCIPLED"}
+    assert BLEND in {node.attribute_name for node in upstream(mix.inputs[0]) if node.type == "ATTRIBUTE"}
+    assert ensure_blend("snow", "sand") == material
+    assert ensure_blend("sand", "snow") != material
+    with pytest.raises(InputError, match="snow, sand"):
+        ensure_blend("snow", "lava")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_pressed_spot_renders_differently_from_an_untouched_one(scene, ensure_material, tmp_path, surface):

@@ -86,6 +86,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         ],
         default="UNIFORM",
     )
+    tread: FloatProperty(
+        name="Tread (m)",
+        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in metres. 0 "
+        "for bare feet, paws and things",
+        default=0.0,
+        min=0.0,
+        max=0.1,
+        soft_max=0.005,
+        precision=4,
+    )
     tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
