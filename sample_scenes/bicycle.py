@@ -147,8 +147,8 @@ def shoot(built: Bicycle, folder: Path, samples: int) -> list[Path]:
     ground = built.bakes["sand"].carrier
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
-    camera = stage.add_camera(scene, "Bicycle", lens=40.0)
-    stage.aim(camera, (0.2, -1.9, 1.5), (2.5, 0.35, 0.15))
+    camera = stage.add_camera(scene, "Bicycle", lens=36.0)
+    stage.aim(camera, (0.3, -2.6, 1.5), (3.2, 0.6, 0.35))
     path = folder / "bicycle.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

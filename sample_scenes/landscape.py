@@ -138,8 +138,8 @@ def claims(built: Landscape) -> list[Claim]:
         Claim(
             "Depth without snowshoes over depth with them, relative to the areas",
             ratio * area["walker"] / area["snowshoes"],
-            0.8,
-            1.2,
+            0.75,
+            1.25,
         ),
         Claim("Area of a snowshoe over that of a shoe", area["snowshoes"] / area["walker"], 3.0, 7.0),
         Claim("Part of the heavy one's way that is trodden", covered(tracks["heavy"]), 0.98, 1.0),
@@ -170,8 +170,9 @@ def shoot(_built: Landscape, folder: Path, samples: int) -> list[Path]:
     scene.frame_set(scene.frame_end)
     stage.add_sun(scene, radians(-20), radians(17))
     scene.view_settings.exposure = -0.4
-    camera = stage.add_camera(scene, "Landscape", lens=36.0)
-    stage.aim(camera, (-4.6, -8.6, 3.6), (0.5, -2.9, 0.35))
+    stage.add_floor(-0.03, scene.collection)
+    camera = stage.add_camera(scene, "Landscape", lens=40.0)
+    stage.aim(camera, (-5.6, -10.4, 4.4), (0.55, -3.2, 0.1))
     path = folder / "landscape.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

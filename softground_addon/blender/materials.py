@@ -21,7 +21,7 @@ TREAD_PITCH = 0.017
 MARK = "softground_surface"
 """Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
 
-BLEND = "softground_blend"
+BLEND = "surface_blend"
 """Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
 Colour = tuple[float, float, float]
