@@ -45,6 +45,7 @@ def plot_trial(trial: Trial, path: str, curves: dict[str, Array], scored: Array,
         axis.set_ylim(bottom=0)
     source = "joint centres" if path == "joints" else "BVH through Blender"
     axes[0].set_title(f"{trial.name}, from {source}; {impulse.replace('IMPULSE', 'impulse model at')} s")
+    axes[0].set_ylim(top=1.25 * axes[0].get_ylim()[1])  # room for the legend
     axes[0].legend(loc="upper right", ncols=3, fontsize="small")
     axes[-1].set_xlabel("time [s]")
     figure.savefig(file, dpi=110)
