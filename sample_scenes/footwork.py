@@ -265,10 +265,10 @@ def footfall_at(
 
 
 def leg_turns(body: Body, side: str, hips: Array, pelvis: Array, foot: FootPoses) -> dict[str, Array]:
-    """Thigh and shin that join hip and ankle, the knee pointing where foot and pelvis face."""
+    """Thigh and shin that join hip and ankle; the knee bends about the left of foot and pelvis."""
     hip = hips + pelvis @ (body.joints[f"hip.{side}"] - body.joints["hips"])
-    facing = np.stack([np.cos(foot.heading), np.sin(foot.heading), np.zeros_like(foot.heading)], axis=-1)
-    knee, lateral = bend_to_reach(hip, foot.ankle, body.thigh, body.shin, pelvis[:, :, 0] + facing)
+    left = pelvis[:, :, 1] + rotation("z", foot.heading)[:, :, 1]
+    knee, lateral = bend_to_reach(hip, foot.ankle, body.thigh, body.shin, np.cross(left, hip - foot.ankle))
     return {
         f"thigh.{side}": hanging(knee - hip, lateral),
         f"shin.{side}": hanging(foot.ankle - knee, lateral),

@@ -11,9 +11,7 @@ from sample_scenes.motion import Array, BodyMotion
 
 def write_action(armature: bpy.types.Object, motion: BodyMotion, name: str, first_frame: int = 1) -> bpy.types.Action:
     """Give a character of `create_character` an action that plays the motion from `first_frame` on."""
-    action = bpy.data.actions.new(name)
-    armature.animation_data_create().action = action
-    curves = _curves_of(action, armature)
+    action, curves = object_curves(armature, name)
     frames = first_frame + np.arange(len(motion.hips), dtype=float)
     turns = {bone: TO_BLENDER @ turn @ TO_BLENDER.T for bone, turn in motion.turns.items()}
     for bone, turn in turns.items():
@@ -23,11 +21,11 @@ def write_action(armature: bpy.types.Object, motion: BodyMotion, name: str, firs
         path = f'pose.bones["{bone}"].'
         armature.pose.bones[bone].rotation_mode = "QUATERNION"
         for index, values in enumerate(quaternions(rest.T @ local @ rest).T):
-            _write(curves, path + "rotation_quaternion", index, frames, values)
+            write_curve(curves, path + "rotation_quaternion", index, frames, values)
         if parent is None:
             offset = (motion.hips @ TO_BLENDER.T - np.array(armature.data.bones[bone].head_local)) @ rest
             for index, values in enumerate(offset.T):
-                _write(curves, path + "location", index, frames, values)
+                write_curve(curves, path + "location", index, frames, values)
     return action
 
 
@@ -54,17 +52,20 @@ def quaternions(matrices: Array) -> Array:
     return result
 
 
-def _curves_of(action: bpy.types.Action, armature: bpy.types.Object) -> bpy.types.bpy_prop_collection:
-    """The collection that F-curves for the armature go into: the action's own, or its slot's channels (4.4 on)."""
+def object_curves(thing: bpy.types.Object, name: str) -> tuple[bpy.types.Action, bpy.types.bpy_prop_collection]:
+    """A new action of an object, and the collection that its F-curves go into: its own, or its slot's (4.4 on)."""
+    action = bpy.data.actions.new(name)
+    thing.animation_data_create().action = action
     if not hasattr(action, "slots"):
-        return action.fcurves
-    slot = action.slots.new(id_type="OBJECT", name=armature.name)
-    armature.animation_data.action_slot = slot
+        return action, action.fcurves
+    slot = action.slots.new(id_type="OBJECT", name=thing.name)
+    thing.animation_data.action_slot = slot
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    return strip.channelbag(slot, ensure=True).fcurves
+    return action, strip.channelbag(slot, ensure=True).fcurves
 
 
-def _write(curves: bpy.types.bpy_prop_collection, path: str, index: int, frames: Array, values: Array) -> None:
+def write_curve(curves: bpy.types.bpy_prop_collection, path: str, index: int, frames: Array, values: Array) -> None:
+    """One F-curve with a key at each of the frames."""
     curve = curves.new(path, index=index)
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", np.stack([frames, values], axis=1).ravel())
