@@ -12,11 +12,14 @@ from sample_scenes.body import SIDES, Array, Body
 from sample_scenes.carriage import hang_arm
 from sample_scenes.curves import clamped_spline, monotone_cubic
 from sample_scenes.footwork import FootCourse, FootPoses, KeyedRoll, Swing
-from sample_scenes.motion import BodyMotion, Footfall, rotation
+from sample_scenes.hands import arms_with_hands_down, between
+from sample_scenes.motion import BodyMotion, Footfall, joint_paths, rotation
 from sample_scenes.stride import assemble, within_reach
 
 MAX_STRETCH = 0.985
 """Longest hip-ankle distance, relative to the straight leg."""
+
+_LOOSENING = 0.18  # s in the air until a foot hangs loose
 
 Track = Sequence[tuple[float, float]]
 """Times [s] and angles [degrees]; level before the first and after the last."""
@@ -46,6 +49,10 @@ class Score:
         Ways of swings, by side and number; others go straight with a lift of `lift`.
     lift : float
         [m]
+    hands : tuple of Footfall
+        When and where hands are on the ground; free arms then point as "spread.L" and "spread.R" say.
+    loose_feet : bool
+        Feet in the air hang from the shin, whichever way the leg points, rather than keeping their keyed pitch.
     """
 
     footfalls: tuple[Footfall, ...]
@@ -54,6 +61,8 @@ class Score:
     angles: Mapping[str, Track] = field(default_factory=dict)
     swings: Mapping[tuple[str, int], Via] = field(default_factory=dict)
     lift: float = 0.08
+    hands: tuple[Footfall, ...] = ()
+    loose_feet: bool = False
 
 
 _RELAXED = {"elbow": 18.0, "inward": 14.0, "arm": 0.0, "spread": 0.0}
@@ -68,7 +77,15 @@ def perform(body: Body, score: Score, frame_count: int, frame_rate: float = 24.0
 
     def pose(hips: Array) -> BodyMotion:
         reached = {side: within_reach(body, side, hips, upper["hips"], feet[side], MAX_STRETCH) for side in SIDES}
-        return assemble(body, frame_rate, hips, upper, reached, score.footfalls)
+        motion = assemble(body, frame_rate, hips, upper, reached, score.footfalls)
+        if score.loose_feet:
+            motion.turns.update(_loosened(score, motion.turns, times))
+        if score.hands:
+            paths = joint_paths(body, motion)
+            shoulders = {side: paths[f"shoulder.{side}"] for side in SIDES}
+            spread = {side: angle(score, f"spread.{side}", times) for side in SIDES}
+            motion.turns.update(arms_with_hands_down(body, times, score.hands, upper["chest"], shoulders, spread))
+        return motion
 
     return balanced(body, pose, centre, centre - (rest_centre(body) - body.joints["hips"]))
 
@@ -106,6 +123,19 @@ def _upper_body(body: Body, score: Score, times: Array) -> dict[str, Array]:
         joints = (of(f"{name}.{side}") for name in ("arm", "elbow", "inward", "spread"))
         turns |= hang_arm(body, side, chest, *joints)
     return turns
+
+
+def _loosened(score: Score, turns: dict[str, Array], times: Array) -> dict[str, Array]:
+    """Feet and toes that hang from the shin with the toes pointed, the more the longer they are in the air."""
+    loose = {}
+    for side in SIDES:
+        falls = [fall for fall in score.footfalls if fall.side == side]
+        away = np.min([np.maximum(np.maximum(f.strike - times, times - f.leave), 0.0) for f in falls], axis=0)
+        free = np.clip(away / _LOOSENING, 0.0, 1.0)
+        free = free**2 * (3 - 2 * free)
+        pointed = turns[f"shin.{side}"] @ rotation("y", np.full(len(times), np.radians(40.0)))
+        loose |= {f"{bone}.{side}": between(turns[f"{bone}.{side}"], pointed, free) for bone in ("foot", "toe")}
+    return loose
 
 
 def _foot(body: Body, score: Score, side: str, times: Array) -> FootPoses:
