@@ -397,11 +397,19 @@ def _footprint(name: Mapping[str, str], values: Mapping[str, NDArray[Any]]) -> F
     return Footprint(window=Window(*values["window"].tolist()), position=values["position"], **content)
 
 
+SPARSEST = 1000
+SPARE_CELLS = 2**20
+"""Most cells of a window for each change in it, and on top of that: windows beyond would only fill the memory."""
+
+
 def _check(footprint: Footprint) -> None:
     """Raise ValueError where the parts of a footprint contradict each other."""
     cells = footprint.window.cells
     if footprint.window.columns < 1 or footprint.window.rows < 1 or footprint.cell_size <= 0:
         raise ValueError("a footprint has no cells")
+    recorded = sum(map(len, (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells)))
+    if cells > SPARSEST * recorded + SPARE_CELLS:
+        raise ValueError("a footprint's window is far larger than what it changed")
     if len(footprint.load_n) != len(footprint.load_frames):
         raise ValueError("loads and frames do not match")
     if not len(footprint.contact_cells) == len(footprint.contact_start) == len(footprint.contact_end):

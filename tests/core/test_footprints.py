@@ -175,6 +175,7 @@ def test_a_record_that_was_cut_short_or_edited_is_refused_with_a_remedy(bake, ke
         ("compression.first", -5),
         ("compression.frames", 1e9),
         ("window", 0),
+        ("window", 2**31 - 1),
         ("load_n.count", -1),
     ],
 )

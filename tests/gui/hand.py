@@ -81,7 +81,7 @@ class Hand:
             yield 0.1
             waited += 0.1
 
-    def picture(self, name: str, *, of: str = "") -> Steps:
+    def picture(self, name: str, *, of: str = "", in_docs: bool = True) -> Steps:
         """Keep what the window shows, or one region of the viewport."""
         yield 0.5
         crop = []
@@ -89,7 +89,7 @@ class Hand:
             region = self.region(of)
             top = self.window.height - region.y - region.height
             crop = ["-crop", f"{region.width}x{region.height}+{region.x}+{top}", "+repage"]
-        folder = self.pictures / "docs"
+        folder = self.pictures / "docs" if in_docs else self.pictures
         folder.mkdir(exist_ok=True)
         subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=True)
 
