@@ -82,9 +82,9 @@ def lay_out(plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: flo
     grid, spacing = _graded(plan, cell_size, reach)
     place = (grid.vertices + 0.5) * spacing
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
-    location = (np.append(middle, plan.terrain.heights(*middle)) / unit_scale).astype(np.float32)
-    world = np.column_stack([place, plan.terrain.heights(*place.T)])
-    local = (world / unit_scale - location).astype(np.float32)
+    centre = np.append(middle, plan.terrain.heights(*middle))
+    local = ((np.column_stack([place, plan.terrain.heights(*place.T)]) - centre) / unit_scale).astype(np.float32)
+    location = (centre / unit_scale).astype(np.float32)
     vertices = (local.astype(np.float64) + location) * unit_scale
     return Layout(vertices, local, location, grid.corner_vertex, grid.face_size)
 
