@@ -12,7 +12,7 @@ from ..core.grounding import Response
 from ..core.key_reduction import kept_samples
 from ..core.motion import CharacterMotion
 from ..core.orientation import euler_angles, quaternions, rotation_matrices
-from .nla_layer import LayerCurve
+from .layer_curves import LayerCurve
 from .pose_sampling import BonePoses, RigPoses, sample_poses
 from .rig_controls import BODY, Control, RigControls, find_controls
 from .rig_mapping import RigMapping

@@ -33,6 +33,15 @@ def new_channels(action: bpy.types.Action, name: str) -> tuple[Any, Any]:
     return slot, strip.channelbag(slot, ensure=True).fcurves
 
 
+def channels_of(action: bpy.types.Action, slot: Any) -> Any:
+    """The collection of an action's curves for one of its slots, made if need be; of all its curves before slots."""
+    if not HAS_SLOTS:
+        return action.fcurves
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(slot, ensure=True).fcurves
+
+
 def new_curve(curves: Any, path: str, index: int, group: str) -> bpy.types.FCurve:
     """A new curve in a collection from `new_channels`, in a named group where this Blender can make one."""
     if not HAS_SLOTS:

@@ -2,24 +2,23 @@
 
 The user's active action moves, as it is, onto a track of its own below the layer, since Blender evaluates an active
 action above all tracks. Channels that the layer changes but nothing animates get their standing value on a third track
-at the bottom: NLA would otherwise take them for their defaults, and the value would be lost.
+at the bottom: NLA would otherwise take them for their defaults, and the value would be lost. Where the user has
+switched the object's NLA off, a copy of the action takes the layer's place (`copied_action`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.errors import InputError
-from .compat import action_curves, new_channels, new_curve, set_slot, slot_of
-
-Array = NDArray[np.float64]
+from . import copied_action
+from .compat import action_curves, set_slot, slot_of
+from .layer_curves import LayerCurve, new_action, set_value, value_of
 
 RESPONSE = "SoftGround Response"
 EXTRA = "SoftGround Response +"
@@ -28,31 +27,9 @@ STANDING = "SoftGround Standing Pose"
 _OWN_TRACKS = (RESPONSE, EXTRA, SOURCE, STANDING)
 
 
-@dataclass(frozen=True)
-class LayerCurve:
-    """Keys of one channel on top of what animates it.
-
-    Attributes
-    ----------
-    path : str
-        Data path from the object.
-    index : int
-    group : str
-        What the user sees the channel under: the bone.
-    frames, values : (K,) float arrays
-        Added to the channel; a quaternion is multiplied.
-    """
-
-    path: str
-    index: int
-    group: str
-    frames: Array
-    values: Array
-
-
 def has_layer(thing: bpy.types.Object) -> bool:
     """Whether a layer lies on the object's animation."""
-    return _track(thing, RESPONSE) is not None
+    return _track(thing, RESPONSE) is not None or copied_action.is_on(thing)
 
 
 def check_layerable(thing: bpy.types.Object) -> None:
@@ -67,10 +44,6 @@ def check_layerable(thing: bpy.types.Object) -> None:
         return
     if animation.use_tweak_mode:
         raise InputError(f"An NLA strip of '{thing.name}' is being tweaked: leave tweak mode (Tab in the NLA editor).")
-    if not animation.use_nla:
-        raise InputError(
-            f"The NLA of '{thing.name}' is switched off, so a layer would not show: switch it on in the NLA editor."
-        )
     solo = next((track for track in animation.nla_tracks if track.is_solo and track.name not in _OWN_TRACKS), None)
     if solo is not None:
         raise InputError(f"NLA track '{solo.name}' of '{thing.name}' is solo, which mutes any layer: end its solo.")
@@ -83,6 +56,8 @@ def add_layer(
     notes: Mapping[str, str] | None = None,
 ) -> None:
     """Put curves above the object's animation; a layer that is there already goes first.
+
+    Where the object's NLA is switched off, the object gets a copy of its action with the curves in it.
 
     Parameters
     ----------
@@ -102,8 +77,11 @@ def add_layer(
     check_layerable(thing)
     strength = strength_of(thing)
     remove_layer(thing)
+    if thing.animation_data is not None and not thing.animation_data.use_nla:
+        copied_action.put(thing, curves, frames, notes or {}, 1.0 if strength is None else strength)
+        return
     standing = _standing_values(thing, curves)
-    action = _new_action(f"{thing.name} Response", thing, curves)
+    action = new_action(f"{thing.name} Response", thing, curves)
     for key, text in (notes or {}).items():
         action[key] = text
     animation = thing.animation_data or thing.animation_data_create()
@@ -118,7 +96,7 @@ def add_layer(
         if settings[2] != 1.0:
             _set_influence(strip, settings[2])
     if standing:
-        below = _new_action(f"{thing.name} Standing Pose", thing, standing)
+        below = new_action(f"{thing.name} Standing Pose", thing, standing)
         strip = _add_strip(animation, STANDING, below, slot_of_action(below), span, bottom=True)
         strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
     for name in (RESPONSE, EXTRA):
@@ -129,6 +107,8 @@ def add_layer(
 
 def notes_of(thing: bpy.types.Object) -> dict[str, str]:
     """What was noted with the layer; nothing where there is none."""
+    if copied_action.is_on(thing):
+        return copied_action.notes_of(thing)
     strip = _strip(thing, RESPONSE)
     action = strip.action if strip else None
     return {key: str(action[key]) for key in action.keys()} if action else {}  # noqa: SIM118
@@ -136,6 +116,7 @@ def notes_of(thing: bpy.types.Object) -> dict[str, str]:
 
 def remove_layer(thing: bpy.types.Object) -> None:
     """Take the layer off; the object is animated as before. Nothing happens where there is none."""
+    copied_action.remove(thing)
     if not has_layer(thing):
         return
     animation = thing.animation_data
@@ -155,7 +136,7 @@ def remove_layer(thing: bpy.types.Object) -> None:
         set_slot(animation, slot)
         animation.action_blend_type, animation.action_extrapolation, animation.action_influence = restored[2:]
     for path, index, value in values:
-        _set(thing, path, index, value)
+        set_value(thing, path, index, value)
     for action in left_over:
         if action.users == 0:
             bpy.data.actions.remove(action)
@@ -166,12 +147,17 @@ def remove_layer(thing: bpy.types.Object) -> None:
 
 def strength_of(thing: bpy.types.Object) -> float | None:
     """How much of the layer shows, 0 to 2; None where there is none."""
+    if copied_action.is_on(thing):
+        return copied_action.strength_of(thing)
     strips = [_strip(thing, name) for name in (RESPONSE, EXTRA)]
     return sum(_influence(strip) for strip in strips if strip) if strips[0] else None
 
 
 def set_strength(thing: bpy.types.Object, strength: float) -> None:
     """Scale the layer, 0 to 2: its keys count once through one strip and once more through another."""
+    if copied_action.is_on(thing):
+        copied_action.set_strength(thing, strength)
+        return
     for name, influence in ((RESPONSE, min(strength, 1.0)), (EXTRA, max(strength - 1.0, 0.0))):
         strip, track = _strip(thing, name), _track(thing, name)
         if strip is not None and track is not None:
@@ -182,6 +168,10 @@ def set_strength(thing: bpy.types.Object, strength: float) -> None:
 @contextmanager
 def without_layer(thing: bpy.types.Object) -> Iterator[None]:
     """The object as animated by the user alone."""
+    if copied_action.is_on(thing):
+        with copied_action.without(thing):
+            yield
+        return
     tracks = [track for name in (RESPONSE, EXTRA) if (track := _track(thing, name)) and not track.mute]
     names = [track.name for track in tracks]
     for track in tracks:
@@ -195,6 +185,14 @@ def without_layer(thing: bpy.types.Object) -> Iterator[None]:
                 track.mute = False
 
 
+def own_action(thing: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
+    """The user's active action and its slot, also where a copy of it is at work."""
+    if copied_action.is_on(thing):
+        return copied_action.original_of(thing)
+    animation = thing.animation_data
+    return (animation.action, slot_of(animation)) if animation else (None, None)
+
+
 def slot_of_action(action: bpy.types.Action) -> Any:
     """The only slot of one of our own actions; None before slots."""
     return next(iter(getattr(action, "slots", ())), None)
@@ -205,8 +203,9 @@ def animated_paths(thing: bpy.types.Object) -> set[tuple[str, int]]:
     animation = thing.animation_data
     if animation is None:
         return set()
-    owners = [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
-    curves = [curve for owner in owners if owner.action for curve in action_curves(owner.action, slot_of(owner))]
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    owned = [own_action(thing), *((strip.action, slot_of(strip)) for strip in strips)]
+    curves = [curve for action, slot in owned if action for curve in action_curves(action, slot)]
     return {(curve.data_path, curve.array_index) for curve in (*curves, *animation.drivers)}
 
 
@@ -283,28 +282,12 @@ _MARGIN = 1000
 """Frames before and after a shot in which the user's action still plays as it would alone."""
 
 
-def _new_action(name: str, thing: bpy.types.Object, curves: Sequence[LayerCurve]) -> bpy.types.Action:
-    action = bpy.data.actions.new(name)
-    _, channels = new_channels(action, thing.name)
-    for layer_curve in curves:
-        curve = new_curve(channels, layer_curve.path, layer_curve.index, layer_curve.group)
-        keys = curve.keyframe_points
-        keys.add(len(layer_curve.frames))
-        keys.foreach_set("co", np.stack([layer_curve.frames, layer_curve.values], axis=1).astype(np.float32).ravel())
-        keys.foreach_set("interpolation", np.full(len(layer_curve.frames), _LINEAR, dtype=np.int32))
-        curve.update()
-    return action
-
-
-_LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
-
-
 def _standing_values(thing: bpy.types.Object, curves: Sequence[LayerCurve]) -> list[LayerCurve]:
     """One key each for the channels that the layer changes and nothing animates."""
     animated = animated_paths(thing)
     return [
         LayerCurve(
-            curve.path, curve.index, curve.group, np.array([0.0]), np.array([_get(thing, curve.path, curve.index)])
+            curve.path, curve.index, curve.group, np.array([0.0]), np.array([value_of(thing, curve.path, curve.index)])
         )
         for curve in curves
         if (curve.path, curve.index) not in animated
@@ -319,11 +302,3 @@ def _constants(strip: bpy.types.NlaStrip) -> list[tuple[str, int, float]]:
         (curve.data_path, curve.array_index, curve.keyframe_points[0].co[1])
         for curve in action_curves(strip.action, slot_of(strip))
     ]
-
-
-def _get(thing: bpy.types.Object, path: str, index: int) -> float:
-    return float(thing.path_resolve(path)[index])
-
-
-def _set(thing: bpy.types.Object, path: str, index: int, value: float) -> None:
-    thing.path_resolve(path)[index] = value

@@ -95,8 +95,9 @@ def _of_animation(armature: bpy.types.Object) -> str:
     if animation is None:
         return ""
     found = set()
-    if animation.action:
-        found.add(_of_action(animation.action, slot_of(animation)))
+    action, slot = nla_layer.own_action(armature)
+    if action:
+        found.add(_of_action(action, slot))
     for track in animation.nla_tracks:
         if track.name in _ANSWERS or (track.mute and track.name != nla_layer.SOURCE):
             continue

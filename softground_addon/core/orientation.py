@@ -37,6 +37,23 @@ def rotation_matrices(quaternion: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
+def quaternion_product(left: Array, right: Array) -> Array:
+    """Products (F, 4) of quaternions (F, 4), w first: the right one turns first."""
+    w, x, y, z = left.T
+    columns = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    return np.asarray(np.einsum("ijf,fj->fi", columns, right))
+
+
+def quaternion_power(quaternion: Array, power: float) -> Array:
+    """Unit quaternions (F, 4), w first, that turn by `power` times as much about the same axes."""
+    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    unit = np.where(unit[:, :1] < 0, -unit, unit)
+    sine = np.linalg.norm(unit[:, 1:], axis=1, keepdims=True)
+    half = np.arctan2(sine, unit[:, :1])
+    axis = np.divide(unit[:, 1:], sine, out=np.zeros_like(unit[:, 1:]), where=sine > 1e-12)
+    return np.concatenate([np.cos(power * half), np.sin(power * half) * axis], axis=1)
+
+
 def euler_angles(matrices: Array, order: str, near: Array) -> Array:
     """Euler angles (F, 3) about x, y and z [rad] of rotation matrices (F, 3, 3), the nearest to given ones.
 

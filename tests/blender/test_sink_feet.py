@@ -41,9 +41,11 @@ def test_one_button_lets_the_feet_down_and_leaves_the_prints(baked):
 
 
 def test_feet_that_cannot_be_let_down_leave_the_settings_as_they_were(baked):
-    baked.softground.characters[0].armature.animation_data.use_nla = False
+    track = baked.softground.characters[0].armature.animation_data.nla_tracks.new()
+    track.strips.new("mine", 1, baked.softground.characters[0].armature.animation_data.action)
+    track.is_solo = True
     baked.softground.output = "PRINTS"
-    with pytest.raises(RuntimeError, match="NLA"):
+    with pytest.raises(RuntimeError, match="solo"):
         bpy.ops.softground.sink_feet()
     assert not baked.softground.grounding.use
     assert baked.softground.output == "PRINTS"
