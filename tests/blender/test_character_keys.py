@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import nla_layer, response_job
+from softground_addon.blender.character_keys import controls_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.heightfield import FlatTerrain
-from tests.blender import fingerprints, responders, rigs, shots
+from tests.blender import auto_rig_pro, fingerprints, responders, rigs, shots
 
 
 def set_up(armature):
@@ -42,10 +43,13 @@ MAKE = {
     "animated object": lambda scene, path: responders.moved_by_its_object(shots.walker(scene)),
     "ik": lambda scene, path: puppet(scene),
     "rigify": rigify,
+    "auto-rig pro": lambda scene, path: auto_rig_pro.walking(),
 }
 
 
-QUICK_AND_SLOW = [rig if rig in ("walker", "ik") else pytest.param(rig, marks=pytest.mark.slow) for rig in MAKE]
+QUICK_AND_SLOW = [
+    rig if rig in ("walker", "ik", "auto-rig pro") else pytest.param(rig, marks=pytest.mark.slow) for rig in MAKE
+]
 
 
 @pytest.mark.parametrize("rig", QUICK_AND_SLOW)
@@ -66,6 +70,21 @@ def test_soles_stand_on_the_ground_that_they_pressed(scene, tmp_path, rig):
         np.abs(np.diff(angles, axis=0)).max() * rate for angles in (responders.knee_angles(scene), before)
     )
     assert jump < max(15.0, 1.2 * source_jump)
+
+
+def test_auto_rig_pro_is_keyed_on_what_its_animators_key_in_ik_and_in_fk(scene):
+    armature = auto_rig_pro.walking()
+    set_up(armature)
+    mapping = responders.mapping_of(scene.softground.characters[0])
+    assert [source.bone for source in mapping.soles][:2] == ["foot.l", "foot.r"]
+    by_ik = controls_of(scene, armature, mapping)
+    assert set(by_ik.bones) >= {"c_root_master.x", "c_foot_ik.l", "c_foot_ik.r"}
+    assert not [bone for bone in by_ik.bones if "fk" in bone]
+    auto_rig_pro.switch_to_fk(armature)
+    by_fk = controls_of(scene, armature, mapping)
+    legs = {f"c_{part}_fk.{side}" for part in ("thigh", "leg", "foot") for side in "lr"}
+    assert set(by_fk.bones) >= {"c_root_master.x", *legs}
+    assert not [bone for bone in by_fk.bones if "_ik" in bone]
 
 
 @pytest.mark.parametrize("rig", ["walker", "ik", "rigify"])
