@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,14 @@ _SLENDERNESS = 7.0  # length of a bone over its stick's radius
 _THICKEST = 0.034  # radius over the height of the rig
 
 
-def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collection) -> bpy.types.Object | None:
-    """A mesh of sticks that follows the rig, each stick with the weight of its own bone only; None without bones."""
-    lines = _lines(armature.data)
+def add_stick_figure(
+    armature: bpy.types.Object, collection: bpy.types.Collection, only: Collection[str] | None = None
+) -> bpy.types.Object | None:
+    """A mesh of sticks that follows the rig, each stick with the weight of its own bone only; None without bones.
+
+    `only` names the bones to draw, for rigs with helper bones.
+    """
+    lines = _lines(armature.data, only)
     if not lines:
         return None
     height = np.ptp(np.concatenate([line for _, *line in lines]), axis=0).max()
@@ -49,13 +56,15 @@ def add_stick_figure(armature: bpy.types.Object, collection: bpy.types.Collectio
     return figure
 
 
-def _lines(rest: bpy.types.Armature) -> list[tuple[str, Array, Array]]:
+def _lines(rest: bpy.types.Armature, only: Collection[str] | None) -> list[tuple[str, Array, Array]]:
     """What to draw, each with the bone that carries it: the bones, and what joins them where they do not touch."""
     lines = []
     for bone in rest.bones:
+        if only is not None and bone.name not in only:
+            continue
         head, tail = np.array(bone.head_local), np.array(bone.tail_local)
         lines.append((bone.name, head, tail))
-        if bone.parent:
+        if bone.parent and (only is None or bone.parent.name in only):
             ends = [np.array(bone.parent.head_local), np.array(bone.parent.tail_local)]
             lines.append((bone.parent.name, min(ends, key=lambda end: float(np.linalg.norm(end - head))), head))
     return lines

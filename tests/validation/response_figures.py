@@ -1,4 +1,4 @@
-"""The figures of docs/response.md: `python -m tests.validation.response_figures`.
+"""The figures of docs/response.md: `python -m tests.validation.response_figures [rough] [deep] [rigs]`.
 
 Needs matplotlib for the curves, and Blender's Cycles for the strips.
 """
@@ -12,8 +12,9 @@ import bpy
 import numpy as np
 
 import softground_addon
+from sample_scenes.stick_figure import add_stick_figure
 from softground_addon.core.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains, lean
-from tests.blender import shots
+from tests.blender import responders, rigs, shots
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 WIDTH, HEIGHT = 300, 420
@@ -57,10 +58,6 @@ def tilt_curves() -> None:
     figure.savefig(IMAGES / "response_tilt.png", dpi=110)
 
 
-def hill(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return 0.55 * np.exp(-(((y + 2.6) / 1.4) ** 2)) + 0 * x
-
-
 def rough(y: np.ndarray, x: np.ndarray) -> np.ndarray:
     return 0.035 * np.sin(4.1 * x + 1) * np.sin(3.3 * y) + 0.02 * np.sin(9 * x + 2 * y) * np.sin(8 * y + 2)
 
@@ -69,33 +66,84 @@ def strip(name: str, shape, frames: list[int], **settings: float) -> None:
     """Frames of a walk as it was made (above) and as it responds (below)."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    armature = shots.walker(scene, frames=96)
-    x, y = np.linspace(-1.4, 1.4, 141), np.linspace(-6.2, 1.2, 371)
-    ground = _field(scene, x, y, shape)
+    shots.walker(scene, frames=96)
+    rows = _baked_and_shown(shape, frames, **settings)
+    _save(name, np.concatenate([np.concatenate(row, axis=1) for row in rows[::-1]], axis=0))
+
+
+def of_rigs(name: str) -> None:
+    """A frame each of a Rigify human, a rig under Mixamo's names and a captured motion, as made and as they respond."""
+    columns = []
+    for make, frame in ((_rigify, 30), (_mixamo, 30), (_captured, 252)):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        make()
+        (made,), (responding,) = _baked_and_shown(rough, [frame], modulus=6e5)
+        columns.append(np.concatenate([responding, made], axis=0))
+    _save(name, np.concatenate(columns, axis=1))
+
+
+def _rigify() -> None:
+    path = Path(bpy.app.tempdir) / "human.blend"
+    rigs.make_rigify_file(path)
+    armature = rigs.open_rigify(path, "Generated")
+    bpy.data.objects.remove(bpy.data.objects["Metarig"])
+    responders.key_steps(armature, "torso", ["foot_ik.L", "foot_ik.R"])
+    limbs = ("spine", "shoulder", "upper_arm", "forearm", "hand", "thigh", "shin", "foot", "toe")
+    shown = [b.name for b in armature.data.bones if b.name.startswith("DEF-") and b.name[4:].split(".")[0] in limbs]
+    add_stick_figure(armature, bpy.context.scene.collection, shown)
+    bpy.context.view_layer.objects.active = armature
+
+
+def _mixamo() -> None:
+    responders.as_mixamo(shots.walker(bpy.context.scene))
+
+
+def _captured() -> None:
+    add_stick_figure(shots.import_motion("zombie"), bpy.context.scene.collection)
+
+
+def _baked_and_shown(shape, frames: list[int], modulus: float = 2e5, **settings: float) -> list[list[np.ndarray]]:
+    """The active rig on soft ground of a shape along its way: pictures of frames as made, and as it responds."""
+    scene, armature = bpy.context.scene, bpy.context.view_layer.objects.active
     bpy.ops.softground.add_character()
+    motion = responders.source_motion(scene)
+    hips = motion.joints["hips"]
+    ahead = (hips[-1] - hips[0])[:2] / np.linalg.norm((hips[-1] - hips[0])[:2])
+    level = float(np.percentile([sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles], 10.0))
+    middle = hips[np.searchsorted(motion.frames, np.mean(frames))]
+    x, y = np.linspace(-2.6, 2.6, 261), np.linspace(-4.2, 4.2, 421)
+    ground = _field(scene, x + middle[0], y + middle[1], lambda y, x: level + shape(y, x))
     options = scene.softground
     options.ground = ground
+    options.frame_end = min(options.frame_end, max(frames) + 24)
     options.tilt.use = options.grounding.use = True
-    options.material.youngs_modulus = 2e5
+    options.material.youngs_modulus = modulus
     for setting, value in settings.items():
         setattr(options.grounding, setting, value)
     bpy.ops.softground.bake()
     camera = _stage(scene)
+    mapping = responders.mapping_of(options.characters[0])
     rows = []
     for strength in (0.0, 1.0):
         options.characters[0].response_strength = strength
         row = []
         for frame in frames:
             scene.frame_set(frame)
-            hips = armature.matrix_world @ armature.pose.bones["hips"].head
-            look = hips.__class__((0.0, hips.y, float(shape(np.array(hips.y), np.array(0.0))) + 0.75))
-            camera.location = look + hips.__class__((4.2, -0.6, 0.55))
+            hips_bone = armature.pose.bones[mapping.joints["hips"][0]]
+            place = armature.matrix_world @ hips_bone.head
+            height = level + float(shape(np.array(place.y), np.array(place.x)))
+            look = place.__class__((place.x, place.y, height + 0.75))
+            aside = place.__class__((-ahead[1], ahead[0], 0.0)) * 4.2 + place.__class__((*ahead, 0.0)) * 0.6
+            camera.location = look + aside + place.__class__((0.0, 0.0, 0.55))
             camera.rotation_euler = (look - camera.location).to_track_quat("-Z", "Y").to_euler()
             row.append(_rendered(scene))
-        rows.append(np.concatenate(row, axis=1))
-    picture = np.concatenate(rows[::-1], axis=0)  # Blender's rows go up
+        rows.append(row)
+    return rows
+
+
+def _save(name: str, picture: np.ndarray) -> None:
     image = bpy.data.images.new(name, picture.shape[1], picture.shape[0])
-    image.pixels.foreach_set(picture.astype(np.float32).ravel())
+    image.pixels.foreach_set(picture.astype(np.float32).ravel())  # Blender's rows go up
     image.filepath_raw, image.file_format = str(IMAGES / f"{name}.jpg"), "JPEG"
     image.save()
 
@@ -151,9 +199,13 @@ def main() -> int:
     tilt_curves()
     softground_addon.register()
     try:
-        strip("response_hill", hill, [24, 36, 58, 70])
-        strip("response_rough", rough, [20, 26, 32, 38])
-        strip("response_deep", lambda y, x: 0 * x * y, [20, 26, 32, 38], knee_lift=1.0, arms=1.0, crouch=1.0)
+        wanted = sys.argv[1:] or ["rough", "deep", "rigs"]
+        if "rough" in wanted:
+            strip("response_rough", rough, [20, 26, 32, 38])
+        if "deep" in wanted:
+            strip("response_deep", lambda y, x: 0 * x * y, [20, 26, 32, 38], knee_lift=1.0, arms=1.0, crouch=1.0)
+        if "rigs" in wanted:
+            of_rigs("response_rigs")
     finally:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         softground_addon.unregister()
