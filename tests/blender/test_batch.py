@@ -189,7 +189,9 @@ def test_the_table_shows_hostile_names_on_one_line():
     assert r"first\nsecond" in lines[1]
 
 
+@pytest.mark.slow
 @pytest.mark.marathon
+@pytest.mark.timeout(1800)
 def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
     """Kill -9 of the batch at random moments; every result is that of one go, and nothing done is done again."""
     manifest = night(50)

@@ -18,9 +18,12 @@ from tests.blender import shots
 QUICK = 40
 
 
-def counts(slow):
-    """Few inputs in the quick tests, many in the slow ones; the four kinds make 20,000."""
-    return pytest.mark.parametrize("count", [QUICK, pytest.param(slow, marks=[pytest.mark.marathon])])
+def counts(whole):
+    """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon; the four kinds make 20,000."""
+    return pytest.mark.parametrize(
+        "count",
+        [QUICK, pytest.param(whole // 10, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
+    )
 
 
 def each(strategy, count, check):

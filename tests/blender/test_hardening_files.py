@@ -53,7 +53,7 @@ def kill_at(moment, command):
 
 @posix
 @pytest.mark.parametrize(
-    "kills", [pytest.param(5, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
+    "kills", [pytest.param(20, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
 )
 def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, kills):
     """Kill -9 at random moments, most of them around the saving."""

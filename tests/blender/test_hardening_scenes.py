@@ -238,10 +238,23 @@ def random_scene(chance):
     bpy.context.view_layer.objects.active = armature
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(500, marks=[pytest.mark.marathon, pytest.mark.timeout(3600)])])
-def test_a_random_scene_is_baked_or_refused_and_the_ground_is_finite(addon, capfd, count):
+def fifty(first, *marks):
+    return pytest.param(range(first, first + 50), marks=[*marks, pytest.mark.timeout(3600)])
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        range(8),
+        fifty(0, pytest.mark.slow, pytest.mark.marathon),
+        *(fifty(first, pytest.mark.marathon) for first in range(50, 500, 50)),
+    ],
+    ids=lambda numbers: f"{numbers.start}-{numbers.stop}",
+)
+def test_a_random_scene_is_baked_or_refused_and_the_ground_is_finite(addon, capfd, monkeypatch, numbers):
+    monkeypatch.setattr("softground_addon.core.cell_limits.machine_memory", lambda: 1e9)  # giants are refused
     codes = {0: 0, 2: 0}
-    for number in range(count):
+    for number in numbers:
         chance = random.Random(1000 + number)
         bpy.ops.wm.read_factory_settings(use_empty=True)
         random_scene(chance)
