@@ -4,7 +4,7 @@ import pytest
 
 from tests.gui import conftest
 
-pytestmark = [pytest.mark.gui, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
 
 
 def test_blender_s_own_tool_finds_the_package_valid(suite):

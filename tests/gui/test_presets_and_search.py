@@ -4,7 +4,7 @@ import shlex
 
 import pytest
 
-pytestmark = [pytest.mark.gui, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
 
 
 @pytest.fixture
