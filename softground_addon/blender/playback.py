@@ -1,33 +1,26 @@
-"""Playing a bake on the ground: its record as vertex attributes, and the modifier that adds them up over time."""
+"""Playing a bake on the ground: its record as a table, and the modifier that looks it up over time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Literal, cast
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.histories import Histories, Visits
-from ..core.ramps import Ramps
+from ..core.histories import Histories
+from ..core.timelines import Timelines, timelines
 from . import playback_nodes as nodes
-from .playback_nodes import numbered
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MODIFIER = "SoftGround Playback"
 
-PER_LAYER = 3
-"""Ramps in one layer: a vector attribute holds one number of each."""
+TABLE = "SoftGround Timelines"
 
-NO_VISIT = 1e9
-"""Frame of visits that never come."""
-
-_NAMES = (nodes.MOVED, nodes.SPAN, nodes.VISITED, nodes.PRESSURE)
-_NUMBERED = (*nodes.HEIGHTS, *nodes.COMPRESSIONS, nodes.VISIT)
-_VALUE = {"FLOAT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector"}
+_ATTRIBUTES = (nodes.MOVED, nodes.ACTIVE, nodes.SPAN, nodes.FIRST_ROW, nodes.LAST_ROW, nodes.PRESSURE)
+_VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector"}
 
 
 def install(
@@ -50,14 +43,10 @@ def install(
         Scene frames per second [Hz].
     """
     remove(ground)
-    mesh = cast("bpy.types.Mesh", ground.data)
-    _write_spans(mesh, index, histories)
+    table = timelines(histories)
+    _write_spans(cast("bpy.types.Mesh", ground.data), index, table)
     group = nodes.build(
-        height_layers=_write_ramps(mesh, index, histories.heights, nodes.HEIGHTS),
-        compression_layers=_write_ramps(mesh, index, histories.compression, nodes.COMPRESSIONS),
-        visits=_write_visits(mesh, index, histories.visits),
-        up=up.tolist(),
-        frame_rate=frame_rate,
+        table=_table_object(table), bisections=max(table.longest.bit_length(), 1), up=up.tolist(), frame_rate=frame_rate
     )
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
@@ -82,16 +71,25 @@ def remove(ground: bpy.types.Object) -> None:
         group = cast("Any", modifier).node_group
         ground.modifiers.remove(modifier)
         if not group.users:
-            bpy.data.node_groups.remove(group)
+            _remove_group(group)
     mesh = cast("bpy.types.Mesh", ground.data)
     for name in [attribute.name for attribute in mesh.attributes]:
         if is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
 
 
+def _remove_group(group: bpy.types.NodeTree) -> None:
+    table = nodes.table_of(group)
+    bpy.data.node_groups.remove(group)
+    if table is not None and not table.users:
+        mesh = cast("bpy.types.Mesh", table.data)
+        bpy.data.objects.remove(table)
+        bpy.data.meshes.remove(mesh)
+
+
 def is_playback_attribute(name: str) -> bool:
     """Whether an attribute of this name belongs to the playback."""
-    return name in _NAMES or name.rpartition("_")[0] in _NUMBERED
+    return name in _ATTRIBUTES
 
 
 def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
@@ -104,58 +102,38 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     return np.flatnonzero(moves)
 
 
-def _write_spans(mesh: bpy.types.Mesh, index: Indices, histories: Histories) -> None:
-    """Store which vertices the bake moves, from when to when, and how far in all."""
-    spans = np.zeros((len(mesh.vertices), 3))
-    spans[:, 0], spans[:, 1] = np.inf, -np.inf
-    for part in (histories.heights, histories.compression, histories.visits):
-        np.minimum.at(spans[:, 0], index[part.point], part.start)
-        np.maximum.at(spans[:, 1], index[part.point], part.end)
-    moved = np.isfinite(spans[:, 0])
-    spans[~moved] = 0.0
-    np.add.at(spans[:, 2], index[histories.heights.point], histories.heights.change)
+def _write_spans(mesh: bpy.types.Mesh, index: Indices, table: Timelines) -> None:
+    """Store which vertices the bake moves, from when to when, how far in all, and where their rows are."""
+    vertex = index[table.point]
+    last = table.first[1:] - 1
+    moved = np.zeros(len(mesh.vertices), dtype=bool)
+    moved[vertex] = True
+    spans = np.zeros((len(moved), 3), dtype=np.float32)
+    spans[vertex] = np.stack([table.frame[table.first[:-1]], table.frame[last], table.height[last]], axis=-1)
     _store(mesh, nodes.MOVED, "BOOLEAN", moved)
-    _store(mesh, nodes.SPAN, "FLOAT_VECTOR", spans.astype(np.float32))
+    _store(mesh, nodes.ACTIVE, "BOOLEAN", np.zeros_like(moved))  # what is there is overwritten faster than made
+    _store(mesh, nodes.SPAN, "FLOAT_VECTOR", spans)
+    _store(mesh, nodes.PRESSURE, "FLOAT", np.zeros(len(moved), dtype=np.float32))
+    for name, rows in ((nodes.FIRST_ROW, table.first[:-1]), (nodes.LAST_ROW, last)):
+        numbers = np.zeros(len(moved), dtype=np.int32)
+        numbers[vertex] = rows
+        _store(mesh, name, "INT", numbers)
 
 
-def _write_ramps(mesh: bpy.types.Mesh, index: Indices, ramps: Ramps, names: Sequence[str]) -> int:
-    """Store ramps in layers; returns how many layers there are."""
-    layer, place = np.divmod(ramps.rank(), PER_LAYER)
-    count = int(layer.max(initial=-1)) + 1
-    for number in range(count):
-        chosen = layer == number
-        vertex = index[ramps.point[chosen]]
-        for name, values in zip(names, (ramps.start, ramps.end, ramps.change), strict=True):
-            vectors = np.zeros((len(mesh.vertices), PER_LAYER), dtype=np.float32)
-            vectors[vertex, place[chosen]] = values[chosen]
-            _store(mesh, numbered(name, number), "FLOAT_VECTOR", vectors)
-    return count
-
-
-def _write_visits(mesh: bpy.types.Mesh, index: Indices, visits: Visits) -> int:
-    """Store the contacts; returns the largest number of one vertex."""
-    rank = visits.rank()
-    count = int(rank.max(initial=-1)) + 1
-    if count:
-        visited = np.zeros(len(mesh.vertices), dtype=bool)
-        visited[index[visits.point]] = True
-        _store(mesh, nodes.VISITED, "BOOLEAN", visited)
-        _store(mesh, nodes.PRESSURE, "FLOAT", np.zeros(len(mesh.vertices), dtype=np.float32))
-    latest = np.full(len(mesh.vertices), -np.inf)
-    for number in range(count):
-        chosen = rank == number
-        vertex = index[visits.point[chosen]]
-        # Soles may leave in another order than they came.
-        latest[vertex] = np.maximum(latest[vertex], visits.end[chosen])
-        vectors = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-        vectors[:, :2] = NO_VISIT
-        vectors[vertex] = np.stack([visits.start[chosen], latest[vertex], visits.pressure[chosen]], axis=-1)
-        _store(mesh, numbered(nodes.VISIT, number), "FLOAT_VECTOR", vectors)
-    return count
+def _table_object(table: Timelines) -> bpy.types.Object:
+    """The table as the vertices of a mesh that is in no scene."""
+    mesh = bpy.data.meshes.new(TABLE)
+    mesh.vertices.add(len(table.frame))
+    rows = np.stack([table.frame, table.height, table.compression], axis=-1).astype(np.float32)
+    contacts = np.stack([table.visit_start, table.visit_end, table.pressure], axis=-1).astype(np.float32)
+    position: Any = mesh.attributes["position"]
+    position.data.foreach_set("vector", rows.ravel())
+    _store(mesh, nodes.CONTACT, "FLOAT_VECTOR", contacts)
+    return bpy.data.objects.new(TABLE, mesh)
 
 
 def _store(
-    mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "BOOLEAN", "FLOAT_VECTOR"], values: NDArray[Any]
+    mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "INT", "BOOLEAN", "FLOAT_VECTOR"], values: NDArray[Any]
 ) -> None:
     """A new point attribute; the one that the user has active stays so."""
     active = mesh.attributes.active_index

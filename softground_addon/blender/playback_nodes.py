@@ -1,8 +1,9 @@
 """The node group that plays a bake: attributes and the time in, the ground at that time out.
 
 It is native Blender data and needs nothing of this add-on. Each vertex stands still most of the time: before its first
-movement where it was, after its last where that left it. Only vertices in between have their ramps added up, three to
-a layer. Positions start from the undisturbed ones.
+movement where it was, after its last where that left it. Only for vertices in between is the table of timelines looked
+up (see `core.timelines`), whose rows are the vertices of a mesh of its own. The group is the same for every bake but
+for the number of bisections. Positions start from the undisturbed ones.
 """
 
 from __future__ import annotations
@@ -12,23 +13,23 @@ from typing import Any
 
 import bpy
 
+from ..core.timelines import NO_VISIT
+
 GROUP = "SoftGround Playback"
 
 REST = "softground_rest"
 MOVED = "softground_moved"
 """Whether the bake moves or touches the vertex at all."""
 SPAN = "softground_span"
-"""Frame before which nothing happens to the vertex, frame after which nothing does, and change of height in all [m]."""
-HEIGHTS = ("softground_height_start", "softground_height_end", "softground_height_change")
-COMPRESSIONS = ("softground_press_start", "softground_press_end", "softground_press_change")
-"""Vectors that hold three ramps each: first frame, last frame, change [m]; by layer."""
-VISIT = "softground_visit"
-"""First and last frame of a contact and its pressure [Pa], by number of the visit."""
-VISITED = "softground_visited"
+"""Frame from which on something happens to the vertex, frame from which on nothing does, and its change of height in
+all [m]."""
+FIRST_ROW, LAST_ROW = "softground_first_row", "softground_last_row"
+"""The vertex's rows in the table."""
 ACTIVE = "softground_active"
 """Whether something happens to the vertex at the frame that is shown; made by the nodes."""
-PENDING = "softground_pending"
-"""Whether something is still to happen to the vertex after the frame that is shown; made by the nodes."""
+CONTACT = "softground_contact"
+"""Of a row of the table: first and last frame of the latest contact that has begun, and its pressure [Pa]. The row's
+position is its frame, the change of height and the compression [m]."""
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
 LOADING = 0.2
@@ -38,22 +39,15 @@ COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
 
 
-def numbered(name: str, layer: int) -> str:
-    """Name of an attribute that exists once for each layer or visit."""
-    return f"{name}_{layer}"
-
-
-def build(
-    *, height_layers: int, compression_layers: int, visits: int, up: Sequence[float], frame_rate: float
-) -> bpy.types.NodeTree:
+def build(*, table: bpy.types.Object, bisections: int, up: Sequence[float], frame_rate: float) -> bpy.types.NodeTree:
     """A new node group.
 
     Parameters
     ----------
-    height_layers, compression_layers : int
-        Number of layers of three ramps.
-    visits : int
-        Largest number of contacts of one vertex.
+    table : bpy.types.Object
+        Its vertices are the rows of the timelines.
+    bisections : int
+        2 to this power is more than the largest number of rows of one vertex.
     up : (3,) floats
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
@@ -62,68 +56,97 @@ def build(
     graph = _Graph(GROUP)
     geometry, frame = graph.inputs(up)
     first, last, total = graph.components(graph.attribute(SPAN))
-    under_way = graph.both(graph.compare("LESS_THAN", first, frame), graph.compare("LESS_THAN", frame, last))
-    geometry = graph.store(geometry, ACTIVE, under_way, MOVED, kind="BOOLEAN")
-    graph.next_row()
     over = graph.compare("GREATER_EQUAL", frame, last)
+    under_way = graph.both(graph.compare("LESS_EQUAL", first, frame), graph.compare("LESS_THAN", frame, last))
+    geometry = graph.store(geometry, ACTIVE, under_way, MOVED, kind="BOOLEAN")
     geometry = graph.raise_from_rest(geometry, MOVED, graph.math("MULTIPLY", total, over))
-    if height_layers:
-        geometry = graph.raise_from_rest(geometry, ACTIVE, _sum(graph, frame, HEIGHTS, height_layers))
-    shaded = _compression_and_rim(graph, geometry, frame, last, compression_layers)
-    if visits:
-        shaded = _age_and_pressure(graph, shaded, frame, visits, frame_rate)
+    rows = _Table(graph, table)
+    row = _search(graph, rows, frame, bisections)
+    _, height, compression = graph.components(rows.between(row, frame))
+    graph.next_row()
+    geometry = graph.raise_from_rest(geometry, ACTIVE, height)
+
+    graph.next_row()
+    shaded = geometry
+    rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
+    for name, value in ((COMPRESSION, compression), (RIM, rim)):
+        at_the_end = graph.attribute(name, "FLOAT")
+        shaded = graph.store(shaded, name, graph.math("MULTIPLY", at_the_end, over), MOVED)
+        shaded = graph.store(shaded, name, value, ACTIVE)
+    shaded = _age_and_pressure(graph, shaded, rows, row, frame, over, frame_rate)
     graph.next_row()
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
 
 
-def _sum(graph: _Graph, frame: Any, names: Sequence[str], layers: int) -> Any:
-    """Sum of the ramps of all layers."""
-    start, end, change = names
-    total: Any = None
-    for layer in range(layers):
+def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
+    """The table that a group looks up."""
+    for node in tree.nodes:
+        if node.bl_idname == "GeometryNodeObjectInfo":
+            found: bpy.types.Object | None = node.inputs["Object"].default_value
+            return found
+    return None
+
+
+class _Table:
+    """Look-ups in the timelines."""
+
+    def __init__(self, graph: _Graph, table: bpy.types.Object) -> None:
         graph.next_row()
-        share = graph.map_range(
-            "FLOAT_VECTOR", frame, graph.attribute(numbered(start, layer)), graph.attribute(numbered(end, layer))
-        )
-        value = graph.vector("DOT_PRODUCT", share, graph.attribute(numbered(change, layer)))
-        total = value if total is None else graph.math("ADD", total, value)
-    return total
+        info = graph.node("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value = table
+        self._graph, self._geometry = graph, info.outputs["Geometry"]
+        self._position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+        self._contact = graph.attribute(CONTACT)
+
+    def at(self, row: Any) -> Any:
+        """Frame, height and compression of a row."""
+        return self._graph.sample(self._geometry, self._position, row)
+
+    def contact(self, row: Any) -> tuple[Any, Any, Any]:
+        """First and last frame of the latest contact at a row, and its pressure."""
+        return self._graph.components(self._graph.sample(self._geometry, self._contact, row))
+
+    def between(self, row: Any, frame: Any) -> Any:
+        """Frame, height and compression at a time between a row and the next."""
+        graph = self._graph
+        graph.next_row()
+        before, after = self.at(row), self.at(graph.math("ADD", row, 1.0))
+        share = graph.map_range(frame, graph.components(before)[0], graph.components(after)[0])
+        step = graph.vector("SUBTRACT", after, before)
+        return graph.vector("ADD", before, graph.vector("SCALE", step, scale=share))
 
 
-def _compression_and_rim(graph: _Graph, geometry: Any, frame: Any, last: Any, layers: int) -> Any:
-    """Both as the finished ground has them where a vertex has come to rest, nothing before its first movement."""
+def _search(graph: _Graph, rows: _Table, frame: Any, bisections: int) -> Any:
+    """The last row of the vertex that is not after the frame."""
     graph.next_row()
-    geometry = graph.store(geometry, PENDING, graph.compare("LESS_THAN", frame, last), MOVED, kind="BOOLEAN")
-    for name in (COMPRESSION, RIM):
-        geometry = graph.store(geometry, name, 0.0, PENDING)
-    value = _sum(graph, frame, COMPRESSIONS, layers) if layers else 0.0
-    geometry = graph.store(geometry, COMPRESSION, value, ACTIVE)
-    graph.next_row()
-    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
-    moved = graph.vector("SUBTRACT", position, graph.attribute(REST))
-    per_metre = graph.vector("DOT_PRODUCT", graph.up, graph.up)
-    height = graph.math("DIVIDE", graph.vector("DOT_PRODUCT", moved, graph.up), per_metre)
-    rim = graph.math("MAXIMUM", graph.math("ADD", height, graph.attribute(COMPRESSION, "FLOAT")), 0.0)
-    return graph.store(geometry, RIM, rim, ACTIVE)
+    start, end = graph.repeat(bisections, Row="INT", Step="FLOAT")
+    graph.link(graph.attribute(FIRST_ROW, "INT"), start.inputs["Row"])
+    graph.link(2.0 ** (bisections - 1), start.inputs["Step"])
+    ahead = graph.math("ADD", start.outputs["Row"], start.outputs["Step"])
+    inside = graph.compare("LESS_EQUAL", ahead, graph.attribute(LAST_ROW, "INT"))
+    passed = graph.compare("LESS_EQUAL", graph.components(rows.at(ahead))[0], frame)
+    row = graph.choose("INT", graph.both(inside, passed), start.outputs["Row"], ahead)
+    graph.link(row, end.inputs["Row"])
+    graph.link(graph.math("MULTIPLY", start.outputs["Step"], 0.5), end.inputs["Step"])
+    return end.outputs["Row"]
 
 
-def _age_and_pressure(graph: _Graph, geometry: Any, frame: Any, visits: int, frame_rate: float) -> Any:
+def _age_and_pressure(
+    graph: _Graph, geometry: Any, rows: _Table, row: Any, frame: Any, over: Any, frame_rate: float
+) -> Any:
     """Time since the latest contact that has begun, and the pressure while it lasts."""
+    for selection, latest in ((MOVED, graph.attribute(LAST_ROW, "INT")), (ACTIVE, row)):
+        graph.next_row()
+        start, end, pressure = rows.contact(latest)
+        since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, end), 0.0)
+        begun = graph.compare("LESS_THAN", start, NO_VISIT)
+        if selection == MOVED:
+            begun = graph.both(begun, over)
+        age = graph.choose("FLOAT", begun, -1.0, graph.math("DIVIDE", since, frame_rate))
+        geometry = graph.store(geometry, AGE, age, selection)
     graph.next_row()
-    latest = graph.attribute(numbered(VISIT, 0))
-    begun = graph.compare("LESS_EQUAL", graph.components(latest)[0], frame)
-    for number in range(1, visits):
-        visit = graph.attribute(numbered(VISIT, number))
-        later = graph.compare("LESS_EQUAL", graph.components(visit)[0], frame)
-        latest = graph.choose("VECTOR", later, latest, visit)
-    start, end, pressure = graph.components(latest)
-    graph.next_row()
-    since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, end), 0.0)
-    age = graph.choose("FLOAT", begun, -1.0, graph.math("DIVIDE", since, frame_rate))
-    geometry = graph.store(geometry, AGE, age, VISITED)
-    graph.next_row()
-    passed = graph.map_range("FLOAT", frame, start, end)
+    passed = graph.map_range(frame, start, end)
     sides = graph.math("MINIMUM", passed, graph.math("SUBTRACT", 1.0, passed))
     loaded = graph.math("MULTIPLY", sides, 1.0 / LOADING, clamp=True)
     return graph.store(geometry, PRESSURE, graph.math("MULTIPLY", loaded, pressure), ACTIVE)
@@ -233,17 +256,32 @@ class _Graph:
         self.link(vector, node.inputs[0])
         return node.outputs["X"], node.outputs["Y"], node.outputs["Z"]
 
-    def map_range(self, kind: str, value: Any, low: Any, high: Any) -> Any:
+    def map_range(self, value: Any, low: Any, high: Any) -> Any:
         """(value - low) / (high - low), limited to 0 and 1; 0 where low = high."""
         node = self.node("ShaderNodeMapRange")
-        node.data_type, node.clamp, node.interpolation_type = kind, True, "LINEAR"
-        names = ("Value", "From Min", "From Max", "Result")
-        if kind == "FLOAT_VECTOR":
-            names = ("Vector", "From_Min_FLOAT3", "From_Max_FLOAT3", "Vector")
-        sockets = {socket.identifier: socket for socket in node.inputs}
-        for name, source in zip(names, (value, low, high), strict=False):
-            self.link(source, sockets[name])
-        return next(socket for socket in node.outputs if socket.identifier == names[3])
+        node.clamp, node.interpolation_type = True, "LINEAR"
+        for name, source in (("Value", value), ("From Min", low), ("From Max", high)):
+            self.link(source, node.inputs[name])
+        return node.outputs["Result"]
+
+    def sample(self, geometry: Any, value: Any, index: Any) -> Any:
+        """A vector of the geometry's point of that number."""
+        node = self.node("GeometryNodeSampleIndex")
+        node.data_type, node.domain, node.clamp = "FLOAT_VECTOR", "POINT", True
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(value, node.inputs["Value"])
+        self.link(index, node.inputs["Index"])
+        return node.outputs["Value"]
+
+    def repeat(self, iterations: int, **items: str) -> tuple[Any, Any]:
+        """Begin and end of a part that is worked through so many times; its state by name and type."""
+        start, end = self.node("GeometryNodeRepeatInput"), self.node("GeometryNodeRepeatOutput")
+        start.pair_with_output(end)
+        end.repeat_items.clear()
+        for name, kind in items.items():
+            end.repeat_items.new(kind, name)
+        start.inputs["Iterations"].default_value = iterations
+        return start, end
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
         node = self.node("GeometryNodeSwitch")

@@ -47,10 +47,10 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     shape_keys: BoolProperty(
         name="Shape Keys",
         description=(
-            "Keep the raw and the smoothed heights as shape keys, to sculpt or blend. "
-            "Without them a dense ground plays several times faster"
+            "Keep the raw and the smoothed heights as shape keys, to blend or sculpt. "
+            "Blender evaluates them on the whole mesh at each frame, which a dense ground feels"
         ),
-        default=True,
+        default=False,
     )
     detail: EnumProperty(
         name="Detail",
