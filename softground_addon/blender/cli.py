@@ -19,7 +19,7 @@ import bpy
 from ..core import files, presets, receipts, report
 from ..core.errors import BakeError, InputError, SoftGroundError
 from ..core.manifest import BatchShot, frame_range
-from . import bake_job, batch, jobs, settings
+from . import bake_job, batch, export_formats, jobs, settings
 from .character_setup import set_up_automatically
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
@@ -55,8 +55,11 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         options = parser.parse_args(list(arguments))
         if options.command == "batch":
             return _batch_code(batch.bake_batch(options))
-        with _ending_with(options.parent):
-            _bake(options)
+        if options.command == "export":
+            _export(options)
+        else:
+            with _ending_with(options.parent):
+                _bake(options)
     except SystemExit as leaving:  # argparse has printed its message
         return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
     except BakeError as error:
@@ -121,8 +124,27 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
     )
     bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
     bake.set_defaults(blend=None)
+    _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
     batch.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
     return parser
+
+
+def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
+    if standalone:
+        export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
+    export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
+    export.add_argument(
+        "--format", required=True, type=str.upper, choices=tuple(export_formats.FORMATS), help="kind of file"
+    )
+    export.add_argument(
+        "--output", type=Path, metavar="FILE",
+        help="the file; of images their folder and what their names begin with; beside the shot if left out",
+    )  # fmt: skip
+    export.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame; else those baked")
+    export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
+    export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
+    export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
+    export.set_defaults(blend=None)
 
 
 def _frame_range(text: str) -> tuple[int, int]:
@@ -164,6 +186,27 @@ def _bake(options: argparse.Namespace) -> None:
         print(json.dumps(said), flush=True)
     if options.progress in ("plain", "openjd"):
         print(report.summary(result.report), flush=True)
+
+
+def _export(options: argparse.Namespace) -> None:
+    if options.blend is not None:
+        _open(options.blend)
+    scene = _scene(options.scene)
+    path = options.output.absolute() if options.output else export_formats.default_path(scene, options.format)
+    start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
+    if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:
+        raise InputError(f"--resolution takes a number from 1 to {export_formats.LARGEST_IMAGE}.")
+    how = export_formats.Options(
+        options.format,
+        export_formats.with_suffix(path, options.format),
+        start,
+        end,
+        options.resolution,
+        options.uv_map,
+        options.outdated,
+    )
+    for written in export_formats.export(scene, how):
+        print(written, flush=True)
 
 
 @contextlib.contextmanager

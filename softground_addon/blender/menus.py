@@ -30,6 +30,9 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.force_curves", icon="GRAPH")
         layout.operator("softground.export_forces", icon="EXPORT")
         layout.separator()
+        layout.operator("softground.export", icon="EXPORT")
+        layout.operator("softground.final_mesh", icon="MESH_DATA")
+        layout.separator()
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 

@@ -309,6 +309,9 @@ class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.column()
         column = layout.column(align=True)
+        column.operator("softground.export", icon="EXPORT")
+        column.operator("softground.final_mesh", icon="MESH_DATA")
+        column = layout.column(align=True)
         column.operator("softground.force_curves", icon="GRAPH")
         column.operator("softground.export_forces", icon="EXPORT")
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")

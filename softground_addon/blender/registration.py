@@ -10,6 +10,7 @@ import bpy
 from . import (
     character_editing,
     cli,
+    export_formats,
     force_curves,
     ground_options_panel,
     handlers,
@@ -41,6 +42,7 @@ CLASSES = (
     *overlay.CLASSES,
     *preset_menu.CLASSES,
     *force_curves.CLASSES,
+    *export_formats.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
     *ground_options_panel.CLASSES,

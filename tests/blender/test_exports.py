@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, jobs, playback
+from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, image_exports, jobs, playback
 from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround
@@ -124,7 +124,7 @@ def read_image(path):
 
 def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):
     resolution = 512
-    paths = exports.export_images(scene, ground, tmp_path, 24, 25, resolution=resolution)
+    paths = image_exports.export_images(scene, ground, tmp_path, 24, 25, resolution=resolution)
     assert sorted(path.name for path in paths) == [
         f"Field_{name}_{frame:04d}.exr" for name in ("displacement", "mask") for frame in (24, 25)
     ]
@@ -162,7 +162,7 @@ def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
         lambda: exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2),
         lambda: exports.export_alembic(scene, ground, tmp_path / "x.abc", 1, 2),
         lambda: exports.export_usd(scene, ground, tmp_path / "x.usdc", 1, 2),
-        lambda: exports.export_images(scene, ground, tmp_path, 1, 2),
+        lambda: image_exports.export_images(scene, ground, tmp_path, 1, 2),
         lambda: exports.final_mesh(scene, ground),
     ):
         with pytest.raises(InputError, match=r"no bake on ground 'Field'.*Bake Footprints"):

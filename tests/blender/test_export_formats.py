@@ -1,0 +1,190 @@
+"""Exporting a bake as the user does: by the operator and by the command line."""
+
+import os
+import re
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import bake_job, baked_ground, cli, export_formats, exports, jobs, playback
+from softground_addon.core import point_cache
+from tests.blender import shots
+from tests.blender.test_bake import plane
+from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image
+
+
+@pytest.fixture(scope="module")
+def baked_file(addon, tmp_path_factory):
+    """A plane with a UV map, baked with detail along the trail."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    shots.walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    ground = scene.softground.ground = plane(scene, vertices=2)
+    layer = ground.data.uv_layers.new(name="UVMap")
+    corners = np.array([ground.data.vertices[loop.vertex_index].co[:2] for loop in ground.data.loops])
+    layer.uv.foreach_set("vector", (corners / 7.0 + 0.5).astype(np.float32).ravel())
+    scene.softground.frame_start, scene.softground.frame_end = 20, 40
+    bpy.context.view_layer.update()
+    jobs.run(bake_job.bake(scene))
+    path = tmp_path_factory.mktemp("baked") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture
+def scene(baked_file, tmp_path):
+    """The baked file, opened from a folder of the test's own."""
+    path = tmp_path / "shot.blend"
+    path.write_bytes(baked_file.read_bytes())
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
+
+
+def files_in(folder):
+    return sorted(path.name for path in folder.iterdir() if path.suffix != ".blend")
+
+
+@pytest.mark.parametrize(
+    ("kind", "importer"),
+    [("ALEMBIC", "alembic_import"), ("USD", "usd_import"), ("OBJ", "obj_import")],
+)
+def test_a_mesh_comes_back_with_the_same_heights_from_beside_the_blend(scene, tmp_path, kind, importer):
+    ground = scene.softground.ground
+    assert bpy.ops.softground.export(format=kind) == {"FINISHED"}
+    name = f"shot_Field{export_formats.FORMATS[kind].suffix}"
+    assert files_in(tmp_path) == [name]
+    options = {"as_background_job": False} if kind == "ALEMBIC" else {}
+    copy = import_and_select(getattr(bpy.ops.wm, importer), tmp_path / name, **options)
+    for frame in (25, 40) if kind != "OBJ" else (1e9,):
+        world = played(copy, int(min(frame, 100)))
+        tolerance = {"tolerance": 1e-5} if kind == "OBJ" else {}
+        assert_stands_as_recorded(ground, frame, world, **tolerance)
+
+
+def test_a_point_cache_holds_the_frames_asked_for_and_can_play_on_the_ground(scene, tmp_path):
+    ground = scene.softground.ground
+    path = tmp_path / "cache" / "walk.pc2"
+    path.parent.mkdir()
+    result = bpy.ops.softground.export(filepath=str(path), format="PC2", frame_start=30, frame_end=32, use_cache=True)
+    assert result == {"FINISHED"}
+    start, samples = point_cache.read(path)
+    assert (start, len(samples)) == (30, 3)
+    assert_stands_as_recorded(ground, 31, samples[1])
+    carrier = baked_ground.carrier_of(ground)
+    assert not playback.modifier_of(carrier).show_viewport
+    assert_stands_as_recorded(ground, 32, played(carrier, 32))
+
+
+def test_images_are_named_after_the_file_that_was_chosen(scene, tmp_path):
+    path = tmp_path / "prints.exr"
+    bpy.ops.softground.export(filepath=str(path), format="EXR", frame_start=39, frame_end=40, resolution=64)
+    assert files_in(tmp_path) == [
+        f"prints_{kind}_00{frame}.exr" for kind in ("displacement", "mask") for frame in (39, 40)
+    ]
+    assert read_image(tmp_path / "prints_displacement_0040.exr")[..., 0].min() < -0.01
+
+
+def test_the_suffix_follows_the_format_and_nothing_else_of_the_name_changes(tmp_path):
+    for before, kind, after in (
+        ("walk.abc", "USD", "walk.usdc"),
+        ("walk.usda", "USD", "walk.usda"),
+        ("walk.v2", "PC2", "walk.v2.pc2"),
+        ("walk", "EXR", "walk.exr"),
+    ):
+        assert export_formats.with_suffix(tmp_path / before, kind) == tmp_path / after
+
+
+def test_the_final_mesh_stands_in_the_scene(scene):
+    before = set(scene.objects)
+    assert bpy.ops.softground.final_mesh() == {"FINISHED"}
+    (still,) = set(scene.objects) - before
+    assert_stands_as_recorded(scene.softground.ground, 1e9, played(still, 1), tolerance=0.0)
+
+
+def spoil_nothing_baked(scene):
+    bpy.ops.softground.clear_bake()
+
+
+def spoil_settings(scene):
+    scene.softground.material.youngs_modulus *= 2
+
+
+def spoil_uv(scene):
+    for thing in (scene.softground.ground, baked_ground.carrier_of(scene.softground.ground)):
+        while thing.data.uv_layers:
+            thing.data.uv_layers.remove(thing.data.uv_layers[0])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind", "said"),
+    [
+        (spoil_nothing_baked, "ALEMBIC", "no bake on ground 'Field'.*Bake Footprints"),
+        (spoil_settings, "USD", "'Field' is outdated .*settings.*bake again"),
+        (spoil_uv, "EXR", "outdated|no UV map: unwrap it"),
+    ],
+)
+def test_what_cannot_be_exported_says_why_and_what_to_do(scene, tmp_path, capfd, spoil, kind, said):
+    spoil(scene)
+    before = files_in(tmp_path)
+    assert cli.run_in_blender(["export", "--format", kind]) == cli.EXIT_BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.startswith("softground: ")
+    assert re.search(said, error)
+    assert files_in(tmp_path) == before
+
+
+def test_an_outdated_bake_is_exported_when_that_is_asked_for(scene, tmp_path):
+    spoil_settings(scene)
+    with pytest.raises(RuntimeError, match="outdated"):
+        bpy.ops.softground.export(format="PC2")
+    assert bpy.ops.softground.export(format="PC2", outdated=True) == {"FINISHED"}
+    assert files_in(tmp_path) == ["shot_Field.pc2"]
+
+
+@pytest.mark.parametrize("kind", export_formats.FORMATS)
+def test_a_folder_that_is_missing_or_locked_is_named(scene, tmp_path, kind, monkeypatch):
+    with pytest.raises(RuntimeError, match=r"no folder '.*nowhere'"):
+        bpy.ops.softground.export(filepath=str(tmp_path / "nowhere" / "x"), format=kind)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
+    with pytest.raises(RuntimeError, match="Nothing may be written to the folder"):
+        bpy.ops.softground.export(filepath=str(tmp_path / "x"), format=kind)
+    assert files_in(tmp_path) == []
+
+
+def test_the_button_waits_for_a_bake(scene):
+    assert bpy.ops.softground.export.poll()
+    bpy.ops.softground.clear_bake()
+    assert not bpy.ops.softground.export.poll()
+
+
+def test_the_command_line_writes_what_it_names_and_keeps_the_blend(scene, tmp_path, capfd):
+    before = (tmp_path / "shot.blend").read_bytes()
+    code = cli.run_in_blender(["export", "--format", "pc2", "--frames", "30-31", "--output", str(tmp_path / "a.pc2")])
+    assert code == cli.EXIT_DONE
+    assert str(tmp_path / "a.pc2") in capfd.readouterr().out
+    assert len(point_cache.read(tmp_path / "a.pc2")[1]) == 2
+    assert (tmp_path / "shot.blend").read_bytes() == before
+    assert cli.run_in_blender(["export", "--format", "fbx"]) == cli.EXIT_BAD_INPUT
+    assert cli.run_in_blender(["export", "--format", "exr", "--resolution", "0"]) == cli.EXIT_BAD_INPUT
+    assert cli.run_in_blender(["export", "--format", "obj", "--scene", "None"]) == cli.EXIT_BAD_INPUT
+
+
+@pytest.mark.parametrize("kind", ["alembic", "obj"])
+def test_another_scene_than_the_open_one_is_exported_by_its_name(scene, tmp_path, kind):
+    name = scene.name
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    assert cli.run_in_blender(["export", "--format", kind, "--scene", name, "--output", str(tmp_path / "a")]) == 0
+    assert files_in(tmp_path) == [f"a{export_formats.FORMATS[kind.upper()].suffix}"]
+    assert bpy.context.scene.name == "Other"
+
+
+def test_an_interrupted_export_leaves_the_older_file(scene, tmp_path, monkeypatch):
+    path = tmp_path / "a.pc2"
+    path.write_bytes(b"older")
+    monkeypatch.setattr(exports.point_cache, "_VERSION", "no number")
+    with pytest.raises(Exception, match=r"integer|argument"):
+        export_formats.export(scene, export_formats.Options("PC2", path, 30, 31))
+    assert path.read_bytes() == b"older"
+    assert files_in(tmp_path) == ["a.pc2"]
