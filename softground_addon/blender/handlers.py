@@ -69,12 +69,6 @@ def end_render(*_: Any) -> None:
 
 
 @persistent
-def before_save(*_: Any) -> None:
-    """What is saved in live mode is whole."""
-    live.before_save()
-
-
-@persistent
 def before_undo(*_: Any) -> None:
     """A bake cannot go on in a scene that is replaced."""
     modal_bake.stop()
@@ -115,7 +109,6 @@ _HANDLERS = (
     ("render_init", begin_render),
     ("render_complete", end_render),
     ("render_cancel", end_render),
-    ("save_pre", before_save),
     ("undo_pre", before_undo),
     ("redo_pre", before_undo),
     ("undo_post", after_undo),

@@ -125,16 +125,16 @@ class LiveMode:
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
         over_time = histories(footprints, *across, blur_sigma=sigma)
-        sample = pressed.sample(*across)
-        jobs.run(
-            baked_ground.write(place, sample, over_time, stored, frame_rate=self._frame_rate, unit_scale=unit_scale)
+        writing = baked_ground.write(
+            place,
+            pressed.sample(*across),
+            over_time,
+            stored,
+            frame_rate=self._frame_rate,
+            unit_scale=unit_scale,
+            shape_keys=scene.softground.shape_keys,
         )
-
-    def settle(self) -> None:
-        """Make the mesh what a bake would have made of it, as it is about to be saved."""
-        ground = self._ground.object()
-        if ground is not None:
-            self._ground.settle(ground)
+        jobs.run(writing)
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
@@ -173,12 +173,6 @@ def rendering(active: bool) -> None:
     """Handle the begin or the end of a render."""
     if _mode is not None:
         _mode.rendering = active
-
-
-def before_save() -> None:
-    """Handle that the file is about to be saved."""
-    if _mode is not None:
-        _mode.settle()
 
 
 def after_undo() -> None:

@@ -86,14 +86,15 @@ class LiveGround:
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         nothing = GroundSample(*np.empty((5, 0)))
-        ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale)
+        # No shape keys: Blender would evaluate them on the whole mesh at each frame.
+        ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale, shape_keys=False)
         self.take_from(ground)
 
     def take_from(self, ground: bpy.types.Object) -> None:
         """Start from the mesh as it is now."""
         mesh = ground_mesh.mesh_of(ground)
         self._rest = ground_mesh.rest_positions(mesh)
-        self._raw, self._display = self._rest.copy(), self._rest.copy()
+        self._display = self._rest.copy()
         self._shading = np.zeros((2, len(self._rest)), dtype=np.float32)
 
     def object(self) -> bpy.types.Object | None:
@@ -104,8 +105,8 @@ class LiveGround:
         if found is None:
             return None
         self.name = found.name
-        mesh: Any = found.data
-        intact = found.type == "MESH" and mesh.shape_keys and len(mesh.vertices) == len(self._rest)
+        mesh = ground_mesh.mesh_of(found)
+        intact = ground_mesh.is_baked(found) and len(mesh.vertices) == len(self._rest)
         return found if intact else None
 
     def show(self, ground: bpy.types.Object, field: HeightField, windows: Sequence[Window], sigma: float) -> None:
@@ -143,26 +144,17 @@ class LiveGround:
     def _update(self, field: HeightField, tile: Tile, vertices: _TileVertices, sigma: float) -> None:
         # Whole tiles, so that the rounding of a height does not depend on what else has changed.
         window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE).expanded(1)
-        values = np.concatenate([field.read(window), blurred_window(field, window, sigma)])
-        compression, rim, smooth_compression, smooth_rim = vertices.interpolate(values)
+        compression, rim = vertices.interpolate(blurred_window(field, window, sigma))
         index = vertices.index
-        rest, up = self._rest[index], self._up
-        self._raw[index] = rest + (rim - compression)[:, None] * up
-        self._display[index] = rest + (smooth_rim - smooth_compression)[:, None] * up
-        self._shading[:, index] = smooth_compression, smooth_rim
+        self._display[index] = self._rest[index] + (rim - compression)[:, None] * self._up
+        self._shading[:, index] = compression, rim
 
     def _write(self, ground: bpy.types.Object) -> None:
         mesh = ground_mesh.mesh_of(ground)
-        keys: Any = mesh.shape_keys
-        keys.reference_key.points.foreach_set("co", self._raw.ravel())
-        keys.key_blocks[ground_mesh.DISPLAY_KEY].points.foreach_set("co", self._display.ravel())
         for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
-            mesh.attributes[name].data.foreach_set("value", values)
-        mesh.update_tag()
-
-    def settle(self, ground: bpy.types.Object) -> None:
-        """Bring the mesh's own positions up to date, which nothing shows while there are shape keys."""
-        ground_mesh.write_positions(ground_mesh.mesh_of(ground), self._raw)
+            attribute: Any = mesh.attributes[name]
+            attribute.data.foreach_set("value", values)
+        ground_mesh.write_positions(mesh, self._display)
 
 
 def _grouped(tiles: NDArray[np.int64]) -> dict[Tile, Indices]:

@@ -1,7 +1,10 @@
-"""What live mode costs per frame, against Dynamic Paint on the same ground under the same character."""
+"""What live mode costs per frame, against Dynamic Paint on the same ground under the same character.
+
+Both play the same frames in turns, several times over; of each frame the least time counts. It is the processor's time
+of all threads, which other programs on the machine disturb less than the clock's.
+"""
 
 import time
-from statistics import median
 
 import bpy
 import numpy as np
@@ -20,6 +23,7 @@ EXTENT = 10.0
 """Length of the ground's sides [m]."""
 FRAMES = 96
 LARGEST_RATIO = 1.5
+TURNS = 4
 
 
 @pytest.fixture
@@ -42,17 +46,18 @@ def ground_of(scene):
     return ground
 
 
-def seconds_per_frame(scene, ground):
-    """Median time of a frame of first playback, with the normals that a viewport would ask for."""
+def seconds_of_frames(scene, ground):
+    """Times of the frames of first playback, without and with the normals that a viewport would ask for, (F, 2)."""
     scene.frame_set(1)
     times = []
     for frame in range(2, FRAMES + 1):
-        begin = time.perf_counter()
+        begin = time.process_time()
         scene.frame_set(frame)
-        mesh = ground.evaluated_get(bpy.context.view_layer.depsgraph).data
-        len(mesh.vertex_normals)
-        times.append(time.perf_counter() - begin)
-    return median(times)
+        mesh = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        evaluated = time.process_time()
+        mesh.vertex_normals[0].vector  # noqa: B018  (computes them)
+        times.append((evaluated - begin, time.process_time() - begin))
+    return times
 
 
 def with_dynamic_paint(scene, ground, brushes):
@@ -69,36 +74,62 @@ def with_dynamic_paint(scene, ground, brushes):
         modifier.ui_type = "BRUSH"
         with bpy.context.temp_override(object=brush, active_object=brush):
             bpy.ops.dpaint.type_toggle(type="BRUSH")
-    return seconds_per_frame(scene, ground)
+    times = seconds_of_frames(scene, ground)
+    assert lowest(ground) < -0.01
+    ground.modifiers.remove(canvas)
+    for brush in brushes:
+        brush.modifiers.remove(brush.modifiers["Brush"])
+    return times
 
 
 def feet_of(scene, armature):
-    """A box on each foot: the lightest brush that leaves prints."""
+    """A box on each foot, no part of the character: the lightest brush that leaves prints."""
     feet = []
     for sole in scene.softground.characters[0].soles:
         mesh = bpy.data.meshes.new(sole.name)
-        corners = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.2) for z in (-0.08, 0.02)]
+        corners = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.2) for z in (-0.1, 0.1)]
         faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
         mesh.from_pydata(corners, [], faces)
         box = bpy.data.objects.new(sole.name, mesh)
-        box.parent, box.parent_type, box.parent_bone = armature, "BONE", sole.bone
+        follow = box.constraints.new("COPY_TRANSFORMS")
+        follow.target, follow.subtarget = armature, sole.bone
         scene.collection.objects.link(box)
         feet.append(box)
     return feet
+
+
+def in_live_mode(scene, ground):
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    times = seconds_of_frames(scene, ground)
+    assert lowest(ground) < -0.01
+    live.discard()
+    return times
+
+
+def lowest(ground):
+    """Height of the ground's deepest point."""
+    mesh = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", positions)
+    return positions[2::3].min()
 
 
 def test_live_mode_costs_no_more_than_dynamic_paint(scene):
     armature = walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()
     ground = ground_of(scene)
-    bare = seconds_per_frame(scene, ground)
-    scene.frame_set(1)
-    bpy.ops.softground.live()
-    ours = seconds_per_frame(scene, ground) - bare
-    live.discard()
-    theirs = with_dynamic_paint(scene, ground, feet_of(scene, armature)) - bare
-    print(
-        f"\nper frame at {SIDE}² over bare playback ({bare * 1e3:.2f} ms): live mode {ours * 1e3:.2f} ms, "
-        f"Dynamic Paint with boxes for feet {theirs * 1e3:.2f} ms, ratio {ours / theirs:.2f}"
-    )
-    assert ours <= LARGEST_RATIO * theirs
+    feet = feet_of(scene, armature)
+    turns = [
+        (seconds_of_frames(scene, ground), in_live_mode(scene, ground), with_dynamic_paint(scene, ground, feet))
+        for _ in range(TURNS)
+    ]
+    bare, ours, theirs = np.median(np.min(turns, axis=0), axis=1) * 1e3
+    ours, theirs = ours - bare, theirs - bare
+    ratio = ours / theirs
+    for part, what in enumerate(("the mesh", "the mesh with its normals")):
+        print(
+            f"\nper frame at {SIDE}² over bare playback ({bare[part]:.2f} ms), {what}: live mode {ours[part]:.2f} ms, "
+            f"Dynamic Paint with boxes for feet {theirs[part]:.2f} ms, ratio {ratio[part]:.2f}"
+        )
+    assert ratio[1] <= LARGEST_RATIO
