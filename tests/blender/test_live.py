@@ -8,6 +8,9 @@ from softground_addon.blender import ground_mesh, handlers, live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 
+LEVEL = 1e-9
+"""How far the undisturbed ground may be from the plane that it was fitted to [m]."""
+
 
 @pytest.fixture
 def shot(scene):
@@ -41,7 +44,7 @@ def test_scrubbing_back_and_forth_shows_every_frame_as_it_was(live_shot, preset)
     for frame in range(1, 49):
         live_shot.frame_set(frame)
         shown[frame] = heights(live_shot)
-    assert not shown[1].any()
+    assert np.abs(shown[1]).max() < LEVEL
     assert shown[48].min() < -0.01
     for frame in (30, 12, 47, 1, 33, 13, 48, 2, 25, 41):
         live_shot.frame_set(frame)
@@ -88,7 +91,7 @@ def test_keeping_leaves_a_bake_of_the_frames_so_far(live_shot):
     bpy.context.view_layer.update()
     assert heights(live_shot) == pytest.approx(shown, abs=3e-4)
     bpy.ops.softground.clear_bake()
-    assert not heights(live_shot).any()
+    assert np.abs(heights(live_shot)).max() < LEVEL
 
 
 def test_a_softer_ground_acts_on_what_follows_only(live_shot):
@@ -174,7 +177,7 @@ def test_a_file_saved_in_live_mode_can_be_cleared_after_it_is_opened_again(live_
     assert heights(scene).min() < -0.01
     bpy.ops.softground.clear_bake()
     bpy.context.view_layer.update()
-    assert not heights(scene).any()
+    assert np.abs(heights(scene)).max() < LEVEL
 
 
 def test_live_mode_waits_until_a_bake_is_cleared(shot):
