@@ -7,6 +7,7 @@ from sample_scenes.balance import GRAVITY, mass_centre
 from sample_scenes.body import SIDES, Body, Foot
 from sample_scenes.motion import joint_paths
 from sample_scenes.showpieces import BEAT, dance, kick
+from tests.scenes.estimates import loads_in_blender, vertical_in_body_weights
 from tests.scenes.kinematics import knee_flexion, largest_slide, sole_points
 
 RATE = 120.0
@@ -71,3 +72,11 @@ def test_the_dance_steps_on_the_beat_with_either_foot():
     assert len(falls) >= 15
     for fall in falls:
         assert fall.strike / BEAT == pytest.approx(round(fall.strike / BEAT), abs=1e-9)
+
+
+@pytest.mark.parametrize(("move", "frames", "steps"), [(kick, 150, [1, 2]), (dance, 480, [9, 9])])
+def test_the_add_on_finds_every_step_and_one_body_weight(scene, move, frames, steps):
+    loads = loads_in_blender(scene, Body(), move(Body(), frames, 60.0))
+    down = loads.contacts.touching
+    assert (down[0] + (down[1:] & ~down[:-1]).sum(axis=0)).tolist() == steps
+    assert vertical_in_body_weights(loads).sum(axis=1).mean() == pytest.approx(1.0, abs=0.02)
