@@ -30,6 +30,7 @@ def _trunk(body: Dog) -> Piece:
         ellipsoid(j["chest"] + W * np.array((0.06, 0, -0.155)), W * g * np.array((0.30, 0.150, 0.235))),  # rib cage
         ellipsoid(j["spine"] + W * np.array((0.05, 0, -0.115)), W * g * np.array((0.25, 0.120, 0.155))),  # belly
         ellipsoid(j["hips"] + W * np.array((-0.02, 0, -0.035)), W * g * np.array((0.20, 0.140, 0.150))),  # croup
+        ellipsoid(j["neck"] + W * np.array((0.01, 0, -0.20)), W * g * np.array((0.125, 0.150, 0.165))),  # forechest
         round_cone(j["hips"], j["chest"], 0.085 * W * g, 0.10 * W * g),
         round_cone(j["neck"] - W * np.array((0.04, 0, 0.10)), j["head"], 0.150 * W * g, 0.105 * W),
     ]
