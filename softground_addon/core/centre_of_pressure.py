@@ -21,10 +21,29 @@ def lowest_points(motion: CharacterMotion) -> Array:
     centres = []
     for sole in motion.soles:
         points = sole.landmark_positions()
-        height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
-        nearness = np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
-        centres.append((nearness[..., None] * points).sum(axis=1) / nearness.sum(axis=1)[:, None])
+        centres.append((_nearness(points, motion)[..., None] * points).sum(axis=1))
     return np.stack(centres, axis=1)
+
+
+def extents(motion: CharacterMotion, lowest: Array) -> Array:
+    """How far each sole can press about its `lowest_points` (N, S, 3), on the level: standard deviation, (N, S) [m].
+
+    Little on the heel or on the toes, most on a flat foot.
+    """
+    spread = []
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        off = ((points[..., :2] - lowest[:, index, None, :2]) ** 2).sum(axis=-1)
+        spread.append((_nearness(points, motion) * off).sum(axis=1))
+    return np.sqrt(np.stack(spread, axis=1))
+
+
+def _nearness(points: Array, motion: CharacterMotion) -> Array:
+    """Shares of the pressure that a sole's landmarks (N, L, 3) can bear by their height, (N, L)."""
+    height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    nearness = np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
+    shares: Array = nearness / nearness.sum(axis=1, keepdims=True)
+    return shares
 
 
 def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, target: Array, trust: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .body_dynamics import FREE_FALL, BodyDynamics
-from .centre_of_pressure import lowest_points
+from .centre_of_pressure import extents, lowest_points
 from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts, close_short, runs
 from .load_sharing import whole_body_shares
 from .motion import CharacterMotion
@@ -97,7 +97,9 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         # In flight the feet are right, there is no double support.
         if body.force[change.leave : change.strike, 2].min(initial=np.inf) >= FREE_FALL
     ]
-    for change, (strike, leave) in zip(changes, _fit_overlaps(changes, lowest, body, unit), strict=True):
+    for change, (strike, leave) in zip(
+        changes, _fit_overlaps(changes, lowest, extents(motion, lowest), body, unit), strict=True
+    ):
         touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
         touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
     for first, sole in _landings(touching):
@@ -227,7 +229,9 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
     return found
 
 
-def _fit_overlaps(changes: list[Transition], lowest: Array, body: BodyDynamics, unit: float) -> NDArray[np.intp]:
+def _fit_overlaps(
+    changes: list[Transition], lowest: Array, extent: Array, body: BodyDynamics, unit: float
+) -> NDArray[np.intp]:
     """Strike and leave of each transition whose cosine ramp fits the point of action best, (T, 2)."""
     search = max(round(SEARCH * unit), 1)
     found = np.array([(change.strike, change.leave) for change in changes]).reshape(-1, 2)
@@ -240,7 +244,7 @@ def _fit_overlaps(changes: list[Transition], lowest: Array, body: BodyDynamics, 
         some = np.flatnonzero(width == steps)
         step = begin[some, None] + np.arange(steps)
         feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
-        share, telling = _shares_told(step, end[some], found[some], feet, lowest, body, unit)
+        share, telling = _shares_told(step, end[some], found[some], feet, lowest, extent, body, unit)
         fitted[some] = _best_ramps(found[some], step, end[some], share, telling, unit)
     return fitted
 
@@ -251,6 +255,7 @@ def _shares_told(
     found: NDArray[np.intp],
     feet: NDArray[np.intp],
     lowest: Array,
+    extent: Array,
     body: BodyDynamics,
     unit: float,
 ) -> tuple[Array, Array]:
@@ -259,21 +264,27 @@ def _shares_told(
     Surely before the strikes and after the leaves `found` (T, 2) the share is 0 and 1: what the point of action tells
     there shows how far it can be trusted. A body animated by eye moves with little regard to the foot that bears it.
     """
-    within = np.minimum(step, end[:, None] - 1)
-    back, front = lowest[within, feet[:, :1]], lowest[within, feet[:, 1:]]
-    target = body.point_of_action((back[..., 2] + front[..., 2]) / 2, within)
-    along = (front - back)[..., :2]
-    length = (along**2).sum(axis=-1)
-    share = ((target - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
-    share = np.clip(share, 0.0, 1.0)
     inside = step < end[:, None]
     sure = round(SURE * TIMING_DEVIATION * unit)
     before = step < found.min(axis=1, keepdims=True) - sure
     after = (step >= found.max(axis=1, keepdims=True) + sure) & inside
-    off = np.select([before, after], [share, 1 - share], 0.0)
-    variance = SHARE_DEVIATION**2 + (off**2).sum(axis=1) / np.maximum((before | after).sum(axis=1), 1)
-    # Where one sole bears all, the point of action wanders under that sole and tells nothing about the other.
-    telling = (4 * share * (1 - share)) ** 2 / (SHARE_MEMORY * unit * variance[:, None])
+    within = np.minimum(step, end[:, None] - 1)
+    back, front = lowest[within, feet[:, :1]], lowest[within, feet[:, 1:]]
+    ground = np.select([before, after], [back[..., 2], front[..., 2]], (back[..., 2] + front[..., 2]) / 2)
+    along = (front - back)[..., :2]
+    length = (along**2).sum(axis=-1)
+    share = ((body.point_of_action(ground, within) - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    # The point of action wanders under each sole as far as that can press: so much less it tells about the shares.
+    wander = (1 - share) * extent[within, feet[:, :1]] ** 2 + share * extent[within, feet[:, 1:]] ** 2
+    wander /= np.maximum(length, 1e-12)
+    off = np.select([before, after], [share, 1 - share], 0.0) ** 2
+    beyond = np.maximum(off - wander, 0.0).sum(axis=1, keepdims=True)
+    beyond /= np.maximum((before | after).sum(axis=1, keepdims=True), 1)
+    # Where the point of action leaves a foot that bears alone, shares near 0 and 1 tell nothing of the other.
+    trust = (SHARE_DEVIATION**2 / (SHARE_DEVIATION**2 + beyond)) ** 2
+    telling = trust + (1 - trust) * (4 * share * (1 - share)) ** 2
+    telling /= SHARE_MEMORY * unit * (SHARE_DEVIATION**2 + wander + beyond)
     return share, np.where(inside, telling, 0.0)
 
 

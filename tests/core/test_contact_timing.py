@@ -42,7 +42,7 @@ def step_from_foot_to_foot(strike, leave, *, count=240):
     return character([back, front], hips=hips, rate=RATE)
 
 
-@pytest.mark.parametrize("error", [(9, -9), (9, 9), (-9, -9)])
+@pytest.mark.parametrize("error", [(9, -9), (9, 9), (-9, -9), (-9, 9)])
 def test_the_point_of_action_corrects_heel_strike_and_toe_off(error):
     strike, leave = 110, 134
     motion = step_from_foot_to_foot(strike, leave)
