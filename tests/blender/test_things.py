@@ -309,9 +309,8 @@ def test_contacts_are_added_from_what_is_selected(scene):
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="POSE")
     for bone in armature.pose.bones:
-        bone.bone.select = bone.name.startswith("hand") if hasattr(bone.bone, "select") else False
-        if hasattr(bone, "select"):
-            bone.select = bone.name.startswith("hand")
+        selectable = bone if hasattr(bone, "select") else bone.bone  # the bone itself before Blender 5
+        selectable.select = bone.name.startswith("hand")
     assert bpy.ops.softground.add_contact() == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     limbs = [sole for sole in scene.softground.characters[0].soles if sole.kind == "LIMB"]
@@ -321,3 +320,30 @@ def test_contacts_are_added_from_what_is_selected(scene):
     # Hands that only swing by change nothing.
     report = bake(scene, frame_end=20).report
     assert {step["contact"] for step in report["steps"]} <= {"foot.L", "foot.R"}
+
+
+def test_the_hands_of_a_cartwheel_print_between_the_feet(scene):
+    """Arms as long as legs: turned about its hips like a wheel, the figure lands on foot, hand, hand and foot."""
+    armature = rigs.human(rigs.FAMILIES["blender"])
+    height, frames = 0.955, 73
+    for frame in range(1, frames + 1):
+        angle = 2 * np.pi * (frame - 1) / (frames - 1)
+        hips = np.array([height * angle, 0.0, height])
+        armature.rotation_euler = (0, angle, 0)
+        armature.location = hips - 0.95 * np.array([np.sin(angle), 0, np.cos(angle)])
+        armature.keyframe_insert("location", frame=frame)
+        armature.keyframe_insert("rotation_euler", frame=frame)
+    character = add_character(scene, armature)
+    add_bone_contacts(character, ["hand.L", "hand.R"])
+    assert {sole.side for sole in character.soles if sole.kind == "LIMB"} == {"LEFT", "RIGHT"}
+    steps = sorted(bake(scene, frame_end=frames).report["steps"], key=lambda step: step["frame_start"])
+    order = [step["contact"] for step in steps]
+    assert order.index("hand.L") < order.index("hand.R")
+    assert "foot" in order[0]
+    assert "foot" in order[-1]
+    hands = [step for step in steps if step["contact"].startswith("hand")]
+    assert len(hands) == 2
+    for step in hands:
+        assert step["area_m2"] < 0.03
+        assert step["peak_force_n"] > 0.3 * character.mass * 9.81
+    assert hands[1]["position"][0] - hands[0]["position"][0] > 0.8
