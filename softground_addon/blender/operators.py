@@ -94,11 +94,12 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
 
 
 def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object if it is a selected mesh that no character wears."""
+    """The active object if it is a selected mesh that no character wears and that does not print itself."""
     thing = context.active_object
     if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
         return None
-    return thing
+    characters = settings.scene_of(context).softground.characters
+    return None if any(sole.object == thing for one in characters for sole in one.soles) else thing
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):

@@ -7,6 +7,7 @@ from mathutils import Quaternion
 
 from softground_addon.blender import analysis, bake_job, jobs
 from softground_addon.blender.character_setup import add_bone_contacts, add_character, add_object_contacts, add_things
+from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.shots import read_shot
 from softground_addon.core.errors import InputError
 
@@ -63,6 +64,53 @@ def test_a_dropped_ball_bakes_from_one_click(scene):
     assert step["max_depth_m"] == pytest.approx(expected, rel=0.03)
     # A cap of the ball: what it carries is its volume times E/L0.
     assert step["compressed_m3"] == pytest.approx(step["peak_force_n"] * 0.3 / 375e3, rel=0.02)
+
+
+def test_the_thing_that_was_just_added_is_not_taken_as_the_ground(scene):
+    thing = ball()
+    key_path(thing, dropped_path(0.0, 0.0, 1.0, frames=40))
+    bpy.ops.softground.add_character()
+    assert bpy.context.active_object == thing
+    bpy.ops.softground.create_ground()
+    assert scene.softground.ground not in (None, thing)
+
+
+def test_a_thing_beside_a_character_that_answers_the_ground(scene):
+    add_character(scene, shots.walker(scene, frames=30))
+    thing = ball(location=(3, 0, 0))
+    key_path(thing, dropped_path(3.0, 0.0, 0.5, frames=30))
+    add_things(scene, [thing])
+    before = np.array([[curve.evaluate(f) for f in range(1, 31)] for curve in curves_of(thing)])
+    scene.softground.tilt.use = scene.softground.grounding.use = True
+    report = bake(scene, cell_size=0.02, frame_start=1, frame_end=30).report
+    assert {"Ball", "foot.L"} <= {step["contact"] for step in report["steps"]}
+    assert list(report["gaps_mm"]["after"]) != []
+    after = np.array([[curve.evaluate(f) for f in range(1, 31)] for curve in curves_of(thing)])
+    assert (before == after).all()
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+
+
+def curves_of(thing):
+    return list(action_curves(thing.animation_data.action, slot_of(thing.animation_data)))
+
+
+def test_live_mode_presses_a_thing_and_takes_it_back(scene):
+    thing = ball()
+    key_path(thing, dropped_path(0.0, 0.0, 0.5, frames=40))
+    add_things(scene, [thing])
+    scene.softground.cell_size = 0.02
+    bpy.ops.softground.create_ground()
+    scene.frame_set(1)
+    untouched = heights(scene)
+    bpy.ops.softground.live()
+    scene.frame_set(40)
+    pressed = heights(scene)
+    scene.frame_set(1)
+    assert heights(scene).tobytes() == untouched.tobytes()
+    scene.frame_set(40)
+    assert heights(scene).tobytes() == pressed.tobytes()
+    bpy.ops.softground.live(keep=True)
+    assert pressed.min() < -0.005
 
 
 def test_a_wheel_that_rolls_leaves_one_continuous_rut(scene):
