@@ -19,6 +19,7 @@ from ..core.heightfield import Window
 from ..core.histories import histories
 from ..core.playhead import Playhead
 from ..core.pressed_ground import PressedGround
+from ..core.soft_ground import SoftGround
 from . import analysis, baked_ground, ground_mesh, jobs, session, settings
 from .character_setup import characters_of
 from .created_ground import create_ground
@@ -55,15 +56,9 @@ class LiveMode:
 
     def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
         self._analysis = known
-        cell_size = settings.cell_size_of(scene)
-        self._playhead = Playhead(
-            known.loads,
-            known.shot.terrain,
-            settings.material_of(scene),
-            cell_size,
-            pressure=scene.softground.pressure,
-            variation=known.shot.variation,
-        )
+        shot = known.shot
+        ground = SoftGround(shot.terrain, settings.material_of(scene), scene.softground.pressure, shot.variation)
+        self._playhead = Playhead(known.loads, ground, settings.cell_size_of(scene))
         self._frame_rate = known.shot.motions[0].frame_rate
 
     def follow(self, scene: bpy.types.Scene) -> bool:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from .deformation import GroundMaterial
 from .footprints import Footprint
-from .heightfield import HeightField, Terrain, Window
-from .pressure import Pressure
+from .heightfield import HeightField, Window
 from .simulation import CharacterLoads, FrameResult, Simulation
-from .variation import Variation
+from .soft_ground import SoftGround
 
 Array = NDArray[np.float64]
 Series = TypeVar("Series", bound=Any)
@@ -52,13 +51,10 @@ class Playhead:
     Parameters
     ----------
     loads : sequence of CharacterLoads
-    terrain : Terrain
-        The undisturbed ground.
-    material : GroundMaterial
+    ground : SoftGround
+        With the material that the first frames are pressed with.
     cell_size : float
         Side of a cell [m].
-    pressure, variation
-        See `simulation.simulate`.
 
     Attributes
     ----------
@@ -68,24 +64,13 @@ class Playhead:
         At the frame that is shown; only to be read.
     """
 
-    def __init__(
-        self,
-        loads: Sequence[CharacterLoads],
-        terrain: Terrain,
-        material: GroundMaterial,
-        cell_size: float,
-        *,
-        pressure: Pressure = "UNIFORM",
-        variation: Variation | None = None,
-    ) -> None:
-        self.material = material
-        self._pressure: Pressure = pressure
-        self._variation = variation
+    def __init__(self, loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> None:
+        self.material = ground.material
         self.ground = HeightField(cell_size)
-        self._loads, self._terrain = tuple(loads), terrain
+        self._loads, self._pressed = tuple(loads), ground
         self._changes: list[_Change] = []
         self._results = self._press(self._loads)
-        self._changes.append(_Change(next(self._results).frame, material))
+        self._changes.append(_Change(next(self._results).frame, ground.material))
         self._shown = 0
 
     @property
@@ -151,10 +136,8 @@ class Playhead:
 
     def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press from the first frame on: frames that are known with the material they had, new ones with the newest."""
-        ground = HeightField(self.ground.cell_size)
-        simulation = Simulation(
-            self._terrain, self.material, ground, pressure=self._pressure, variation=self._variation
-        )
+        ground = replace(self._pressed, material=self.material)
+        simulation = Simulation(ground, HeightField(self.ground.cell_size))
         results = simulation.run(loads)
         for number in numbers():
             known = number < len(self._changes)

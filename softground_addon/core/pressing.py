@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -10,11 +11,10 @@ from numpy.typing import NDArray
 
 from .deformation import GroundMaterial, compress, displaced_volume
 from .footprints import FootprintRecorder, quantised
-from .heightfield import HeightField, SparseGrid, Surface, Terrain, Window
-from .pressure import Pressure
+from .heightfield import HeightField, SparseGrid, Surface, Window
 from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
+from .soft_ground import SoftGround
 from .stance import Bed, Imprints, Stance, Timing
-from .variation import Variation
 
 Array = NDArray[np.float64]
 
@@ -24,28 +24,14 @@ class Press:
 
     Parameters
     ----------
-    terrain : Terrain
-        The undisturbed ground.
-    material : GroundMaterial
-    ground : HeightField
-        Its state, which is worked on.
-    pressure : Pressure
-        How the force on a sole spreads over its contact.
-    variation : Variation, optional
-        How the ground varies from place to place.
+    ground : SoftGround
+    state : HeightField
+        What was pressed of it so far; it is worked on.
     """
 
-    def __init__(
-        self,
-        terrain: Terrain,
-        material: GroundMaterial,
-        ground: HeightField,
-        *,
-        pressure: Pressure = "UNIFORM",
-        variation: Variation | None = None,
-    ) -> None:
-        self.ground = ground
-        self.bed = Bed(terrain, material, ground.cell_size, pressure, variation)
+    def __init__(self, ground: SoftGround, state: HeightField) -> None:
+        self.state = state
+        self.bed = Bed(ground, state.cell_size)
 
     @property
     def material(self) -> GroundMaterial:
@@ -54,12 +40,12 @@ class Press:
 
     @material.setter
     def material(self, material: GroundMaterial) -> None:
-        self.bed.material = material
+        self.bed.ground = replace(self.bed.ground, material=material)
 
     @property
     def cell_size(self) -> float:
         """Side of a cell [m]."""
-        return self.ground.cell_size
+        return self.state.cell_size
 
     def advance(
         self, stances: Sequence[Stance], start: int, end: int, frame: float, timing: Timing
@@ -91,13 +77,13 @@ class Press:
         if not self.material.repose_angle or stance.recorder is None:
             return ()
         window, surface = self._around(stance.recorder.window)
-        state = self.ground.read(window)
+        state = self.state.read(window)
         before = quantised(state)
         state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
         change = quantised(state) - before
         if not change.any():
             return ()
-        self.ground.write(window, state)
+        self.state.write(window, state)
         stance.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
         return (window,)
 
@@ -111,7 +97,7 @@ class Press:
         window, surface = imprints.window, None
         if self.material.repose_angle:
             window, surface = self._around(imprints.window)
-        whole = self.ground.read(window)
+        whole = self.state.read(window)
         before = quantised(whole)
         inside = _inside(window, imprints.window)
         state = whole[:, inside[0], inside[1]]
@@ -143,7 +129,7 @@ class Press:
         rise = displaced @ rim
         if not surface:
             state[1] += rise.reshape(state[1].shape)
-        self.ground.write(window, whole)
+        self.state.write(window, whole)
         if stance.pressed is not None and found is not None:
             stance.pressed.write(imprints.window, (state[0] - found)[None])
         cell_area = self.cell_size**2
@@ -167,7 +153,7 @@ class Press:
 
     def _around(self, window: Window) -> tuple[Window, Surface]:
         """A window with the ground around it that may slide with it."""
-        compression, rim = self.ground.read(window)
+        compression, rim = self.state.read(window)
         reach = slide_reach(rim, compression, self.material.repose_angle, self.cell_size)
         wider = window.expanded(reach)
         return wider, self.bed.surface(wider)

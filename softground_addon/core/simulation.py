@@ -23,6 +23,7 @@ from .imprint import sole_points
 from .motion import CharacterMotion, SoleMotion, steps_per_frame
 from .pressing import Press
 from .pressure import Pressure
+from .soft_ground import SoftGround
 from .solid_stance import SolidStance
 from .stance import SoleStance, Stance, Steps, Timing
 from .variation import Variation
@@ -131,15 +132,10 @@ def simulate(
     ----------
     loads : sequence of CharacterLoads
         Characters that share the ground, on time grids of the same step.
-    terrain : Terrain
-        The undisturbed ground.
-    material : GroundMaterial
+    terrain, material, pressure, variation
+        See `SoftGround`.
     cell_size : float
         Side of a cell [m].
-    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
-        How the force on a sole spreads over its contact.
-    variation : Variation, optional
-        How the ground varies from place to place.
 
     Yields
     ------
@@ -152,8 +148,8 @@ def simulate(
     InputError
         If the cell size is not positive, or the characters do not share a time grid.
     """
-    ground = HeightField(cell_size)
-    yield from Simulation(terrain, material, ground, pressure=pressure, variation=variation).run(loads)
+    ground = SoftGround(terrain, material, pressure, variation)
+    yield from Simulation(ground, HeightField(cell_size)).run(loads)
 
 
 class Simulation:
@@ -161,25 +157,13 @@ class Simulation:
 
     Parameters
     ----------
-    terrain : Terrain
-        The undisturbed ground.
-    material : GroundMaterial
-    ground : HeightField
-        Its state to begin with, empty or from `footprints.recompose`; it is worked on.
-    pressure, variation
-        See `simulate`.
+    ground : SoftGround
+    state : HeightField
+        What was pressed of it so far, empty or from `footprints.recompose`; it is worked on.
     """
 
-    def __init__(
-        self,
-        terrain: Terrain,
-        material: GroundMaterial,
-        ground: HeightField,
-        *,
-        pressure: Pressure = "UNIFORM",
-        variation: Variation | None = None,
-    ) -> None:
-        self._press = Press(terrain, material, ground, pressure=pressure, variation=variation)
+    def __init__(self, ground: SoftGround, state: HeightField) -> None:
+        self._press = Press(ground, state)
         self._open: dict[tuple[int, int], Stance] = {}
         self._active: list[Stance] = []
         self._step = 1
@@ -225,7 +209,7 @@ class Simulation:
             self._step = int(end)
             yield FrameResult(
                 frame,
-                self._press.ground,
+                self._press.state,
                 changed,
                 tuple(stance.footprint() for stance in ended if stance.printed),
                 *_state_at(loads, grid.offsets, int(end) - 1),

@@ -18,11 +18,12 @@ from .deformation import (
     touching_fraction,
 )
 from .footprints import Footprint, FootprintRecorder
-from .heightfield import SparseGrid, Surface, Terrain, TerrainTiles, Window
+from .heightfield import SparseGrid, Surface, TerrainTiles, Window
 from .imprint import SolePoints, cell_coverage, centroid, contact_window, places, point_contact
 from .motion import Sole
-from .pressure import Pressure, pressure_field
-from .variation import Factors, Variation, VariationTiles
+from .pressure import pressure_field
+from .soft_ground import SoftGround
+from .variation import Factors, VariationTiles
 
 Array = NDArray[np.float64]
 
@@ -61,28 +62,20 @@ class Bed:
 
     Parameters
     ----------
-    terrain : Terrain
-        The undisturbed ground.
-    material : GroundMaterial
+    ground : SoftGround
     cell_size : float
         Side of a cell [m].
-    pressure : Pressure
-        How the force on a sole spreads over its contact.
-    variation : Variation, optional
-        How the ground varies from place to place.
     """
 
-    def __init__(
-        self,
-        terrain: Terrain,
-        material: GroundMaterial,
-        cell_size: float,
-        pressure: Pressure = "UNIFORM",
-        variation: Variation | None = None,
-    ) -> None:
-        self.terrain, self.material, self.cell_size, self.pressure = terrain, material, cell_size, pressure
-        self.variation = VariationTiles(variation, cell_size) if variation else None
+    def __init__(self, ground: SoftGround, cell_size: float) -> None:
+        self.ground, self.cell_size = ground, cell_size
+        self.variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
         self._tiles: dict[int, TerrainTiles] = {}
+
+    @property
+    def material(self) -> GroundMaterial:
+        """What the ground is made of."""
+        return self.ground.material
 
     @property
     def rim_reach(self) -> float:
@@ -92,7 +85,7 @@ class Bed:
     def surface(self, window: Window, divisions: int = 1) -> Surface:
         """The undisturbed ground under a window, its cells divided in so many parts along each side."""
         if divisions not in self._tiles:
-            self._tiles[divisions] = TerrainTiles(self.terrain, self.cell_size / divisions)
+            self._tiles[divisions] = TerrainTiles(self.ground.terrain, self.cell_size / divisions)
         return self._tiles[divisions].surface(window.refined(divisions))
 
 
@@ -371,9 +364,9 @@ class SoleStance(Stance):
         )
         stress = np.divide(load, sinking.area, out=np.zeros_like(load), where=pressing)
         target = sinking.target
-        if bed.pressure == "CENTRE_OF_PRESSURE" or factors:
+        if bed.ground.pressure == "CENTRE_OF_PRESSURE" or factors:
             stress = stress[:, None, None]
-            if bed.pressure == "CENTRE_OF_PRESSURE":
+            if bed.ground.pressure == "CENTRE_OF_PRESSURE":
                 x, y = places(points, poses)
                 centre = self._steps.centres[steps, :2]
                 field = pressure_field(x, y, touching, centre, points.tolerance)

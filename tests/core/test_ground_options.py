@@ -20,6 +20,7 @@ from softground_addon.core.deformation import (
 from softground_addon.core.footprints import QUANTUM, recompose
 from softground_addon.core.heightfield import FlatTerrain, HeightField
 from softground_addon.core.simulation import Simulation, simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.test_ground_invariants import Hills, random_loads
 from tests.core.test_pressure import rolling
 from tests.core.test_simulation import piece
@@ -307,7 +308,7 @@ def test_without_load_no_bit_changes(pressure):
 def test_frame_by_frame_the_same_prints_arise_as_in_one_go(pressure):
     loads = rolling(walk(steps=3))
     whole, _ = check_every_frame([loads], FlatTerrain(), ALL, 0.01, pressure)
-    simulation = Simulation(FlatTerrain(), ALL, HeightField(0.01), pressure=pressure)
+    simulation = Simulation(SoftGround(FlatTerrain(), ALL, pressure), HeightField(0.01))
     last = int(loads.motion.frames[-1])
     for frame in range(1, last):
         part = piece(loads, frame, frame + 1)

@@ -10,6 +10,7 @@ from softground_addon.core.footprints import recompose
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.playhead import Playhead
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
@@ -35,7 +36,7 @@ def baked(loads, frames):
 
 
 def test_frames_in_any_order_show_the_ground_of_a_bake_bit_for_bit(loads):
-    playhead = Playhead([loads], FlatTerrain(), SNOW, CELL)
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     first, last = loads.motion.frames[[0, -1]]
     order = np.random.default_rng(1).integers(first, last + 1, 30).astype(float)
     expected = baked(loads, set(order))
@@ -47,7 +48,7 @@ def test_frames_in_any_order_show_the_ground_of_a_bake_bit_for_bit(loads):
 
 
 def test_before_the_shot_the_ground_is_undisturbed_and_after_it_stays(loads):
-    playhead = Playhead([loads], FlatTerrain(), SNOW, CELL)
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     last = loads.motion.frames[-1]
     playhead.go_to(last + 100)
     assert playhead.frame == last
@@ -56,13 +57,13 @@ def test_before_the_shot_the_ground_is_undisturbed_and_after_it_stays(loads):
 
 
 def test_a_frame_between_two_shows_the_earlier_one(loads):
-    playhead = Playhead([loads], FlatTerrain(), SNOW, CELL)
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     playhead.go_to(20.7)
     assert playhead.frame == 20.0
 
 
 def test_a_new_material_acts_on_what_follows_only(loads):
-    playhead = Playhead([loads], FlatTerrain(), SNOW, CELL)
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     middle = float(np.floor(loads.motion.frames.mean()))
     playhead.go_to(loads.motion.frames[-1])
     playhead.go_to(middle)
@@ -84,7 +85,7 @@ def test_a_new_material_acts_on_what_follows_only(loads):
 
 
 def test_its_footprints_put_together_are_the_ground_that_it_shows(loads):
-    playhead = Playhead([loads], FlatTerrain(), SNOW, CELL)
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     for frame in (35.0, 90.0, 50.0):
         playhead.go_to(frame)
         ground = recompose(playhead.footprints(), cell_size=CELL)

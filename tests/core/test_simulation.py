@@ -11,6 +11,7 @@ from softground_addon.core.errors import InputError
 from softground_addon.core.footprints import recompose
 from softground_addon.core.heightfield import FlatTerrain, HeightField, Window
 from softground_addon.core.simulation import Simulation, simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import (
     GRAVITY,
     MASS,
@@ -363,7 +364,7 @@ def piece(loads, start, end):
 def test_frame_by_frame_the_same_prints_arise_as_in_one_go():
     loads = [walk(steps=4), walk(steps=4, heading=0.5, origin=(0.1, -0.2, 0), name="other")]
     whole, footprints = pressed(loads, MUD)
-    simulation = Simulation(FlatTerrain(), MUD, HeightField(0.01))
+    simulation = Simulation(SoftGround(FlatTerrain(), MUD), HeightField(0.01))
     last = int(loads[0].motion.frames[-1])
     found = []
     for frame in range(1, last):
@@ -385,7 +386,7 @@ def test_a_simulation_goes_on_from_a_recomposed_ground():
     ground, footprints = pressed(first, MUD)
     recomposed = recompose(footprints)
     for state in (ground, recomposed):
-        for _ in Simulation(FlatTerrain(), MUD, state).run([second]):
+        for _ in Simulation(SoftGround(FlatTerrain(), MUD), state).run([second]):
             pass
     for window in ground.tile_windows():
         assert np.abs(ground.read(window) - recomposed.read(window)).max() < 1e-8
