@@ -12,7 +12,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: demo scenes test slow marathon bench validate gui pictures package lint types clean
+.PHONY: demo scenes test slow versions marathon bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -31,6 +31,10 @@ test: $(READY)
 
 slow: $(READY)
 	$(BIN)/python -m pytest -m slow $(TESTS)
+
+# One file baked in each Blender that is here, played in the others.
+versions: $(READY)
+	$(BIN)/python -m pytest -m versions -rs tests/blender/test_versions.py
 
 marathon: $(READY)
 	$(BIN)/python -m pytest -m marathon $(TESTS)

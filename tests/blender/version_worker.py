@@ -1,0 +1,89 @@
+"""Bakes a shot, or plays one, in whatever Blender runs this: `python -m tests.blender.version_worker make|play ...`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+FRAMES = (8, 22, 36)
+BETWEEN = 14.25
+
+
+def make(blend: str, heights: str) -> None:
+    """Bake the walker, save the shot, and write what its record says of the carrier's heights."""
+    import softground_addon
+    from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
+    from softground_addon.core.pressed_ground import PressedGround
+    from tests.blender import shots
+    from tests.blender.test_bake import plane
+    from tests.blender.test_playback_render import set_up_render
+
+    softground_addon.register()
+    try:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        shots.walker(scene, frames=40)
+        bpy.ops.softground.add_character()
+        ground = scene.softground.ground = plane(scene, vertices=2)
+        scene.softground.frame_end = 40
+        bpy.context.view_layer.update()
+        jobs.run(bake_job.bake(scene))
+        set_up_render(scene)
+        carrier = baked_ground.carrier_of(ground)
+        carrier.name = "Carrier"
+        rest = ground_mesh.rest_vertices(carrier, 1.0)
+        footprints, about = baked_ground.load(ground)
+        sigma = baked_ground.blur_sigma_of(about)
+        recorded = {}
+        for frame in (*FRAMES, BETWEEN):
+            whole = PressedGround.at(footprints, frame=frame, frame_rate=24.0, cell_size=0.01, blur_sigma=sigma)
+            recorded[str(frame)] = rest[:, 2] + whole.sample(*rest[:, :2].T).display
+        np.savez(heights, **recorded)
+        bpy.ops.wm.save_as_mainfile(filepath=blend)
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        softground_addon.unregister()
+
+
+def play(blend: str, out: str, with_addon: str, rendering: str, *frames: str) -> None:
+    """Open a shot with the add-on enabled or without it, and write heights and, if asked for, pixels of the frames."""
+    if with_addon == "1":
+        import softground_addon
+
+        softground_addon.register()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=blend, use_scripts=with_addon == "1")
+        assert hasattr(bpy.types.Scene, "softground") == (with_addon == "1")
+        scene, shown = bpy.context.scene, {}
+        for frame in frames:
+            scene.frame_set(int(float(frame)), subframe=float(frame) % 1)
+            carrier = bpy.data.objects["Carrier"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+            positions = np.empty(len(carrier.data.vertices) * 3, dtype=np.float32)
+            carrier.data.attributes["position"].data.foreach_get("vector", positions)
+            matrix = np.array(carrier.matrix_world)
+            shown[frame] = positions.reshape(-1, 3) @ matrix[2, :3] + matrix[2, 3]
+            if rendering == "1":
+                shown[f"pixels {frame}"] = pixels(scene, Path(out).with_suffix(".exr"))
+        np.savez(out, **shown)
+    finally:
+        if with_addon == "1":
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            softground_addon.unregister()
+
+
+def pixels(scene: bpy.types.Scene, path: Path) -> np.ndarray:
+    """The current frame as it is rendered."""
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    values = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(values)
+    bpy.data.images.remove(image)
+    return values
+
+
+if __name__ == "__main__":
+    {"make": make, "play": play}[sys.argv[1]](*sys.argv[2:])
