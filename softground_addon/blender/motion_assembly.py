@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -63,8 +63,10 @@ def assemble_motion(
     *,
     mass: float,
     carried: Mapping[str, SoleMotion],
-) -> CharacterMotion:
+) -> Generator[int, None, CharacterMotion]:
     """The character's motion with the soles of its mapping.
+
+    Yields the number of frames read before each part of the work, so that Blender can answer its user.
 
     Parameters
     ----------
@@ -92,7 +94,9 @@ def assemble_motion(
     planted = planted_instants(
         [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
     )
+    yield len(recording.frames)
     meshes = find_foot_meshes(scene, armature, sources, rest.world)
+    yield len(recording.frames)
     facing = rest.facing(mapping)
     trust = [_REST_IS_FLAT if source.name in meshes else 0.0 for source in sources]
     images = _mirror_images(feet)
@@ -107,6 +111,7 @@ def assemble_motion(
 
     motions: dict[str, SoleMotion] = {}
     for foot, flat, size in zip(feet, flats, sizes, strict=True):
+        yield len(recording.frames)
         placed = foot_sole(
             foot.source,
             flat,
@@ -118,6 +123,7 @@ def assemble_motion(
         carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
         transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
         motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))
+    yield len(recording.frames)
     motions.update(_limb_motions(scene, mapping, recording, rest))
     motions.update(carried)
 

@@ -90,7 +90,7 @@ def sample_character(
         for source in mapping.soles
         if source.object
     }
-    return assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried)
+    return (yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried))
 
 
 def sample_thing(
