@@ -48,7 +48,7 @@ def test_the_size_of_the_ground_does_not_change_the_time_of_a_bake():
 
 
 @pytest.mark.xfail(
-    reason="halving faces ends at 0.84 to 1.19 cells, as their size has it: a fifth more or less vertices"
+    reason="halving faces ends at 0.84 to 1.19 cells: with their size, vertices vary by a fifth"
 )
 def test_the_size_of_the_ground_does_not_change_the_memory_of_a_bake():
     assert on_ground_of(1000.0)["memory"] == pytest.approx(on_ground_of(10.0)["memory"], rel=0.10)
