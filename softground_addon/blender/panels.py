@@ -339,8 +339,8 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
         return
     box = layout.box().column(align=True)
-    text = iface_("Feet float up to {gap} mm above their prints")
-    box.label(text=text.format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.label(text="above their prints", icon="BLANK1")
     box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
 
 

@@ -140,9 +140,9 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")
     row.label(text=notes.get(response_job.CARRIER, ""), translate=False)
-    row = box.row()
-    row.label(text="Suggested Speed", icon="TIME")
-    row.label(text=f"{float(notes.get(response_job.SPEED, '1')):.0%}", translate=False)
+    speed = f"{float(notes.get(response_job.SPEED, '1')):.0%}"
+    row = box.split(factor=0.72)
+    row.label(text=iface_("Suggested Speed {speed}").format(speed=speed), icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
     for gap in json.loads(notes.get(response_job.WORST, "[]"))[:_SHOWN]:
         if abs(gap["gap_mm"]) >= response_job.NOTICEABLE_GAP_MM:

@@ -1,0 +1,57 @@
+"""Prints by one click, feet let down into them by another; the response by its panel."""
+
+from __future__ import annotations
+
+import bpy
+
+from tests.gui.hand import Hand, Steps
+from tests.gui.shot import open_walk
+from tests.gui.stories.interrupted_bake import scene, session, with_viewport
+
+
+def tell(hand: Hand, facts: dict) -> Steps:
+    armature = open_walk(60)
+    yield from hand.open_sidebar()
+    with_viewport(hand, bpy.ops.softground.add_character)
+    yield from hand.press_button("softground.bake")
+    yield from hand.wait_for(lambda: session().is_baking, 10)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
+    yield 0.5
+    facts["floating"] = floating()
+    yield from hand.frame_all()
+    yield from hand.look_at_walk()
+    button = yield from hand.find_button("softground.sink_feet")
+    yield from hand.picture("panel_floating", of="UI")
+
+    yield from hand.click(*button)
+    yield from hand.wait_for(lambda: session().is_baking, 10)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
+    yield 0.5
+    facts["left"] = floating()
+    facts["grounding"] = scene().softground.grounding.use
+    facts["tracks"] = [track.name for track in armature.animation_data.nla_tracks]
+    facts["stale"] = session().stale
+
+    show_open(bpy.types.SOFTGROUND_PT_response)
+    for _ in range(24):
+        yield from hand.key("WHEELUPMOUSE")
+    yield from hand.picture("panel_response")
+
+    yield from hand.move(*hand.middle())
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    facts["undone"] = floating(), scene().softground.grounding.use
+
+
+def floating() -> float:
+    return float(dict(scene().softground.ground.data["softground_summary"])["floating_mm"])
+
+
+def show_open(panel: type) -> None:
+    """Show once more, open, a panel that is closed until one opens it: what a region has closed stays closed."""
+    shown = {"bl_idname": "TEST_PT_open", "bl_options": set(), "draw": panel.draw}
+    kept = {name: getattr(panel, name) for name in _PLACE}
+    bpy.utils.register_class(type("TEST_PT_open", (bpy.types.Panel,), shown | kept))
+
+
+_PLACE = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "bl_parent_id")
