@@ -9,7 +9,18 @@ import subprocess
 import sys
 import time
 
-SCENES = ("landscape", "force_arrows", "walk_forces", "craters", "four_grounds", "response_hill", "crossing")
+SCENES = (
+    "landscape",
+    "force_arrows",
+    "walk_forces",
+    "craters",
+    "four_grounds",
+    "response_hill",
+    "crossing",
+    "four_legs",
+    "bicycle",
+    "stunts",
+)
 """Modules of this package that `production.run` knows how to run, in the order of the paper's figures."""
 
 

@@ -26,7 +26,7 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import bake_job, baked_ground, jobs, settings
+from softground_addon.blender import bake_job, baked_ground, character_setup, jobs, settings
 from softground_addon.core.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")
@@ -75,7 +75,7 @@ class Walker:
     with_things : sequence of bpy.types.Object
         Further mesh objects that are one thing with the first, such as the other wheel.
     more : sequence of str
-        Bones that print beside the feet, such as hands and forepaws; their names end in their side.
+        Bones that print beside the feet, such as hands and forepaws.
     """
 
     armature: bpy.types.Object
@@ -158,10 +158,8 @@ def bake(
         for sole in shot.characters[-1].soles:
             if shoe := walker.shoes.get(sole.side[:1]):
                 sole.object = shoe
-        for bone in walker.more:
-            sole = shot.characters[-1].soles.add()
-            sole.name, sole.bone = bone, bone
-            sole.side = {"L": "LEFT", "R": "RIGHT"}[bone[-1]]
+        if walker.more:
+            character_setup.add_bone_contacts(shot.characters[-1], walker.more)
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)

@@ -27,6 +27,8 @@ GOLDEN = (sqrt(5.0) - 1) / 2
 """Multiples of it, less their whole parts, are spread evenly whatever the length of the rows that points come in."""
 CLOSE = 1e-3
 """How far the force may act from the centre of pressure, in standard deviations of the contact."""
+ASTRAY = 0.1
+"""A fit that bears more or less than the force by this part of it has not found a pressure."""
 MOST_ROUNDS = 30
 """Newton steps; four or five suffice."""
 
@@ -125,18 +127,31 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     few = part[:, sample]
     few /= np.maximum(few.sum(axis=1, keepdims=True), np.float32(1e-30))
     # Nearly all of the way on a sample, the rest on all points.
+    linear = field[off]
     for points in ((near_x[:, sample], near_y[:, sample], few), (near_x, near_y, part)):
         field[off] = _fitted(field[off], *points, wanted[off], highest[off], spread[off], blunt)
     kept = np.ones(len(field))
-    kept[off] = np.einsum("nq,nq->n", _pressure(field[off], near_x, near_y, highest[off]), part, dtype=float)
+    kept[off] = _force(field[off], near_x, near_y, highest[off], part)
+    astray = np.flatnonzero(~(np.abs(kept[off] - 1.0) < ASTRAY))  # too few points to fit: the beam's section it is
+    field[off[astray]] = linear[astray]
+    kept[off[astray]] = _force(linear[astray], near_x[astray], near_y[astray], highest[off[astray]], part[astray])
     return PressureField(middle, field[:, 0] / kept, field[:, 1:] / kept[:, None], highest / kept)
+
+
+def _force(field: Array, x: Single, y: Single, highest: Array, share: Single) -> Array:
+    """Part of the force that a pressure bears, (N,)."""
+    return np.asarray(np.einsum("nq,nq->n", _pressure(field, x, y, highest), share, dtype=float))
 
 
 def _fitted(
     field: Array, x: Single, y: Single, share: Single, wanted: Array, highest: Array, spread: Array, blunt: float
 ) -> Array:
-    """Level and slope (N, 3) whose pressure has the `wanted` force and moments (N, 3), by Newton's method."""
+    """Level and slope (N, 3) whose pressure has the `wanted` force and moments (N, 3), by Newton's method.
+
+    A step that leads further off is halved until it does not: the pressure's kinks send whole steps to and fro.
+    """
     scale = np.sqrt(np.einsum("nii->ni", spread))
+    before, nearest = field, np.full(len(field), np.inf)
     for _ in range(MOST_ROUNDS):
         load = _pressure(field, x, y, highest)
         free = (load > 0) & (load < highest.astype(np.float32)[:, None])
@@ -146,11 +161,19 @@ def _fitted(
         far = (np.abs(miss) > CLOSE * scale).any(axis=1)
         if not far.any():
             break
+        off = np.abs(miss / scale).max(axis=1)
+        worse = far & (off >= nearest)
+        nearest = np.where(worse, nearest, off)
         # Where hardly any of the contact is between the limits, the step would be boundless: a little is added.
         system = _moments(free * share, x, y) + np.diag([0.0, blunt, blunt])
         system += 1e-3 * np.eye(3) * scale[:, :, None] ** 2
+        step = np.linalg.solve(system, miss[..., None])[..., 0]
         # Those that are there stay, so that none depends on which others are fitted with it.
-        field = np.where(far[:, None], field - np.linalg.solve(system, miss[..., None])[..., 0], field)
+        stepped = np.where(far[:, None], field - step, field)
+        field, before = (
+            np.where(worse[:, None], (field + before) / 2, stepped),
+            np.where(worse[:, None], before, field),
+        )
     return field
 
 
