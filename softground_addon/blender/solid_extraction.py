@@ -74,6 +74,8 @@ def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, 
         evaluated.to_mesh_clear()
     if not len(triangles):
         raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or choose another object.")
+    if not np.isfinite(vertices).all():
+        raise InputError(f"The mesh of '{thing.name}' holds vertices that are nowhere (NaN or infinite): delete them.")
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
 
 

@@ -154,15 +154,32 @@ def sole_from_underside(
     InputError
         If the mesh has no underside to speak of.
     """
-    return _from_mesh(vertices, triangles, name=name, side=side, ball=ball, band=_UNDERSIDE_BAND)
-
-
-def sole_from_mesh(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "") -> PlacedSole:
-    """Sole of one piece from any mesh, seen from below: a paw, a snowshoe, a sphere.
-
-    Parameters and errors are those of `sole_from_underside`; all of the mesh that can be seen from below counts.
-    """
-    return _from_mesh(vertices, triangles, name=name, side=side, ball=None, band=np.inf)
+    used = np.asarray(vertices, dtype=float)[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
+    extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
+    if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
+        raise InputError(
+            f"The mesh of the sole '{name}' has no underside: it needs faces that look down when it stands. "
+            "Give the sole another object, or let it use the foot bones."
+        )
+    length = float(max(extent))
+    grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
+    heights, coverage = underside_map(
+        np.asarray(vertices, dtype=float),
+        triangles,
+        grid.origin,
+        grid.shape,
+        grid.spacing,
+        band=_UNDERSIDE_BAND * length,
+    )
+    loops = trace_loops(coverage, grid.origin, grid.spacing)
+    loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
+    if not loops:
+        raise InputError(
+            f"The mesh of the sole '{name}' has no underside larger than a point. "
+            "Give the sole another object, or let it use the foot bones."
+        )
+    ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
+    return _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
 
 
 def solid_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "", give: float = 0.0) -> Sole:
@@ -190,32 +207,6 @@ def solid_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side:
     landmarks = supports(solid.probes)
     outline = convex_hull(solid.probes[:, :2])
     return Sole(name, side, (), landmarks, np.zeros(len(landmarks), dtype=np.intp), outline, solid)
-
-
-def _from_mesh(
-    vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str, ball: float | None, band: float
-) -> PlacedSole:
-    used = np.asarray(vertices, dtype=float)[np.unique(triangles)] if len(triangles) else np.empty((0, 3))
-    extent = np.ptp(used[:, :2], axis=0) if len(used) else np.zeros(2)
-    if not np.isfinite(extent).all() or min(extent) <= 1e-4 * max(*extent, 1e-9):
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside: it needs faces that look down when it stands. "
-            "Give the sole another object, or let it use the foot bones."
-        )
-    length = float(max(extent))
-    grid = _Grid.around(used[:, :2], length / NODES_PER_LENGTH)
-    heights, coverage = underside_map(
-        np.asarray(vertices, dtype=float), triangles, grid.origin, grid.shape, grid.spacing, band=band * length
-    )
-    loops = trace_loops(coverage, grid.origin, grid.spacing)
-    loops = [loop for loop in loops if abs(area([loop])) > 2 * grid.spacing**2]
-    if not loops:
-        raise InputError(
-            f"The mesh of the sole '{name}' has no underside larger than a point. "
-            "Give the sole another object, or let it use the foot bones."
-        )
-    ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
-    return _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
 
 
 @dataclass(frozen=True)

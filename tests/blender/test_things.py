@@ -264,6 +264,11 @@ def without_faces(scene, thing):
     thing.data = bpy.data.meshes.new("Empty")
 
 
+def with_a_vertex_nowhere(scene, thing):
+    thing.data.vertices[0].co.x = float("nan")
+    thing.data.update()
+
+
 def weightless(scene, thing):
     scene.softground.characters[0].mass = 0.0
 
@@ -287,6 +292,7 @@ def turned_into_the_ground(scene, thing):
         (growing, "'Ball' changes its size"),
         (squashed, "'Ball' has a scale of zero"),
         (without_faces, "'Ball' has no faces"),
+        (with_a_vertex_nowhere, "mesh of 'Ball' holds vertices that are nowhere"),
         (weightless, "mass of 'Ball'"),
         (unlinked, "object 'Ball' is gone"),
         (removed, "object of 'Ball' is gone"),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
-from softground_addon.core import deformation, heightfield, imprint, smoothing
+from softground_addon.core import deformation, heightfield, imprint, indentation, smoothing, solids
 from softground_addon.core.deformation import (
     GroundMaterial,
     compress,
@@ -30,7 +30,7 @@ coverages = arrays(
 )
 
 
-@pytest.mark.parametrize("module", [deformation, heightfield, imprint, smoothing])
+@pytest.mark.parametrize("module", [deformation, heightfield, imprint, indentation, smoothing, solids])
 def test_the_examples_in_the_docstrings_hold(module):
     assert doctest.testmod(module).failed == 0
 

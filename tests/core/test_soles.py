@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.outlines import area, as_one_polygon, signed_distance, trace_loops
-from softground_addon.core.soles import FOOT_BREADTH, anatomical_sole, sole_from_mesh, sole_from_underside
+from softground_addon.core.soles import FOOT_BREADTH, anatomical_sole, sole_from_underside
 from softground_addon.core.undersides import sample_map
 
 
@@ -163,11 +163,12 @@ def icosphere(radius, rings=60):
 
 def test_a_sphere_is_round_from_below():
     radius = 0.2
-    placed = sole_from_mesh(*icosphere(radius), name="sphere")
+    placed = sole_from_underside(*icosphere(radius), name="sphere", side="")
     (patch,) = placed.sole.patches
     assert placed.placements[0, 2, 3] == pytest.approx(-radius, rel=0.01)
-    assert patch.area == pytest.approx(np.pi * radius**2, rel=0.01)
-    points = radius * np.array([(0.0, 0.0), (0.3, 0.2), (-0.5, 0.4), (0.0, -0.7)])
+    band = 0.1 * 2 * radius  # what lies higher than a tenth of its length is no underside of a foot
+    assert patch.area == pytest.approx(np.pi * (2 * radius * band - band**2), rel=0.01)
+    points = radius * np.array([(0.0, 0.0), (0.3, 0.2), (-0.2, 0.4), (0.0, -0.5)])
     truth = radius - np.sqrt(radius**2 - (points**2).sum(axis=1))
     np.testing.assert_allclose(
         sample_map(patch.heights, points, patch.origin, patch.spacing), truth, atol=0.005 * radius
@@ -175,11 +176,11 @@ def test_a_sphere_is_round_from_below():
 
 
 def test_the_underside_does_not_depend_on_where_and_how_finely_the_mesh_is_made():
-    coarse = sole_from_mesh(*icosphere(0.2, 60), name="a").sole.patches[0]
-    fine = sole_from_mesh(*icosphere(0.2, 150), name="b").sole.patches[0]
+    coarse = sole_from_underside(*icosphere(0.2, 60), name="a", side="").sole.patches[0]
+    fine = sole_from_underside(*icosphere(0.2, 150), name="b", side="").sole.patches[0]
     assert coarse.area == pytest.approx(fine.area, rel=0.005)
     vertices, triangles = icosphere(0.2)
-    moved = sole_from_mesh(vertices + np.array((3.1, -2.7, 5.0)), triangles, name="c").sole.patches[0]
+    moved = sole_from_underside(vertices + np.array((3.1, -2.7, 5.0)), triangles, name="c", side="").sole.patches[0]
     assert moved.area == pytest.approx(coarse.area, rel=0.003)
 
 
@@ -195,7 +196,7 @@ def test_the_underside_does_not_depend_on_where_and_how_finely_the_mesh_is_made(
 )
 def test_a_mesh_without_underside_is_refused_with_its_name(vertices, triangles):
     with pytest.raises(InputError, match="'ghost'"):
-        sole_from_mesh(vertices, triangles, name="ghost")
+        sole_from_underside(vertices, triangles, name="ghost", side="")
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf")])
