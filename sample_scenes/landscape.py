@@ -41,11 +41,11 @@ HILL = np.array((1.1, -1.6))
 
 LANES = {"walker": -0.3, "runner": 1.1, "snowshoes": -1.4, "heavy": -2.5, "light": 2.7}
 """Across the way, where each goes [m]."""
-STARTS = {"walker": 0.3, "runner": 0.9, "snowshoes": -0.7, "heavy": -1.9, "light": -1.0}
+STARTS = {"walker": 0.3, "runner": 0.9, "snowshoes": -0.7, "heavy": -2.2, "light": -1.0}
 """Along the way, where each starts [m]; all go toward -y."""
 
 _WALKER = Body()
-_HEAVY = Body(stature=2.05, mass=230.0, foot=Foot(0.48, 0.20))
+_HEAVY = Body(stature=2.05, mass=270.0, foot=Foot(0.50, 0.20))
 _LIGHT = Body(stature=1.05, mass=9.0, foot=Foot(0.13, 0.055))
 
 
@@ -76,7 +76,7 @@ def motions(rate: float) -> dict[str, tuple[Body, BodyMotion]]:
         "walker": (_WALKER, walk(_WALKER, Gait(), FRAMES, rate)),
         "runner": (_WALKER, run(_WALKER, Run(speed=2.8), round(2.8 * rate), rate, course=course)),
         "snowshoes": (_WALKER, walk(_WALKER, ON_SNOWSHOES, FRAMES, rate)),
-        "heavy": (_HEAVY, walk(_HEAVY, Gait(speed=0.55, step_width=0.10), FRAMES, rate)),
+        "heavy": (_HEAVY, walk(_HEAVY, Gait(speed=0.42, step_width=0.10), FRAMES, rate)),
         "light": (_LIGHT, walk(_LIGHT, Gait(speed=0.8), FRAMES, rate)),
     }
 
