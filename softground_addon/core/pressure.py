@@ -151,30 +151,32 @@ def _fitted(
     A step that leads further off is halved until it does not: the pressure's kinks send whole steps to and fro.
     """
     scale = np.sqrt(np.einsum("nii->ni", spread))
-    before, nearest = field, np.full(len(field), np.inf)
+    damping = np.full(len(field), 1e-3)
+    best, least = field, np.full(len(field), np.inf)
     for _ in range(MOST_ROUNDS):
         load = _pressure(field, x, y, highest)
         free = (load > 0) & (load < highest.astype(np.float32)[:, None])
         load *= share
         miss = np.stack([load.sum(axis=1), np.einsum("nq,nq->n", load, x), np.einsum("nq,nq->n", load, y)], axis=1)
         miss += field * (0.0, blunt, blunt) - wanted
-        far = (np.abs(miss) > CLOSE * scale).any(axis=1)
-        if not far.any():
+        error = np.abs(miss / scale).max(axis=1)
+        # A step that led further off is taken back and tried again, shorter.
+        better = (error < least)[:, None]
+        best, least = np.where(better, field, best), np.minimum(error, least)
+        if (least <= CLOSE).all():
             break
-        off = np.abs(miss / scale).max(axis=1)
-        worse = far & (off >= nearest)
-        nearest = np.where(worse, nearest, off)
-        # Where hardly any of the contact is between the limits, the step would be boundless: a little is added.
         system = _moments(free * share, x, y) + np.diag([0.0, blunt, blunt])
-        system += 1e-3 * np.eye(3) * scale[:, :, None] ** 2
-        step = np.linalg.solve(system, miss[..., None])[..., 0]
+        if better.all():
+            kept_system, kept_miss = system, miss
+        else:
+            kept_system = np.where(better[..., None], system, kept_system)
+            kept_miss = np.where(better, miss, kept_miss)
+        damping = np.where(better[:, 0], np.maximum(damping / 10, 1e-3), damping * 10)
+        damped = kept_system + damping[:, None, None] * np.eye(3) * scale[:, :, None] ** 2
+        step = np.linalg.solve(damped, kept_miss[..., None])[..., 0]
         # Those that are there stay, so that none depends on which others are fitted with it.
-        stepped = np.where(far[:, None], field - step, field)
-        field, before = (
-            np.where(worse[:, None], (field + before) / 2, stepped),
-            np.where(worse[:, None], before, field),
-        )
-    return field
+        field = np.where((least > CLOSE)[:, None], best - step, best)
+    return best
 
 
 def _pressure(field: Array, x: Single, y: Single, highest: Array) -> Single:

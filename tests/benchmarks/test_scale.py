@@ -47,9 +47,7 @@ def test_the_size_of_the_ground_does_not_change_the_time_of_a_bake():
     assert large["seconds"] == pytest.approx(small["seconds"], rel=0.10)
 
 
-@pytest.mark.xfail(
-    reason="halving faces ends at 0.84 to 1.19 cells: with their size, vertices vary by a fifth"
-)
+@pytest.mark.xfail(reason="halving faces ends at 0.84 to 1.19 cells: with their size, vertices vary by a fifth")
 def test_the_size_of_the_ground_does_not_change_the_memory_of_a_bake():
     assert on_ground_of(1000.0)["memory"] == pytest.approx(on_ground_of(10.0)["memory"], rel=0.10)
 

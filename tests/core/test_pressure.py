@@ -119,6 +119,24 @@ def test_a_contact_on_a_line_or_on_nothing_stays_finite():
         assert field.at(x, 0 * x).mean() == pytest.approx(1.0, rel=2e-3)
 
 
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+@pytest.mark.filterwarnings("error")
+def test_contacts_of_any_shape_keep_the_force(seed):
+    """Scattered points, some of them near a line, that touch on one side of a slanting edge."""
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(-0.15, 0.15, (2, 1, random.integers(2, 900)))
+    y, x = np.tile(y * random.uniform(0.001, 1), (8, 1)), np.tile(x, (8, 1))
+    angle, edge = random.uniform(0, 2 * np.pi, (8, 1)), random.uniform(-0.2, 0.2, (8, 1))
+    inside = (x * np.cos(angle) + y * np.sin(angle) - edge) / random.uniform(0.001, 0.05) + 0.5
+    area = 1e-4 * np.clip(inside, 0, 1)
+    pressure = pressure_field(x, y, area, random.uniform(-0.3, 0.3, (8, 2)), 0.005).at(x, y)
+    force = (pressure * area).sum(axis=1)
+    assert force == pytest.approx(area.sum(axis=1), rel=1e-5)
+    assert pressure.min() >= 0
+    assert pressure.max() < 2.5
+
+
 def test_cells_have_the_pressure_of_the_points_in_them():
     x, y, area = points_of("foot")
     field = pressure_field(x, y, area, np.array([[3.03, -2.004]]), 1e-6)
