@@ -35,7 +35,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     show_open(bpy.types.SOFTGROUND_PT_response)
     for _ in range(24):
         yield from hand.key("WHEELUPMOUSE")
-    yield from hand.picture("panel_response")
+    yield from hand.picture("panel_response", in_docs=False)
 
     yield from hand.move(*hand.middle())
     yield from hand.key("Z", ctrl=True)

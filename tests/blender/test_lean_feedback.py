@@ -1,0 +1,33 @@
+"""The two-way loop: the ground that the lean follows from is the ground that the leaning body pressed."""
+
+import bpy
+import numpy as np
+
+from softground_addon.blender import response_job
+from tests.blender import responders, shots
+
+
+def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monkeypatch):
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    scene.softground.tilt.strength = 1.0
+    scene.softground.material.youngs_modulus = 6e4
+    leans, answers = [], []
+    leaning, answers_of = response_job.leaning, response_job.answers_of
+
+    def watched(*arguments):
+        leans.append(leaning(*arguments))
+        return leans[-1]
+
+    def kept(*arguments):
+        answers.extend(answers_of(*arguments))
+        return answers
+
+    monkeypatch.setattr(response_job, "leaning", watched)
+    monkeypatch.setattr(response_job, "answers_of", kept)
+    responders.bake(scene)
+    first, last = leans[0].leans[0], answers[0].response.lean
+    assert np.abs(first).max() > response_job.NOTICEABLE_LEAN, "the body sways over its own prints"
+    assert 2 <= len(leans) < response_job.LEAN_PASSES, "a few passes are enough"
+    pressed_by = leans[-2].leans[0]
+    assert np.abs(last - pressed_by).max() < response_job.NOTICEABLE_LEAN

@@ -1,0 +1,29 @@
+"""The order of a frame: the tilt of frame k sees the ground of frame k - 1."""
+
+import numpy as np
+
+from softground_addon.core.response import TiltOptions, _lean
+from softground_addon.core.tilt import TiltGains
+from tests.core.test_grounding import walk
+
+
+class Sudden:
+    """Level ground that rises by 10° along x from one frame on."""
+
+    def __init__(self, frame):
+        self.frame = frame
+
+    def heights(self, x, y, frame):
+        return np.where(np.asarray(frame) >= self.frame - 1e-9, np.tan(np.radians(10)) * x, 0.0) + 0.0 * y
+
+
+def test_the_lean_answers_what_the_ground_was_one_frame_before_and_nothing_later():
+    motion, touching = walk()
+    tilt = TiltOptions(TiltGains(), strength=1.0)
+    level = _lean(motion, touching, Sudden(np.inf), tilt)
+    for frame in (10.0, 41.0, 60.0):
+        lean = _lean(motion, touching, Sudden(frame), tilt)
+        seen = int(np.searchsorted(motion.frames, frame)) + 1  # the frame after it
+        assert np.array_equal(lean[:seen], level[:seen])
+        assert lean[seen, 0] > 0
+        assert lean[seen + 8, 0] > np.radians(1.0)
