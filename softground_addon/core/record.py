@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .errors import InputError
-from .footprints import Footprint, from_arrays, to_arrays
+from .footprint_arrays import from_arrays, to_arrays
+from .footprints import Footprint
 
 FORMAT = 1
 """Version of the bytes' layout."""

@@ -8,15 +8,14 @@ import pytest
 
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
+from softground_addon.core.footprint_arrays import from_arrays, to_arrays
 from softground_addon.core.footprints import (
     LARGEST_AMOUNT,
     QUANTUM,
     Changes,
     FootprintRecorder,
-    from_arrays,
     last_contact,
     recompose,
-    to_arrays,
 )
 from softground_addon.core.heightfield import FlatTerrain, Window
 from softground_addon.core.simulation import simulate
