@@ -16,6 +16,7 @@ from ..core.footprints import Footprint
 from ..core.heightfield import Terrain
 from ..core.histories import Histories
 from ..core.pressed_ground import GroundSample, PressedGround
+from ..core.timelines import timelines
 from . import created_ground, ground_mesh, playback, trail_detail
 from .created_ground import Layout
 from .jobs import Job, Progress
@@ -137,13 +138,19 @@ def write(
         Metres per Blender unit.
     shape_keys : bool
         See `ground_mesh.write`.
+
+    Raises
+    ------
+    InputError
+        If there is more than can be played; nothing is written then.
     """
+    table = timelines(over_time)
     carrier = place.draft or place.publish()
     ground_mesh.write(carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(carrier, unit_scale)
     if place.draft:
         yield Progress("write", 0.9)
-    playback.install(carrier, place.index, over_time, up=up, frame_rate=frame_rate)
+    playback.install(carrier, place.index, table, up=up, frame_rate=frame_rate)
     if place.draft:
         yield Progress("write", 0.9)
         place.publish()

@@ -8,8 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.histories import Histories
-from ..core.timelines import Timelines, timelines
+from ..core.timelines import Timelines
 from . import playback_nodes as nodes
 
 Array = NDArray[np.float64]
@@ -24,7 +23,7 @@ _VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": 
 
 
 def install(
-    ground: bpy.types.Object, index: Indices, histories: Histories, *, up: Array, frame_rate: float
+    ground: bpy.types.Object, index: Indices, table: Timelines, *, up: Array, frame_rate: float
 ) -> bpy.types.Modifier:
     """Put the playback on a ground, in place of the one that may be there.
 
@@ -35,15 +34,14 @@ def install(
     ----------
     ground : bpy.types.Object
     index : (K,) int array
-        Vertices that the histories' places stand for.
-    histories : Histories
+        Vertices that the places of the timelines stand for.
+    table : Timelines
     up : (3,) float array
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
         Scene frames per second [Hz].
     """
     remove(ground)
-    table = timelines(histories)
     _write_spans(cast("bpy.types.Mesh", ground.data), index, table)
     group = nodes.build(
         table=_table_object(table), bisections=max(table.longest.bit_length(), 1), up=up.tolist(), frame_rate=frame_rate

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import InputError
 from .histories import Histories
 from .ramps import QUANTUM, Ramps
 
@@ -19,6 +20,9 @@ Indices = NDArray[np.intp]
 
 NO_VISIT = 1e9
 """Frame of visits that never come."""
+
+MOST_ROWS = 2**24
+"""Blender's nodes reckon with row numbers in single precision, exact up to here."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,11 @@ def timelines(over_time: Histories) -> Timelines:
 
     Values are rounded to `ramps.QUANTUM`, which those at rest are multiples of.
 
+    Raises
+    ------
+    InputError
+        If there are more than `MOST_ROWS`.
+
     Examples
     --------
     Two overlapping ramps of one place make four rows:
@@ -85,6 +94,11 @@ def timelines(over_time: Histories) -> Timelines:
     point, frame = point[order][new], frame[order][new]
     sizes = [len(heights.point)] * 2 + [len(compression.point)] * 2 + [len(visits.point)]
     parts = np.split(row, np.cumsum(sizes))
+    if len(point) > MOST_ROWS:
+        raise InputError(
+            f"The ground moves too much to be played: {len(point):,} changes where {MOST_ROWS:,} fit. Choose larger "
+            "cells, or bake fewer frames at a time onto grounds of their own."
+        )
     places, first = np.unique(point, return_index=True)
     first = np.append(first, len(point))
     start, end, pressure = _latest(visits.start, visits.end, visits.pressure, parts[4], first)

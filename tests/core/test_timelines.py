@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import softground_addon.core.timelines as timelines_module
 from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.errors import InputError
 from softground_addon.core.histories import Histories, Visits, histories
 from softground_addon.core.ramps import QUANTUM, Ramps
 from softground_addon.core.timelines import NO_VISIT, timelines
@@ -104,3 +106,11 @@ def test_a_walk_takes_few_rows():
 def test_nothing_makes_an_empty_table():
     table = timelines(Histories(NO_RAMPS, NO_RAMPS, no_visits(), 0.0))
     assert len(table.point) == len(table.frame) == table.longest == 0
+
+
+def test_more_rows_than_can_be_told_apart_are_refused(monkeypatch):
+    heights = random_ramps(np.random.default_rng(0), 40, 5)
+    rows = len(timelines(Histories(heights, NO_RAMPS, no_visits(), 0.0)).frame)
+    monkeypatch.setattr(timelines_module, "MOST_ROWS", rows - 1)
+    with pytest.raises(InputError, match="larger cells"):
+        timelines(Histories(heights, NO_RAMPS, no_visits(), 0.0))
