@@ -80,6 +80,7 @@ def test_sand_with_an_angle_of_repose_bakes_within_its_checks_and_leaves_no_stee
 
 
 def test_rolling_pressure_changes_the_prints_and_all_options_bake_within_the_checks(walk):
+    walk.softground.pressure = "UNIFORM"
     even = jobs.run(bake_job.bake(walk, write=False)).report
     walk.softground.pressure = "CENTRE_OF_PRESSURE"
     rolling = jobs.run(bake_job.bake(walk, write=False)).report
