@@ -107,7 +107,7 @@ def test_a_rig_of_2000_bones_is_baked(walker):
 
 
 @pytest.mark.marathon
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(3600)
 def test_an_action_of_100000_frames_is_baked(scene, tmp_path):
     shots.walker(scene, frames=100_000)
     report = tmp_path / "report.json"
