@@ -74,13 +74,23 @@ def claims(built: FourGrounds) -> list[Claim]:
         preset: sum(step.rim_m3 for step in bake.footprints) / sum(step.compressed_m3 for step in bake.footprints)
         for preset, bake in built.bakes.items()
     }
+    sand = close_up_of(built.bakes["Dry Sand"].footprints)
     return [
         Claim("Snow's prints over mud's, in mean depth", depth["Snow"] / depth["Mud"], 1.05, 2.5),
         Claim("Mud's prints over soil's, in mean depth", depth["Mud"] / depth["Soil"], 1.3, 2.5),
         Claim("Soil's prints over sand's, in mean depth", depth["Soil"] / depth["Dry Sand"], 1.3, 2.5),
         Claim("Part of the pressed snow that stands up as a rim", raised["Snow"], 0.099, 0.101),
         Claim("Part of the pressed sand that stands up as a rim", raised["Dry Sand"], 0.99, 1.01),
+        Claim("Rim ahead of the toes in sand over that behind the heel", rim_ahead(sand), 1.2, 4.0),
     ]
+
+
+def rim_ahead(step: Footprint) -> float:
+    """Volume of the rim beyond the toes of a print over that behind its heel, with a centimetre of the print each."""
+    x, y = np.meshgrid(*step.window.centres(step.cell_size))
+    along = (x - step.position[0]) * cos(step.heading) + (y - step.position[1]) * sin(step.heading)
+    of_print, rim = along.ravel()[step.contact_cells], step.tile(step.rim)
+    return float(rim[along > of_print.max() - 0.01].sum() / rim[along < of_print.min() + 0.01].sum())
 
 
 def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
