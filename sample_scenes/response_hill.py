@@ -70,7 +70,7 @@ def claims(built: ResponseHill) -> list[Claim]:
         Claim("Distance of standing soles from the ground without response, 95 % [mm]", gaps["before"], 15, 600),
         Claim("Distance of standing soles from the ground with response, 95 % [mm]", gaps["after"], 0, 2),
         Claim("Rise of the hips without response [m]", float(rise["without"]), 0.0, 0.06),
-        Claim("Rise of the hips with response [m]", float(rise["with"]), 0.35, 0.6),
+        Claim("Rise of the hips with response [m]", float(rise["with"]), 0.35, 0.7),
         Claim("Lean into the rise that the response adds [degrees]", lean["with"] - lean["without"], 2, 20),
     ]
 
