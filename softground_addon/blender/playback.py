@@ -124,8 +124,9 @@ def _table_object(table: Timelines) -> bpy.types.Object:
     mesh.vertices.add(len(table.frame))
     rows = np.stack([table.frame, table.height, table.compression], axis=-1).astype(np.float32)
     contacts = np.stack([table.visit_start, table.visit_end, table.pressure], axis=-1).astype(np.float32)
-    position: Any = mesh.attributes["position"]
-    position.data.foreach_set("vector", rows.ravel())
+    if len(rows):  # a mesh without vertices has no positions either
+        position: Any = mesh.attributes["position"]
+        position.data.foreach_set("vector", rows.ravel())
     _store(mesh, nodes.CONTACT, "FLOAT_VECTOR", contacts)
     return bpy.data.objects.new(TABLE, mesh)
 

@@ -94,7 +94,7 @@ def test_rolling_pressure_changes_the_prints_and_all_options_bake_within_the_che
 
 
 def test_each_side_of_a_painted_border_is_as_if_all_ground_were_like_it(walk):
-    ground = walk.softground.ground = plane(walk)
+    ground = walk.softground.ground = plane(walk, vertices=300)
     modulus = walk.softground.material.youngs_modulus
     alone = {}
     for factor in (1.0, 0.5):
