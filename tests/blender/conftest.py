@@ -1,17 +1,7 @@
-"""Each test starts in an empty file with the add-on registered, and leaves nothing registered behind."""
+"""Each test starts in an empty file with the add-on registered."""
 
 import bpy
 import pytest
-
-import softground_addon
-
-
-@pytest.fixture(scope="session")
-def addon():
-    softground_addon.register()
-    yield
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    softground_addon.unregister()
 
 
 @pytest.fixture

@@ -31,12 +31,10 @@ scenes = pytest.mark.parametrize(
 
 
 @pytest.fixture
-def production():
-    pytest.importorskip("bpy", reason="the sample scenes are built in Blender: pip install bpy==4.5.15")
+def production(addon, scene):
     from sample_scenes import production
 
-    with production.addon():
-        yield production
+    return production
 
 
 @scenes
