@@ -1,7 +1,5 @@
 """A bake that is left at any of its steps has changed nothing."""
 
-from itertools import islice
-
 import bpy
 import pytest
 
@@ -95,9 +93,12 @@ def test_a_bake_with_detail_left_before_its_last_step_leaves_nothing(scene):
     scene.softground.ground = bpy.context.object
     bpy.context.view_layer.update()
     before = fingerprints.of_file()
-    for writing_steps in (1, 3, 6, 9, 12):
+    # How many steps there are depends on the machine, except for the last ones, in which the fine copy is made.
+    for fraction, further in ((0.3, 0), (0.4, 0), (0.5, 0), (0.7, 0), (0.9, 0), (0.9, 1), (0.9, 2)):
         job = bake_job.bake(scene)
-        written = (progress for progress in job if progress.stage == "write")
-        last = list(islice(written, writing_steps))[-1]
+        last = next(progress for progress in job if progress.stage == "write" and progress.fraction >= fraction)
+        for _ in range(further):
+            last = next(job)
+        assert last.fraction < 1.0
         job.close()
         assert fingerprints.of_file() == before, last

@@ -262,7 +262,9 @@ def test_sampling_takes_one_step_per_frame(scene):
     sampling = sample_character(
         scene, moving_human(), map_rig(bpy.data.objects["Human"]), mass=70.0, frame_start=1, frame_end=9
     )
-    assert list(sampling) == list(range(1, 10))
+    steps = list(sampling)
+    assert steps[:9] == list(range(1, 10))
+    assert set(steps[9:]) <= {9}  # the soles are read in steps of their own
 
 
 def test_lengths_are_metres_in_any_unit_and_at_any_object_scale(scene):
