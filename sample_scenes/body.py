@@ -16,26 +16,43 @@ from sample_scenes.motion import Array, Bones
 SIDES = {"L": 1.0, "R": -1.0}
 """Suffix of a side's bones, and the sign of y on that side."""
 
-BONES: Bones = {
+TRUNK: Bones = {
     "hips": ("hips", "spine", None),
     "spine": ("spine", "chest", "hips"),
     "chest": ("chest", "neck", "spine"),
     "neck": ("neck", "head", "chest"),
-    "head": ("head", "crown", "neck"),
 }
-"""Bone name -> (joint at its head, joint at its tail, parent bone); parents come before children."""
+"""What people and animals have in common, without the head."""
 
-for _side in SIDES:
-    BONES |= {
-        f"shoulder.{_side}": (f"collar.{_side}", f"shoulder.{_side}", "chest"),
-        f"upper_arm.{_side}": (f"shoulder.{_side}", f"elbow.{_side}", f"shoulder.{_side}"),
-        f"forearm.{_side}": (f"elbow.{_side}", f"wrist.{_side}", f"upper_arm.{_side}"),
-        f"hand.{_side}": (f"wrist.{_side}", f"fingertips.{_side}", f"forearm.{_side}"),
-        f"thigh.{_side}": (f"hip.{_side}", f"knee.{_side}", "hips"),
-        f"shin.{_side}": (f"knee.{_side}", f"ankle.{_side}", f"thigh.{_side}"),
-        f"foot.{_side}": (f"ankle.{_side}", f"ball.{_side}", f"shin.{_side}"),
-        f"toe.{_side}": (f"ball.{_side}", f"toe.{_side}", f"foot.{_side}"),
+ARM: Bones = {"upper_arm": ("shoulder", "elbow", "shoulder"), "forearm": ("elbow", "wrist", "upper_arm")}
+"""The same of a limb."""
+
+
+def on_both_sides(limbs: Bones) -> Bones:
+    """Limbs on the left and on the right: their bones and joints with the side as suffix, hung on the trunk."""
+    return {
+        f"{bone}.{side}": (f"{head}.{side}", f"{tail}.{side}", parent if parent in TRUNK else f"{parent}.{side}")
+        for side in SIDES
+        for bone, (head, tail, parent) in limbs.items()
     }
+
+
+BONES: Bones = (
+    TRUNK
+    | {"head": ("head", "crown", "neck")}
+    | on_both_sides(
+        {"shoulder": ("collar", "shoulder", "chest")}
+        | ARM
+        | {
+            "hand": ("wrist", "fingertips", "forearm"),
+            "thigh": ("hip", "knee", "hips"),
+            "shin": ("knee", "ankle", "thigh"),
+            "foot": ("ankle", "ball", "shin"),
+            "toe": ("ball", "toe", "foot"),
+        }
+    )
+)
+"""Bone name -> (joint at its head, joint at its tail, parent bone); parents come before children."""
 
 
 @dataclass(frozen=True)

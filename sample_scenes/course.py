@@ -87,3 +87,7 @@ class Course:
             rise = self.heights(ahead[..., 0], ahead[..., 1]) - self.heights(behind[..., 0], behind[..., 1])
             rises.append(np.arctan2(rise, 2 * _REACH))
         return rises[0], rises[1]
+
+
+STRAIGHT = Course()
+"""Along x over level ground."""

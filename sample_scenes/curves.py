@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def monotone_cubic(x: ArrayLike, knots: ArrayLike, values: ArrayLike) -> Array:
-    """Piecewise cubic that never overshoots its knots, so that level stretches stay level (Fritsch & Carlson 1980).
+    """Piecewise cubic that never overshoots its knots, so that level stretches stay level (Fritsch & Butland 1984).
 
     Knots must increase; outside them the end values continue.
     """

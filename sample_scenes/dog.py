@@ -11,35 +11,33 @@ from functools import cached_property
 
 import numpy as np
 
-from sample_scenes.body import SIDES
+from sample_scenes.body import ARM, SIDES, TRUNK, on_both_sides
 from sample_scenes.motion import Array, Bones
 
-DOG_BONES: Bones = {
-    "hips": ("hips", "spine", None),
-    "spine": ("spine", "chest", "hips"),
-    "chest": ("chest", "neck", "spine"),
-    "neck": ("neck", "head", "chest"),
-    "head": ("head", "nose", "neck"),
-    "tail.1": ("tail", "tail_middle", "hips"),
-    "tail.2": ("tail_middle", "tail_tip", "tail.1"),
-}
+DOG_BONES: Bones = (
+    TRUNK
+    | {
+        "head": ("head", "nose", "neck"),
+        "tail.1": ("tail", "tail_middle", "hips"),
+        "tail.2": ("tail_middle", "tail_tip", "tail.1"),
+    }
+    | on_both_sides(
+        {
+            "thigh": ("hip", "knee", "hips"),
+            "shin": ("knee", "hock", "thigh"),
+            "hock": ("hock", "paw", "shin"),
+            "foot": ("paw", "toe", "hock"),
+            "shoulder": ("withers", "shoulder", "chest"),
+        }
+        | ARM
+        | {"pastern": ("wrist", "forepaw", "forearm"), "hand": ("forepaw", "foretoe", "pastern")}
+    )
+)
 """Bone name -> (joint at its head, joint at its tail, parent bone); parents come before children."""
 
-for _side in SIDES:
-    DOG_BONES |= {
-        f"thigh.{_side}": (f"hip.{_side}", f"knee.{_side}", "hips"),
-        f"shin.{_side}": (f"knee.{_side}", f"hock.{_side}", f"thigh.{_side}"),
-        f"hock.{_side}": (f"hock.{_side}", f"paw.{_side}", f"shin.{_side}"),
-        f"foot.{_side}": (f"paw.{_side}", f"toe.{_side}", f"hock.{_side}"),
-        f"shoulder.{_side}": (f"withers.{_side}", f"shoulder.{_side}", "chest"),
-        f"upper_arm.{_side}": (f"shoulder.{_side}", f"elbow.{_side}", f"shoulder.{_side}"),
-        f"forearm.{_side}": (f"elbow.{_side}", f"wrist.{_side}", f"upper_arm.{_side}"),
-        f"pastern.{_side}": (f"wrist.{_side}", f"forepaw.{_side}", f"forearm.{_side}"),
-        f"hand.{_side}": (f"forepaw.{_side}", f"foretoe.{_side}", f"pastern.{_side}"),
-    }
-
 FRONT_SHARE = 0.60
-"""Part of a standing dog's weight on its front legs (Roush and McLaughlin 1994; horses 0.57)."""
+"""Part of a standing dog's weight on its front legs (552 dogs of 123 breeds: "A 60:40 split:
+Differential mass support in dogs", The Anatomical Record, 2020, 10.1002/ar.24407)."""
 
 
 @dataclass(frozen=True)

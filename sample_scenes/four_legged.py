@@ -15,13 +15,13 @@ import numpy as np
 
 from sample_scenes.balance import GRAVITY, CyclicPath, stance_force
 from sample_scenes.body import SIDES
-from sample_scenes.course import Course
+from sample_scenes.course import STRAIGHT, Course
 from sample_scenes.curves import quintic
 from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.footwork import FootCourse, FootPoses, Roll, Swing, footfall_at
 from sample_scenes.limbs import bend_to_reach, hanging
 from sample_scenes.motion import Array, BodyMotion, Footfall, rotation
-from sample_scenes.stride import inward_lean, ride
+from sample_scenes.stride import inward_lean, over_strides, ride
 
 LEGS = {"HL": ("hip", "paw"), "HR": ("hip", "paw"), "FL": ("shoulder", "forepaw"), "FR": ("shoulder", "forepaw")}
 """Suffix of a leg's footfalls -> its uppermost joint and that of its paw; the last letter is the side."""
@@ -140,12 +140,10 @@ def go_on_four_legs(
     frame_count: int,
     frame_rate: float = 24.0,
     start_phase: float = 0.25,
-    course: Course | None = None,
+    course: Course = STRAIGHT,
 ) -> BodyMotion:
     """A walk (`WALK`) or trot (`TROT`) along a course, by default along x; in full stride from first to last frame."""
-    course = course or Course()
-    times = np.arange(frame_count) / frame_rate
-    phase = start_phase + times / gait.stride_time(body)
+    times, phase = over_strides(frame_count, frame_rate, start_phase, gait.stride_time(body))
     footfalls = gait.footfalls(body, course, start_phase, times[-1])
     trunk, centre = _trunk(body, gait, course, times, phase, footfalls)
 

@@ -13,7 +13,7 @@ from math import pi, sqrt
 import numpy as np
 
 from sample_scenes.body import SIDES, Array, Body
-from sample_scenes.course import Course
+from sample_scenes.course import STRAIGHT, Course
 from sample_scenes.curves import quintic
 from sample_scenes.footwork import FootCourse, FootPoses, Roll, Swing
 from sample_scenes.motion import BodyMotion
@@ -26,6 +26,7 @@ from sample_scenes.stride import (
     facing_along,
     foot_poses,
     inward_lean,
+    over_strides,
     ride,
     room_above,
 )
@@ -120,12 +121,10 @@ def walk(
     frame_count: int,
     frame_rate: float = 24.0,
     start_phase: float = 0.25,
-    course: Course | None = None,
+    course: Course = STRAIGHT,
 ) -> BodyMotion:
     """A walk along a course, by default along x from the origin; in full stride from the first frame to the last."""
-    course = course or Course()
-    times = np.arange(frame_count) / frame_rate
-    phase = start_phase + times / gait.stride_time(body)
+    times, phase = over_strides(frame_count, frame_rate, start_phase, gait.stride_time(body))
     local = _hips_path(body, gait, phase, times)
     local[:, 2] += _hips_height(body, gait)
     footfalls = gait.footfalls(body, course, start_phase, times[-1])
@@ -170,7 +169,7 @@ def _hips_height(body: Body, gait: Gait) -> float:
     phase = np.arange(400) / 400
     stride = gait.stride_time(body)
     times = phase * stride
-    feet = foot_poses(dict.fromkeys(SIDES, gait.foot_course(body)), times, gait.footfalls(body, Course(), 0.0, stride))
+    feet = foot_poses(dict.fromkeys(SIDES, gait.foot_course(body)), times, gait.footfalls(body, STRAIGHT, 0.0, stride))
     path = _hips_path(body, gait, phase, times)
     return float(_room(body, path, gait.pelvis(phase), feet).min())
 

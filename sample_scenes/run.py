@@ -16,7 +16,7 @@ import numpy as np
 
 from sample_scenes.balance import GRAVITY, CyclicPath, balanced, rest_centre, stance_force
 from sample_scenes.body import SIDES, Array, Body
-from sample_scenes.course import Course
+from sample_scenes.course import STRAIGHT, Course
 from sample_scenes.curves import clamped_spline
 from sample_scenes.footwork import FootCourse, Roll, Swing
 from sample_scenes.motion import BodyMotion
@@ -137,11 +137,11 @@ def run(
     frame_count: int,
     frame_rate: float = 24.0,
     start_phase: float = 0.25,
-    course: Course | None = None,
+    course: Course = STRAIGHT,
 ) -> BodyMotion:
     """A run along a course, by default along x from the origin; in full stride from the first frame to the last."""
     times = np.arange(frame_count) / frame_rate
-    motion, _ = _run(body, gait, times, frame_rate, start_phase, course or Course(), _centre_height(body, gait))
+    motion, _ = _run(body, gait, times, frame_rate, start_phase, course, _centre_height(body, gait))
     return motion
 
 
@@ -186,7 +186,7 @@ def _centre_height(body: Body, gait: Run) -> float:
     samples = 160
     times = gait.stride_time(body) * np.arange(samples) / samples
     for _ in range(6):
-        height += _run(body, gait, times, samples / gait.stride_time(body), 0.0, Course(), height)[1]
+        height += _run(body, gait, times, samples / gait.stride_time(body), 0.0, STRAIGHT, height)[1]
     return height
 
 

@@ -77,6 +77,12 @@ class Stride(Carriage):
         return tuple(falls)
 
 
+def over_strides(frame_count: int, frame_rate: float, start_phase: float, stride_time: float) -> tuple[Array, Array]:
+    """Times of frames (F,) [s], the first at 0, and how many strides they are from the start of one, (F,)."""
+    times = np.arange(frame_count) / frame_rate
+    return times, start_phase + times / stride_time
+
+
 def ride(times: Array, footfalls: Sequence[Footfall]) -> Array:
     """Height of the ground under a body that goes over footfalls, (F,) [m].
 
