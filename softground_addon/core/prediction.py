@@ -17,10 +17,10 @@ from .contacts import runs
 from .deformation import GroundMaterial, compress, compression_rate, sink, target_compression, touching_fraction
 from .errors import InputError
 from .heightfield import Terrain, TerrainTiles, Window
-from .imprint import contact_window, places, point_contact, sole_points
 from .indentation import Springs
 from .pressure import Pressure, pressure_field
 from .simulation import CharacterLoads
+from .sole_points import contact_window, places, point_contact, sole_points
 from .solid_imprint import ground_under
 from .solids import posed
 

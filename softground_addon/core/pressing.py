@@ -9,12 +9,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from .deformation import GroundMaterial, compress, displaced_volume
+from .bed import Bed, Imprints, Timing
+from .deformation import GroundMaterial, compress
 from .footprints import FootprintRecorder, quantised
 from .heightfield import HeightField, SparseGrid, Surface, Window
 from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
+from .rim import displaced_volume
 from .soft_ground import SoftGround
-from .stance import Bed, Imprints, Stance, Timing
+from .stance import Stance
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .bed import Timing
 from .body_dynamics import body_dynamics
 from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts, runs
@@ -19,13 +20,14 @@ from .footprints import Footprint
 from .forces import ContactForces, impulse_forces, whole_body_forces
 from .free_bodies import free_loads
 from .heightfield import HeightField, Terrain, Window
-from .imprint import sole_points
 from .motion import CharacterMotion, SoleMotion, steps_per_frame
 from .pressing import Press
 from .pressure import Pressure
 from .soft_ground import SoftGround
+from .sole_points import sole_points
+from .sole_stance import SoleStance
 from .solid_stance import SolidStance
-from .stance import SoleStance, Stance, Steps, Timing
+from .stance import Stance, Steps
 from .variation import Variation
 
 Array = NDArray[np.float64]

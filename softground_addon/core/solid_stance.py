@@ -8,13 +8,15 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from .deformation import GroundMaterial, compression_rate, in_contact, rim_weights
+from .bed import Bed, Imprints
+from .deformation import GroundMaterial, compression_rate
 from .heightfield import Surface, Window
 from .indentation import stress
 from .motion import Sole, interpolated_poses
+from .rim import in_contact, rim_weights
 from .solid_imprint import ground_under
 from .solids import Solid, posed
-from .stance import Bed, Imprints, Stance
+from .stance import Stance
 from .variation import Factors
 
 Array = NDArray[np.float64]
@@ -86,10 +88,7 @@ class SolidStance(Stance):
         self._load += float(load.sum())
         self._area = max(self._area, float(area[load > 0].max(initial=0.0)))
         contact = in_contact(coverage)
-        toward = None
-        if material.rim_bias:
-            path = self._between(start, end, parts, before=True)[:, :2, 3]
-            toward = self._leaning(path, step / parts, material.rim_bias, self.solid.size)
+        toward = material.rim_bias * self.lean[steps].repeat(parts, axis=0) if material.rim_bias else None
         rim = rim_weights(coverage, contact, bed.rim_reach, cells.bears, toward)
         rate = np.broadcast_to(compression_rate(step / parts, material, sinkage, self._descent / step), sinkage.shape)
         holds = None
@@ -106,6 +105,14 @@ class SolidStance(Stance):
         before = np.concatenate([self._steps.approach[-1:], self._steps.poses])[max(0, step)]
         travel: Array = pose[:2, 3] - before[0, :2, 3]
         return travel if np.linalg.norm(travel) > STANDSTILL * self.solid.size else pose[:2, 0]
+
+    @property
+    def _length(self) -> float:
+        return self.solid.size
+
+    def _middles(self, poses: Array) -> Array:
+        middle: Array = poses[:, 0, :3, 3]
+        return middle
 
     def _between(self, start: int, end: int, parts: int, *, before: bool = False) -> Array:
         """Poses (N, 4, 4) of these steps, each in so many parts; with that of the step before, if asked."""

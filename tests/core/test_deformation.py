@@ -9,20 +9,17 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
-from softground_addon.core import deformation, heightfield, imprint, indentation, smoothing, solids
+from softground_addon.core import deformation, heightfield, indentation, rim, smoothing, solids
 from softground_addon.core.deformation import (
     GroundMaterial,
     compress,
     compression_rate,
-    dilate,
-    displaced_volume,
     equilibrium_depth,
-    in_contact,
-    rim_weights,
     sink,
     target_compression,
     touching_fraction,
 )
+from softground_addon.core.rim import dilate, displaced_volume, in_contact, rim_weights
 
 SNOW = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
 coverages = arrays(
@@ -30,7 +27,7 @@ coverages = arrays(
 )
 
 
-@pytest.mark.parametrize("module", [deformation, heightfield, imprint, indentation, smoothing, solids])
+@pytest.mark.parametrize("module", [deformation, heightfield, indentation, rim, smoothing, solids])
 def test_the_examples_in_the_docstrings_hold(module):
     assert doctest.testmod(module).failed == 0
 

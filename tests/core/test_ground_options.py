@@ -13,18 +13,17 @@ from softground_addon.core.deformation import (
     compress,
     compression_rate,
     equilibrium_depth,
-    in_contact,
-    rim_weights,
     target_compression,
 )
 from softground_addon.core.footprints import QUANTUM, recompose
 from softground_addon.core.heightfield import FlatTerrain, HeightField
+from softground_addon.core.rim import LEANING_DISTANCE, in_contact, lean_of_landing, leaning, rim_weights
 from softground_addon.core.simulation import Simulation, simulate
 from softground_addon.core.soft_ground import SoftGround
 from tests.core.test_ground_invariants import Hills, random_loads
 from tests.core.test_pressure import rolling
 from tests.core.test_simulation import piece
-from tests.core.walkers import box_sole, loads_of, pose, pressed, standing, walk
+from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, loads_of, pose, pressed, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 SAND = GroundMaterial(0.33e6, 0.5, 0.05)
@@ -86,6 +85,49 @@ def test_a_sole_that_slides_piles_up_the_rim_ahead_and_one_that_stands_does_not(
         assert footprint.rim_m3 == pytest.approx(footprint.compressed_m3, rel=1e-9)
     assert ahead["stands"] == pytest.approx(1.0, rel=0.05)
     assert ahead["slides"] > 4
+
+
+@given(st.lists(st.tuples(*2 * [st.floats(-0.05, 0.05)]), min_size=1, max_size=6), st.integers(1, 9))
+def test_the_lean_depends_on_the_way_of_the_sole_and_not_on_the_steps_it_is_sampled_in(moves, parts):
+    corners = np.concatenate([np.zeros((1, 3)), np.cumsum([(*move, 0.01) for move in moves], axis=0)])
+    fine = np.stack(
+        [np.interp(np.arange(len(moves) * parts + 1) / parts, np.arange(len(corners)), c) for c in corners.T]
+    )
+    start = np.array([0.6, -0.3])
+    whole = leaning(corners, 0.27, start)
+    assert leaning(fine.T, 0.27, start)[parts - 1 :: parts] == pytest.approx(whole, abs=1e-6)
+    assert np.linalg.norm(whole, axis=1).max() <= 1 + 1e-12
+
+
+def test_a_sole_that_moves_turns_its_lean_by_an_exponential_of_the_distance():
+    distance = 2 * LEANING_DISTANCE * 0.27
+    (lean,) = leaning(np.array([[0, 0, 0], [0, distance, 0]]), 0.27, np.array([1.0, 0.0]))
+    assert lean == pytest.approx([np.exp(-2), 1 - np.exp(-2)])
+
+
+@pytest.mark.parametrize(("way", "expected"), [((0, 0, -0.02), 0), ((0.02, 0, -0.02), 0.5**0.5), ((0.02, 0, 0), 1)])
+def test_a_rim_leans_the_way_that_the_sole_comes_seen_from_above(way, expected):
+    path = np.outer(np.arange(2), way)
+    assert lean_of_landing(path, 0.27) == pytest.approx([expected, 0], abs=0.015)
+    assert not lean_of_landing(0 * path, 0.27).any()
+
+
+@pytest.mark.parametrize("material", [SAND, replace(SAND, poisson_ratio=0.35, characteristic_time=0.15)])
+@pytest.mark.parametrize("heading", [0.0, 2.5])
+def test_the_rim_of_a_walking_foot_is_highest_at_its_toes(material, heading):
+    """Without a bias it is highest where the heel struck."""
+    at = {}
+    for bias in (0.0, 0.6):
+        ground, steps = pressed(walk(heading=heading, steps=4), replace(material, rim_bias=bias), 0.01)
+        x, y = np.meshgrid(*steps[1].window.centres(0.01))
+        along = (x - steps[1].position[0]) * np.cos(heading) + (y - steps[1].position[1]) * np.sin(heading)
+        of_print = along.ravel()[steps[1].contact_cells]
+        compression, rim = ground.read(steps[1].window)
+        highest = along.ravel()[np.argmax(rim - compression)]
+        at[bias] = (highest - of_print.min()) / np.ptp(of_print)
+        assert steps[1].rim_m3 == pytest.approx(2 * material.poisson_ratio * steps[1].compressed_m3, rel=1e-9)
+    assert at[0.0] < 0.5
+    assert at[0.6] > BALL / FOOT_LENGTH + 0.1
 
 
 # Time from the speed of landing

@@ -6,15 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.heightfield import FlatTerrain, TerrainTiles
-from softground_addon.core.imprint import (
-    TOLERANCE,
-    cell_coverage,
-    centroid,
-    contact_window,
-    point_contact,
-    sole_points,
-)
+from softground_addon.core.imprint import cell_coverage
 from softground_addon.core.motion import Sole
+from softground_addon.core.sole_points import TOLERANCE, centroid, contact_window, point_contact, sole_points
 from tests.core.walkers import box_sole, foot_sole, pose, sphere_sole
 
 LENGTH, WIDTH = 0.25, 0.09
