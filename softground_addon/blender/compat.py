@@ -65,3 +65,13 @@ def set_slot(owner: Any, slot: Any) -> None:
 def remove_scene(scene: bpy.types.Scene) -> None:
     """Remove a scene. `bpy.data.scenes.remove` crashes Blender where it has no window: in `--background --command`."""
     bpy.data.batch_remove([scene])
+
+
+def straighten(curves: Any) -> None:
+    """Make polylines of all splines of curves. Before 4.3 a spline of one point is added, which is in nobody's way."""
+    if hasattr(curves, "set_types"):
+        curves.set_types(type="POLY")
+    else:
+        kinds = curves.attributes.new("curve_type", "INT8", "CURVE")
+        kinds.data.foreach_set("value", [1] * len(curves.curves))
+        curves.add_curves([1])  # lets Blender count the kinds anew

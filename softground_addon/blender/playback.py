@@ -1,15 +1,17 @@
-"""Playing a bake on the ground: its record as a table, and the modifier that looks it up over time."""
+"""Playing a bake on the ground: its record as splines over time, and the modifier that samples them."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.polylines import Polylines, polylines
 from ..core.timelines import Timelines
 from . import playback_nodes as nodes
+from .compat import straighten
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -18,8 +20,8 @@ MODIFIER = "SoftGround Playback"
 
 TABLE = "SoftGround Timelines"
 
-_ATTRIBUTES = (nodes.MOVED, nodes.ACTIVE, nodes.SPAN, nodes.FIRST_ROW, nodes.LAST_ROW, nodes.PRESSURE)
-_VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector"}
+_ATTRIBUTES = (nodes.MOVED, nodes.SPLINE, nodes.PRESSURE)
+_VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_COLOR": "color"}
 
 
 def install(
@@ -42,10 +44,8 @@ def install(
         Scene frames per second [Hz].
     """
     remove(ground)
-    _write_spans(cast("bpy.types.Mesh", ground.data), index, table)
-    group = nodes.build(
-        table=_table_object(table), bisections=max(table.longest.bit_length(), 1), up=up.tolist(), frame_rate=frame_rate
-    )
+    _write_splines(cast("bpy.types.Mesh", ground.data), index[table.point])
+    group = nodes.build(table=_table_object(polylines(table)), up=up.tolist(), frame_rate=frame_rate)
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
     modifier.show_in_editmode = False
@@ -80,9 +80,9 @@ def _remove_group(group: bpy.types.NodeTree) -> None:
     table = nodes.table_of(group)
     bpy.data.node_groups.remove(group)
     if table is not None and not table.users:
-        mesh = cast("bpy.types.Mesh", table.data)
+        splines: Any = table.data
         bpy.data.objects.remove(table)
-        bpy.data.meshes.remove(mesh)
+        bpy.data.hair_curves.remove(splines)
 
 
 def is_playback_attribute(name: str) -> bool:
@@ -100,42 +100,43 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     return np.flatnonzero(moves)
 
 
-def _write_spans(mesh: bpy.types.Mesh, index: Indices, table: Timelines) -> None:
-    """Store which vertices the bake moves, from when to when, how far in all, and where their rows are."""
-    vertex = index[table.point]
-    last = table.first[1:] - 1
+def _write_splines(mesh: bpy.types.Mesh, vertex: Indices) -> None:
+    """Store which vertices the bake moves, one per spline (P,)."""
     moved = np.zeros(len(mesh.vertices), dtype=bool)
     moved[vertex] = True
-    spans = np.zeros((len(moved), 3), dtype=np.float32)
-    spans[vertex] = np.stack([table.frame[table.first[:-1]], table.frame[last], table.height[last]], axis=-1)
-    _store(mesh, nodes.MOVED, "BOOLEAN", moved)
-    _store(mesh, nodes.ACTIVE, "BOOLEAN", np.zeros_like(moved))  # what is there is overwritten faster than made
-    _store(mesh, nodes.SPAN, "FLOAT_VECTOR", spans)
-    _store(mesh, nodes.PRESSURE, "FLOAT", np.zeros(len(moved), dtype=np.float32))
-    for name, rows in ((nodes.FIRST_ROW, table.first[:-1]), (nodes.LAST_ROW, last)):
-        numbers = np.zeros(len(moved), dtype=np.int32)
-        numbers[vertex] = rows
-        _store(mesh, name, "INT", numbers)
-
-
-def _table_object(table: Timelines) -> bpy.types.Object:
-    """The table as the vertices of a mesh that is in no scene."""
-    mesh = bpy.data.meshes.new(TABLE)
-    mesh.vertices.add(len(table.frame))
-    rows = np.stack([table.frame, table.height, table.compression], axis=-1).astype(np.float32)
-    contacts = np.stack([table.visit_start, table.visit_end, table.pressure], axis=-1).astype(np.float32)
-    if len(rows):  # a mesh without vertices has no positions either
-        position: Any = mesh.attributes["position"]
-        position.data.foreach_set("vector", rows.ravel())
-    _store(mesh, nodes.CONTACT, "FLOAT_VECTOR", contacts)
-    return bpy.data.objects.new(TABLE, mesh)
-
-
-def _store(
-    mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "INT", "BOOLEAN", "FLOAT_VECTOR"], values: NDArray[Any]
-) -> None:
-    """A new point attribute; the one that the user has active stays so."""
+    number = np.zeros(len(moved), dtype=np.int32)
+    number[vertex] = np.arange(len(vertex))
     active = mesh.attributes.active_index
-    attribute: Any = mesh.attributes.new(name, kind, "POINT")
+    _store(mesh, nodes.MOVED, "BOOLEAN", moved)
+    _store(mesh, nodes.SPLINE, "INT", number)
+    # What is there is overwritten faster than made.
+    _store(mesh, nodes.PRESSURE, "FLOAT", np.zeros(len(moved), dtype=np.float32))
+    mesh.attributes.active_index = active  # the one that the user has active stays so
+
+
+def _table_object(lines: Polylines) -> bpy.types.Object:
+    """The timelines as the splines of an object that is in no scene."""
+    splines = bpy.data.hair_curves.new(TABLE)
+    size = np.diff(lines.first)
+    if len(size):
+        splines.add_curves(size.tolist())
+        position = np.zeros((len(lines.frame), 3), dtype=np.float32)
+        position[:, 0] = lines.frame
+        along: Any = splines.attributes["position"]
+        along.data.foreach_set("vector", position.ravel())
+    _store(splines, nodes.STATE, "FLOAT_COLOR", lines.state)
+    last = lines.state[lines.first[1:] - 1]
+    for name, kind, values in (
+        (nodes.STATE_NOW, "FLOAT_COLOR", last),
+        (nodes.START, "FLOAT", lines.start),
+        (nodes.END, "FLOAT", lines.end),
+    ):
+        _store(splines, name, kind, values, domain="CURVE")
+    if len(size):
+        straighten(splines)
+    return bpy.data.objects.new(TABLE, splines)
+
+
+def _store(geometry: Any, name: str, kind: str, values: NDArray[Any], *, domain: str = "POINT") -> None:
+    attribute: Any = geometry.attributes.new(name, kind, domain)
     attribute.data.foreach_set(_VALUE[kind], values.ravel())
-    mesh.attributes.active_index = active

@@ -1,7 +1,7 @@
-"""All that happens to each place of the ground in one table: what it is like at a time is found by bisection.
+"""All that happens to each place of the ground in one table: its rows are in the order of time.
 
 Ramps and visits of a place overlap, and how many there are depends on how often it is stepped on. Put together they
-are a polyline per place, whose rows are looked up by time: the work grows with the logarithm of their number.
+are a polyline per place: what it is like at a time lies between two rows.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Indices = NDArray[np.intp]
 NO_VISIT = 1e9
 """Frame of visits that never come."""
 
-MOST_ROWS = 2**24
-"""Blender's nodes reckon with row numbers in single precision, exact up to here."""
+MOST_ROWS = 2**29
+"""Blender numbers points with 32 bits; a row becomes four of them at most (see `polylines`)."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,118 @@
+"""Timelines as polylines over time, the form in which Blender's nodes sample them.
+
+Between two points all is linear; where something jumps, two points share a frame. The pressure of a contact, which
+timelines tell by its frames and its peak, becomes points too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .timelines import Timelines
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Floats = NDArray[np.float32]
+
+LOADING = 0.2
+"""Part of a contact over which the pressure rises, and again falls: about that of a walking step."""
+
+
+@dataclass(frozen=True)
+class Polylines:
+    """The state of P places over time, as R points.
+
+    Attributes
+    ----------
+    first : (P + 1,) int array
+        Where the points of each place begin, and of the last end.
+    frame : (R,) float32 array
+        Frames since the first of the place, ascending.
+    state : (R, 4) float32 array
+        Change of the displayed height [m], displayed compression [m], last frame of the latest contact that has begun
+        (`timelines.NO_VISIT` where there was none), and the pressure [Pa].
+    start, end : (P,) float32 arrays
+        First and last frame of each place: before, nothing has happened to it; after, all but the pressure, which is
+        none, stays as it is at the last.
+    """
+
+    first: Indices
+    frame: Floats
+    state: Floats
+    start: Floats
+    end: Floats
+
+
+def polylines(table: Timelines) -> Polylines:
+    """The timelines as polylines.
+
+    Examples
+    --------
+    A contact from frame 2 to 12 on ground that does not move:
+
+    >>> from softground_addon.core.histories import Histories, Visits
+    >>> from softground_addon.core.ramps import Ramps
+    >>> from softground_addon.core.timelines import timelines
+    >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
+    >>> lines = polylines(timelines(Histories(Ramps.joined([]), Ramps.joined([]), visits, 0.0)))
+    >>> lines.start.tolist(), lines.frame.tolist(), lines.state[:, 3].tolist()
+    ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
+    """
+    place = np.repeat(np.arange(len(table.point)), np.diff(table.first))
+    row, frame = _with_turns(table, place)
+    jump = np.flatnonzero(table.frame == table.visit_start)
+    jump = jump[np.isin(jump, table.first, invert=True)]
+    # A point on either side of each jump: that before belongs to the contact of the row before.
+    points = np.concatenate([jump - 1, row])
+    when = np.concatenate([table.frame[jump], frame])
+    after = np.repeat([0, 1], [len(jump), len(row)])
+    order = np.lexsort((after, when, place[points]))
+    points, when = points[order], when[order]
+    size = np.bincount(place[points], minlength=len(table.point))
+    start = table.frame[table.first[:-1]]
+    return Polylines(
+        first=np.concatenate([[0], np.cumsum(size)]),
+        frame=(when - np.repeat(start, size)).astype(np.float32),
+        state=_states(table, points, when),
+        start=start.astype(np.float32),
+        end=table.frame[table.first[1:] - 1].astype(np.float32),
+    )
+
+
+def _with_turns(table: Timelines, place: Indices) -> tuple[Indices, Array]:
+    """The rows and frames of all points but those before jumps: the table's own, and where the pressure turns."""
+    contact = np.flatnonzero((table.frame == table.visit_start) & (table.visit_end > table.visit_start))
+    length = table.visit_end[contact] - table.visit_start[contact]
+    turns = [table.visit_start[contact] + part * length for part in (LOADING, 1.0 - LOADING)]
+    own = np.arange(len(place))
+    when = np.concatenate([table.frame, *turns])
+    source = np.concatenate([own, contact, contact])
+    order = np.lexsort((np.arange(len(when)) >= len(own), when, place[source]))
+    row = np.maximum.accumulate(np.where(order < len(own), order, -1))
+    # A turn counts while its contact is the latest, and where there is no row already.
+    kept = (order < len(own)) | (
+        (table.visit_start[row] == table.visit_start[source[order]]) & (table.frame[row] < when[order])
+    )
+    return row[kept], when[order][kept]
+
+
+def _states(table: Timelines, row: Indices, frame: Array) -> Floats:
+    """The states at given frames, each between a row and the next, (N, 4)."""
+    following = np.minimum(row + 1, max(len(table.frame) - 1, 0))
+    run = table.frame[following] - table.frame[row]
+    since = frame - table.frame[row]
+    share = np.divide(since, run, out=np.zeros(len(row)), where=since > 0)
+    begin, end = table.visit_start[row], table.visit_end[row]
+    passed = np.divide(frame - begin, end - begin, out=np.zeros(len(row)), where=end > begin)
+    loaded = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0)
+    return np.stack(
+        [
+            *(values[row] + share * (values[following] - values[row]) for values in (table.height, table.compression)),
+            end,
+            loaded * table.pressure[row],
+        ],
+        axis=-1,
+    ).astype(np.float32)
