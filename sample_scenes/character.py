@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -100,18 +101,20 @@ def _meshes(armature: bpy.types.Object) -> Iterable[bpy.types.Object]:
 
 
 def _assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.ndarray) -> None:
-    """Write weights bone by bone, small ones dropped; equal values go in one call, on a grid of 1/500."""
-    steps = 500
-    kept = np.round(
-        np.where(weights < 0.01, 0.0, weights) / np.where(weights < 0.01, 0, weights).sum(1, keepdims=True) * steps
-    )
-    strongest = kept.argmax(axis=1)
-    kept[np.arange(len(kept)), strongest] += steps - kept.sum(axis=1)
-    for column, bone in enumerate(bones):
-        group = skin.vertex_groups.new(name=bone)
-        for level in np.unique(kept[:, column]):
-            if level > 0:
-                group.add(np.flatnonzero(kept[:, column] == level).tolist(), float(level / steps), "REPLACE")
+    """Write the weights (V, B), small ones dropped. Blender's call for it takes a hundred times longer than BMesh."""
+    for bone in bones:
+        skin.vertex_groups.new(name=bone)
+    kept = np.where(weights < 0.01, 0.0, weights)
+    kept /= kept.sum(axis=1, keepdims=True)
+    mesh = bmesh.new()
+    mesh.from_mesh(skin.data)
+    groups = mesh.verts.layers.deform.verify()
+    vertices = list(mesh.verts)
+    rows, columns = kept.nonzero()
+    for row, column, weight in zip(rows.tolist(), columns.tolist(), kept[rows, columns].tolist(), strict=True):
+        vertices[row][groups][column] = weight
+    mesh.to_mesh(skin.data)
+    mesh.free()
 
 
 def _material(part: str) -> bpy.types.Material:
