@@ -12,8 +12,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..core.errors import InputError
-from . import bake_report, baked_ground, exports, image_exports, settings
-from .operators import reports_errors
+from . import bake_report, exports, image_exports, settings
+from .operators import OnBake, reports_errors
 from .translation import rpt_
 
 LARGEST_IMAGE = 16384
@@ -147,19 +147,7 @@ def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
     return ground
 
 
-class _OnBake:
-    """Operators that need a bake on the ground."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is a bake on the scene's ground."""
-        ground = settings.scene_of(context).softground.ground
-        operator: Any = cls
-        operator.poll_message_set("Bake the footprints first")
-        return ground is not None and baked_ground.is_baked(ground)
-
-
-class SOFTGROUND_OT_export(_OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
     """Write the baked ground for other programs: Alembic, USD, a point cache, image sequences or the final mesh"""
 
     bl_idname = "softground.export"
@@ -243,7 +231,7 @@ class SOFTGROUND_OT_export(_OnBake, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_final_mesh(_OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
     """Add the ground as it stands after the last step to the scene: a plain mesh of its own, with nothing that moves"""
 
     bl_idname = "softground.final_mesh"

@@ -17,7 +17,7 @@ from ..core import files, record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
 from . import baked_ground, compat, ground_mesh, settings
-from .operators import reports_errors
+from .operators import OnBake, reports_errors
 from .translation import rpt_
 
 Array = NDArray[np.float64]
@@ -124,19 +124,7 @@ def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
     return footprints, np.arange(first, last + 1, dtype=float)
 
 
-class _OnBake:
-    """Operators that need a bake on the ground."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is a bake on the scene's ground."""
-        ground = settings.scene_of(context).softground.ground
-        operator: Any = cls
-        operator.poll_message_set("Bake the footprints first")
-        return ground is not None and baked_ground.is_baked(ground)
-
-
-class SOFTGROUND_OT_force_curves(_OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
     """Put force and contact of every sole on an empty, as animated properties for the Graph Editor and for drivers"""
 
     bl_idname = "softground.force_curves"
@@ -151,7 +139,7 @@ class SOFTGROUND_OT_force_curves(_OnBake, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_export_forces(_OnBake, bpy.types.Operator):
+class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
     """Write force and contact of every sole at every frame to a table (CSV)"""
 
     bl_idname = "softground.export_forces"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import wraps
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 import bpy
 
@@ -33,6 +33,17 @@ def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -
             return {"CANCELLED"}
 
     return guarded
+
+
+class OnBake:
+    """Operators that need a bake on the ground."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is a bake on the scene's ground."""
+        ground = settings.scene_of(context).softground.ground
+        cast("Any", cls).poll_message_set("Bake the footprints first")
+        return ground is not None and baked_ground.is_baked(ground)
 
 
 class SOFTGROUND_OT_add_character(bpy.types.Operator):
@@ -94,12 +105,14 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
 
 
 def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object if it is a selected mesh that no character wears and that does not print itself."""
+    """The active object if it is a selected mesh that no character wears or carries and that does not print itself."""
     thing = context.active_object
     if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
         return None
     characters = settings.scene_of(context).softground.characters
-    return None if any(sole.object == thing for one in characters for sole in one.soles) else thing
+    above = character_setup.ancestors(thing)
+    belongs = any(one.armature in above or any(sole.object == thing for sole in one.soles) for one in characters)
+    return None if belongs else thing
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):

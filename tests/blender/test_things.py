@@ -75,6 +75,20 @@ def test_the_thing_that_was_just_added_is_not_taken_as_the_ground(scene):
     assert scene.softground.ground not in (None, thing)
 
 
+@pytest.mark.parametrize("is_contact", [True, False])
+def test_what_a_character_carries_is_not_taken_as_the_ground(scene, is_contact):
+    armature = shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_cube_add(size=0.1)
+    shoe = bpy.context.active_object
+    shoe.parent, shoe.parent_type, shoe.parent_bone = armature, "BONE", "foot.L"
+    if is_contact:
+        assert bpy.ops.softground.add_contact() == {"FINISHED"}
+    assert (bpy.context.active_object, shoe.select_get()) == (shoe, True)
+    bpy.ops.softground.create_ground()
+    assert scene.softground.ground not in (None, shoe)
+
+
 def test_a_thing_beside_a_character_that_answers_the_ground(scene):
     add_character(scene, shots.walker(scene, frames=30))
     thing = ball(location=(3, 0, 0))
