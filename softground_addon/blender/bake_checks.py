@@ -38,8 +38,8 @@ RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
 
 
-def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: bpy.types.Object | None) -> None:
-    """Raise InputError if nothing touches the ground, or where the ground has two layers under a foot."""
+def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
+    """Raise InputError if nothing touches the ground of that name, or where it has two layers under a foot."""
     place = np.concatenate(
         [
             sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
@@ -47,7 +47,7 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: bp
             for number, sole in enumerate(character.motion.soles)
         ]
     )
-    name = f"'{ground.name}'" if ground else "the ground"
+    name = f"'{ground}'" if ground else "the ground"
     if not len(place):
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         raise InputError(

@@ -38,6 +38,7 @@ from . import (
 from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detail
 from .character_setup import characters_of, movers_of
 from .jobs import Job, Progress, aside
+from .materials import drafted
 from .properties import SoftGroundCharacter
 from .shots import Shot, estimate_shot, read_shot
 
@@ -89,7 +90,9 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     loads, footprints, forces, answers = yield from _press(scene, shot)
     simulated = time.perf_counter()
 
-    yield Progress("write", 0.0)
+    gaps = response_job.gap_table(answers)
+    if gaps is None:
+        gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
     layers = (yield from _layers(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
     if shot.surface and shot.surface.factors is not None:
@@ -124,8 +127,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
             *response_job.warnings(answers),
         ],
         forces=forces if options.keep_forces else None,
-        gaps_mm=response_job.gap_table(answers)
-        or response_job.gaps_left(loads, shot.motions, shot.terrain, footprints),
+        gaps_mm=gaps,
         worst_gaps=response_job.worst_gaps(answers),
         suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
     )
@@ -172,6 +174,8 @@ def _write(
         if shot.surface is None:
             lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
             layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, unit_scale)
+            drafts.enter_context(drafted(options.material.surface))
+            yield Progress("write", 0.3)
             ground = drafts.enter_context(created_ground.draft(layout))
             inputs["ground"] = ground.name
             vertices = layout.vertices
@@ -189,9 +193,8 @@ def _write(
                 mesh = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
                 yield Progress("write", 0.4)
                 fine = refinement.vertices(surface)
-                place = yield from aside(
-                    "write", 0.4, baked_ground.on_detail, ground, mesh, fine, pressed, shot.terrain
-                )
+                index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, fine, pressed, shot.terrain)
+                place = baked_ground.on_detail(ground, mesh, index, fine)
             warnings += coverage_warnings(ground, cover, options.detail, cell_size)
         input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
         stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import bpy
@@ -13,13 +14,13 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
-from ..core.heightfield import Terrain
 from ..core.histories import Histories
+from ..core.polylines import polylines
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.timelines import timelines
 from . import created_ground, ground_mesh, playback, trail_detail
 from .created_ground import Layout
-from .jobs import Job, Progress
+from .jobs import Job, Progress, aside
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -35,16 +36,19 @@ class Place:
         Vertices of the carrier's mesh that the bake moves.
     position : (K, 3) float array
         Their undisturbed world positions [m].
+    carrier : bpy.types.Object
+        What takes the prints.
     publish : callable
-        Takes away what stands there now, and returns the carrier: the object that takes the prints.
-    draft : bpy.types.Object, optional
-        The carrier where it is a new object, in no scene yet.
+        Takes away what stands in its way, and shows the carrier.
+    is_draft : bool
+        Whether the carrier is a new object, in no scene yet.
     """
 
     index: Indices
     position: Array
-    publish: Callable[[], bpy.types.Object]
-    draft: bpy.types.Object | None = None
+    carrier: bpy.types.Object
+    publish: Callable[[], object]
+    is_draft: bool = False
 
 
 def carrier_of(ground: bpy.types.Object) -> bpy.types.Object:
@@ -65,48 +69,24 @@ def clear(ground: bpy.types.Object) -> None:
 
 def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, pressed: PressedGround) -> Place:
     """A ground that is not in the scene yet."""
-
-    def publish() -> bpy.types.Object:
-        created_ground.publish(scene, draft)
-        return draft
-
     index = np.flatnonzero(pressed.covers(*layout.vertices[:, :2].T))
-    return Place(index, layout.vertices[index], publish, draft)
+    return Place(index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft), is_draft=True)
 
 
-def on_detail(
-    ground: bpy.types.Object, draft: bpy.types.Object, vertices: Array, pressed: PressedGround, terrain: Terrain
-) -> Place:
-    """The ground refined along the trail; a bake that lies on the ground itself is taken off.
+def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:
+    """A draft of the ground refined along the trail; a bake that lies on the ground itself is taken off."""
 
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    draft : bpy.types.Object
-        A draft of the refined ground.
-    vertices : (V, 3) float array
-        World positions of its vertices [m].
-    pressed : PressedGround
-    terrain : Terrain
-    """
-
-    def publish() -> bpy.types.Object:
+    def publish() -> None:
         ground_mesh.restore(ground)
-        return trail_detail.publish(ground, draft)
+        trail_detail.publish(ground, draft)
 
-    index = ground_mesh.pressed_vertices(vertices, pressed, terrain)
-    is_first = trail_detail.detail_of(ground) is None
-    return Place(index, vertices[index], publish, draft if is_first else None)
+    there = trail_detail.detail_of(ground)
+    return Place(index, vertices[index], there or draft, publish, is_draft=there is None)
 
 
 def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """The ground itself; a detail that stood in for it is taken away."""
-
-    def publish() -> bpy.types.Object:
-        trail_detail.remove(ground)
-        return ground
-
-    return Place(index, vertices[index], publish)
+    return Place(index, vertices[index], ground, partial(trail_detail.remove, ground))
 
 
 def write(
@@ -144,17 +124,21 @@ def write(
     InputError
         If there is more than can be played; nothing is written then.
     """
-    table = timelines(over_time)
-    carrier = place.draft or place.publish()
-    ground_mesh.write(carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
-    up = ground_mesh.up_of(carrier, unit_scale)
-    if place.draft:
+    table = yield from aside("write", 0.9, timelines, over_time)
+    lines = yield from aside("write", 0.9, polylines, table)
+    up = ground_mesh.up_of(place.carrier, unit_scale)
+    with playback.player(lines, up=up, frame_rate=frame_rate) as group:
         yield Progress("write", 0.9)
-    playback.install(carrier, place.index, table, up=up, frame_rate=frame_rate)
-    if place.draft:
-        yield Progress("write", 0.9)
-        place.publish()
-    return carrier
+        if not place.is_draft:
+            place.publish()
+        ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+        if place.is_draft:
+            yield Progress("write", 0.9)
+        playback.attach(place.carrier, place.index[table.point], group)
+        if place.is_draft:
+            yield Progress("write", 0.9)
+            place.publish()
+    return place.carrier
 
 
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import bpy
 import numpy as np
@@ -21,7 +21,7 @@ from ..core.footprints import NEVER
 from ..core.heightfield import Terrain
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.terrain import MeshTerrain
-from . import painted_ground, playback
+from . import mesh_arrays, painted_ground, playback
 from .compat import remove_scene
 
 Array = NDArray[np.float64]
@@ -164,12 +164,12 @@ def undisturbed_surface(
     vertices = rest_vertices(ground, unit_scale)
     to_world = to_world_of(ground, unit_scale)
     if not any(modifier.show_viewport for modifier in ground.modifiers):
-        surface, triangles = vertices, _triangles(mesh)
+        surface, triangles = vertices, mesh_arrays.triangles(mesh)
         factors = painted_ground.factors(ground, mesh, painted)
     else:
         with undisturbed_copy(ground) as evaluated:
-            surface = _transform(to_world, _positions(evaluated))
-            triangles = _triangles(evaluated)
+            surface = _transform(to_world, mesh_arrays.positions(evaluated))
+            triangles = mesh_arrays.triangles(evaluated)
             factors = painted_ground.factors(ground, evaluated, painted)
         if len(surface) == len(vertices):
             vertices = surface
@@ -227,9 +227,12 @@ def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
 
 
 def _drop_shape_keys(mesh: bpy.types.Mesh) -> None:
+    """Take the shape keys off a copy of a mesh: before 5.x their data stays, as a copy counts it twice."""
+    keys = mesh.shape_keys.session_uid
     holder = bpy.data.objects.new("SoftGround Evaluation", mesh)
     holder.shape_key_clear()
     bpy.data.objects.remove(holder)
+    bpy.data.batch_remove([left for left in bpy.data.shape_keys if left.session_uid == keys])
 
 
 def write(
@@ -321,7 +324,7 @@ def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
     mesh = mesh_of(ground)
     key = mesh.shape_keys.key_blocks.get(DISPLAY_KEY) if mesh.shape_keys else None
     if key is None:
-        return _positions(mesh)
+        return mesh_arrays.positions(mesh)
     positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     key.points.foreach_get("co", positions)
     return positions.reshape(-1, 3)
@@ -355,16 +358,10 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Positions without the bake, (V, 3) in the object's own space and units."""
     attribute = mesh.attributes.get(REST)
     if attribute is None or len(attribute.data) != len(mesh.vertices):
-        return _positions(mesh)
+        return mesh_arrays.positions(mesh)
     rest = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     attribute.data.foreach_get("vector", rest)
     return rest.reshape(-1, 3)
-
-
-def _positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
-    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", positions)
-    return positions.reshape(-1, 3)
 
 
 def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
@@ -372,22 +369,6 @@ def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> Non
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
     mesh.update()
-
-
-def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """Vertex of each corner, face by face, (L,)."""
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    if len(corners):
-        attribute: Any = mesh.attributes[".corner_vert"]  # a hundred times faster than `loops`
-        attribute.data.foreach_get("value", corners)
-    return corners
-
-
-def _triangles(mesh: bpy.types.Mesh) -> Indices:
-    mesh.calc_loop_triangles()
-    triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    return triangles.reshape(-1, 3).astype(np.intp)
 
 
 def _transform(matrix: Array, points: NDArray[np.float32]) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 Result = TypeVar("Result")
+State = TypeVar("State")
 
 STAGES = {"sample": 6, "simulate": 3, "write": 1}
 """Stages in their order, and the share of the whole time that each takes about, in tenths."""
@@ -56,8 +57,13 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
 
 def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
     """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering."""
+    return (yield from meanwhile(Progress(stage, fraction), function, *arguments))
+
+
+def meanwhile(state: State, function: Callable[..., Result], *arguments: object) -> Generator[State, None, Result]:
+    """What `aside` does, for generators that yield something else than their progress: the same over and over."""
     with ThreadPoolExecutor(1) as thread:
         outcome = thread.submit(function, *arguments)
         while not wait([outcome], timeout=PATIENCE).done:
-            yield Progress(stage, fraction)
+            yield state
     return outcome.result()

@@ -5,7 +5,8 @@ Textures are laid out in world space, so that grains keep their size on any grou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -163,6 +164,19 @@ def ensure_material(surface: str) -> bpy.types.Material:
     """
     name = surface.replace("_", " ").title()
     return _material(surface, name, (surface,), lambda graph: _shaded(graph, _looks(surface)[0](graph, _ground(graph))))
+
+
+@contextmanager
+def drafted(surface: str) -> Iterator[bpy.types.Material]:
+    """The same; one that is made now and that nothing has come to use at the end is taken away."""
+    known = set(bpy.data.materials)
+    material = ensure_material(surface)
+    is_new = material not in known
+    try:
+        yield material
+    finally:
+        if is_new and not material.users:
+            bpy.data.materials.remove(material)
 
 
 def ensure_blend(surface: str, other: str) -> bpy.types.Material:

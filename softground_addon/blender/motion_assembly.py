@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 import numpy as np
@@ -21,6 +22,7 @@ from ..core.foot_attitude import (
 from ..core.motion import Array, CharacterMotion, SoleMotion
 from ..core.soles import solid_sole
 from ..core.solids import capsule
+from .jobs import meanwhile
 from .rig_mapping import RigMapping, SoleSource
 from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
 
@@ -111,15 +113,9 @@ def assemble_motion(
 
     motions: dict[str, SoleMotion] = {}
     for foot, flat, size in zip(feet, flats, sizes, strict=True):
-        yield len(recording.frames)
-        placed = foot_sole(
-            foot.source,
-            flat,
-            size,
-            meshes.get(foot.source.name),
-            has_toes=foot.ball is not None,
-            mirrored=rest.is_mirrored,
-        )
+        shape = partial(foot_sole, has_toes=foot.ball is not None, mirrored=rest.is_mirrored)
+        mesh = meshes.get(foot.source.name)
+        placed = yield from meanwhile(len(recording.frames), shape, foot.source, flat, size, mesh)
         carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
         transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
         motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))

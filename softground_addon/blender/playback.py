@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, cast
 
 import bpy
@@ -27,10 +29,7 @@ _VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_COLOR": "
 def install(
     ground: bpy.types.Object, index: Indices, table: Timelines, *, up: Array, frame_rate: float
 ) -> bpy.types.Modifier:
-    """Put the playback on a ground, in place of the one that may be there.
-
-    The ground must carry its undisturbed positions (`ground_mesh.write`). The modifier comes first, so that the
-    user's own modifiers work on the ground as it is at the time.
+    """Put the playback on a ground, in place of the one that may be there: `player` and `attach` in one go.
 
     Parameters
     ----------
@@ -38,14 +37,48 @@ def install(
     index : (K,) int array
         Vertices that the places of the timelines stand for.
     table : Timelines
+    up, frame_rate
+        See `player`.
+    """
+    with player(polylines(table), up=up, frame_rate=frame_rate) as group:
+        return attach(ground, index[table.point], group)
+
+
+@contextmanager
+def player(lines: Polylines, *, up: Array, frame_rate: float) -> Iterator[bpy.types.NodeTree]:
+    """The node group that plays timelines; it is taken away at the end if nothing has come to use it.
+
+    Parameters
+    ----------
+    lines : Polylines
     up : (3,) float array
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
         Scene frames per second [Hz].
     """
+    group = nodes.build(table=_table_object(lines), up=up.tolist(), frame_rate=frame_rate)
+    try:
+        yield group
+    finally:
+        if not group.users:
+            _remove_group(group)
+
+
+def attach(ground: bpy.types.Object, vertices: Indices, group: bpy.types.NodeTree) -> bpy.types.Modifier:
+    """Let a group from `player` play a ground, in place of the one that may play it.
+
+    The ground must carry its undisturbed positions (`ground_mesh.write`). The modifier comes first, so that the
+    user's own modifiers work on the ground as it is at the time.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    vertices : (P,) int array
+        Vertex of its mesh that each of the group's splines plays.
+    group : bpy.types.NodeTree
+    """
     remove(ground)
-    _write_splines(cast("bpy.types.Mesh", ground.data), index[table.point])
-    group = nodes.build(table=_table_object(polylines(table)), up=up.tolist(), frame_rate=frame_rate)
+    _write_splines(cast("bpy.types.Mesh", ground.data), vertices)
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
     modifier.show_in_editmode = False

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.refinement import Refinement, Surface
-from .ground_mesh import corner_vertices
+from . import mesh_arrays
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -38,16 +38,15 @@ SEAM = ".uv_seam"
 
 def surface_of(mesh: bpy.types.Mesh, to_world: Array) -> Surface:
     """The faces of a mesh with world positions [m], and the triangles that Blender shows them as."""
-    mesh.calc_loop_triangles()
-    triangles = mesh.loop_triangles
-    positions = _values(mesh.attributes["position"]).astype(np.float64)
-    size = _bulk(mesh.polygons, "loop_total")
+    positions = mesh_arrays.positions(mesh).astype(np.float64)
+    corners, face = mesh_arrays.triangle_corners(mesh)
+    size = np.bincount(face, minlength=len(mesh.polygons)) + 2
     return Surface(
         vertices=positions @ to_world[:3, :3].T + to_world[:3, 3],
-        corner_vertex=corner_vertices(mesh).astype(np.intp),
+        corner_vertex=mesh_arrays.corner_vertices(mesh).astype(np.intp),
         face_start=np.concatenate([[0], np.cumsum(size)]),
-        triangle_corners=_bulk(triangles, "loops", 3),
-        triangle_face=_bulk(triangles, "polygon_index"),
+        triangle_corners=corners,
+        triangle_face=face,
     )
 
 

@@ -94,7 +94,8 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
         moved = replace(motion, mass=settings.typed(character.mass))
         estimate = partial(estimate_loads, force_model=character.force_model, material=material)
         loads.append((yield from aside("sample", 1.0, estimate, moved, shot.terrain)))
-    check_contacts(loads, shot.terrain, scene.softground.ground)
+    ground = scene.softground.ground
+    yield from aside("sample", 1.0, check_contacts, loads, shot.terrain, ground and ground.name)
     return loads
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..core.foot_attitude import FlatFoot, FootSize
 from ..core.motion import Array
 from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
+from . import mesh_arrays
 from .rig_mapping import RigMapping, SoleSource
 
 _REACH = 2.0
@@ -256,12 +257,7 @@ def _joined(parts: list[FootMesh]) -> FootMesh:
 def _read_mesh(thing: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
     """Vertices (V, 3) and triangles (T, 3) of a mesh object as modelled."""
     mesh = _mesh_of(thing)
-    vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", vertices)
-    mesh.calc_loop_triangles()
-    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
+    return mesh_arrays.positions(mesh).astype(float), mesh_arrays.triangles(mesh)
 
 
 def _near_feet(armature: bpy.types.Object, feet: frozenset[str], points: Array) -> NDArray[np.intp]:

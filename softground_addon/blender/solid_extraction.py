@@ -10,6 +10,7 @@ from ..core.errors import InputError
 from ..core.motion import Array, SoleMotion
 from ..core.soles import solid_sole
 from ..core.solids import mass_properties
+from . import mesh_arrays
 from .motion_assembly import nearest_rotation
 from .rig_mapping import SoleSource
 
@@ -65,18 +66,14 @@ def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, 
     evaluated = thing.evaluated_get(depsgraph) if depsgraph else thing
     mesh = evaluated.to_mesh()
     try:
-        vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-        mesh.vertices.foreach_get("co", vertices)
-        mesh.calc_loop_triangles()
-        triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", triangles)
+        vertices, triangles = mesh_arrays.positions(mesh), mesh_arrays.triangles(mesh)
     finally:
         evaluated.to_mesh_clear()
     if not len(triangles):
         raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or choose another object.")
     if not np.isfinite(vertices).all():
         raise InputError(f"The mesh of '{thing.name}' holds vertices that are nowhere (NaN or infinite): delete them.")
-    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.intp)
+    return vertices.astype(float), triangles
 
 
 def solid_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:

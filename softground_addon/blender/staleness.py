@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..core import report
-from . import ground_mesh, nla_layer
+from . import ground_mesh, mesh_arrays, nla_layer
 from .baked_ground import carrier_of
 from .compat import action_curves, slot_of
 
@@ -85,7 +85,7 @@ def _of_ground(ground: bpy.types.Object) -> str:
 
 
 def _of_topology(mesh: bpy.types.Mesh) -> str:
-    corners = ground_mesh.corner_vertices(mesh)
+    corners = mesh_arrays.corner_vertices(mesh)
     return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.tobytes()):08x}"
 
 
