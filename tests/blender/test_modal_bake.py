@@ -62,7 +62,7 @@ def test_a_bake_left_in_any_state_leaves_the_file_as_it_was(scene, ground, again
         assert (fingerprints.of_file(), len(bpy.data.shape_keys)) == (before, keys), state
         stages.append(state[0])
     assert {"sample", "simulate", "write"} == set(stages)
-    assert stages.count("write") > 4
+    assert stages.count("write") > 2
     assert fingerprints.of_file() != before
 
 
