@@ -68,12 +68,14 @@ def ground_under(
         How the ground varies over the window.
     """
     window, size = cells.window, cells.cell_size
-    corners = posed(solid.corners, pose)
-    above = (corners[:, 2] - _ground_below(corners, cells)).reshape(-1, 3).min(axis=1)
+    vertices, (a, b, c) = posed(solid.vertices, pose), solid.triangles.T
+    height = vertices[:, 2] - _ground_below(vertices, cells)
+    above = np.minimum(np.minimum(height[a], height[b]), height[c])
     if not np.isfinite(above.min()):
         return None
-    corners = corners.reshape(-1, 3, 3)[above <= above.min() + solid.give + reach]
-    low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
+    triangles = solid.triangles[above <= above.min() + solid.give + reach]
+    near = vertices[triangles.ravel(), :2].T
+    low, high = near.min(axis=1), near.max(axis=1)
     corner = np.array([window.column, window.row])
     first = np.maximum(np.floor(low / size).astype(int) - corner, 0)
     last = np.minimum(np.floor(high / size).astype(int) - corner, (window.columns - 1, window.rows - 1))
@@ -84,8 +86,6 @@ def ground_under(
     divisions = int(np.clip(ceil(size / across), FEWEST_DIVISIONS, MOST_DIVISIONS))
     spacing = size / divisions
     shape = ((rows.stop - rows.start) * divisions, (columns.stop - columns.start) * divisions)
-    vertices = corners.reshape(-1, 3)
-    triangles = np.arange(len(vertices)).reshape(-1, 3)
     lower = lowest_surface(vertices, triangles, (first + corner) * size + spacing / 2, shape, spacing)
     clearance = lower - _finer(cells, rows, columns, divisions)
     over = np.isfinite(clearance)

@@ -15,8 +15,8 @@ from .indentation import stress
 from .motion import Sole, interpolated_poses
 from .rim import in_contact, rim_weights
 from .solid_imprint import ground_under
-from .solids import Solid, posed
-from .stance import Stance
+from .solids import Solid
+from .stance import Stance, Steps
 from .variation import Factors
 
 Array = NDArray[np.float64]
@@ -47,12 +47,23 @@ class SolidStance(Stance):
         self.solid: Solid = sole.solid
         self._deepest = 0.0
 
+    def extend(self, steps: Steps) -> None:
+        """Go on with the next steps of the stance."""
+        super().extend(steps)
+        poses, outer = steps.poses[:, 0], self.solid.probes.T
+        reach = np.zeros((2, len(poses), 2))
+        for k, pose in enumerate(poses):
+            if k and (pose == poses[k - 1]).all():
+                reach[:, k] = reach[:, k - 1]
+            else:
+                place = pose[:2, :3] @ outer + pose[:2, 3:]
+                reach[:, k] = place.min(axis=1), place.max(axis=1)
+        self._reach = reach
+
     def _window(self, start: int, end: int, bed: Bed) -> Window:
-        low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for pose in _distinct(self._between(start, end, 1)):
-            place = posed(self.solid.vertices, pose)[:, :2]
-            low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
-        window = Window.around(low - bed.cell_size / 2, high + bed.cell_size / 2, bed.cell_size)
+        low, high = self._reach[:, start - self.first : end - self.first]
+        half = bed.cell_size / 2
+        window = Window.around(low.min(axis=0) - half, high.max(axis=0) + half, bed.cell_size)
         return window.expanded(max(1, int(bed.rim_reach + 1e-6)))
 
     def _parts(self, start: int, end: int, bed: Bed) -> int:
@@ -167,13 +178,6 @@ class _Hollow:
     compression: Array
     sinkage: float
     area: float
-
-
-def _distinct(poses: Array) -> Array:
-    """Poses without those that repeat the one before."""
-    moved = np.ones(len(poses), bool)
-    moved[1:] = (np.diff(poses, axis=0) != 0).any(axis=(1, 2))
-    return poses[moved]
 
 
 def _middle(pressed: Array, cells: Surface) -> Array:

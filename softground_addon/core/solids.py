@@ -51,11 +51,6 @@ class Solid:
         return float(max(np.cbrt(self.extent.prod()), _FLATTEST * self.extent.max()))
 
     @cached_property
-    def corners(self) -> Array:
-        """Corners of the triangles one after the other, (3·T, 3) [m]."""
-        return np.asarray(self.vertices[self.triangles].reshape(-1, 3))
-
-    @cached_property
     def probes(self) -> Array:
         """Points of the surface that tell how high it is above the ground, (Q, 3) [m]."""
         used = self.vertices[np.unique(self.triangles)]

@@ -78,8 +78,9 @@ def lowest_surface(
     flat = (corners[..., :2] - origin) / spacing
     lying = np.abs(_cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
     corners, flat = corners[lying], flat[lying]
-    first = np.clip(np.ceil(flat.min(axis=1)).astype(int), 0, (columns, rows))
-    last = np.clip(np.floor(flat.max(axis=1)).astype(int), -1, (columns - 1, rows - 1))
+    a, b, c = np.moveaxis(flat, 1, 0)  # over an axis of three, pairs are many times faster than a reduction
+    first = np.clip(np.ceil(np.minimum(np.minimum(a, b), c)).astype(int), 0, (columns, rows))
+    last = np.clip(np.floor(np.maximum(np.maximum(a, b), c)).astype(int), -1, (columns - 1, rows - 1))
     size = np.maximum(last - first + 1, 0)
     count = size.prod(axis=1)
     order = np.cumsum(count)
@@ -105,21 +106,30 @@ def _draw(
     count: NDArray[np.intp],
 ) -> None:
     """Lower the buffer to a block of triangles, all pairs of triangle and covered node at once."""
-    triangle = np.repeat(np.arange(len(count)), count)
-    within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
-    row, column = np.divmod(within, size[triangle, 0])
-    node = first[triangle] + np.column_stack([column, row])
-
+    # Barycentric coordinates and height are linear over the nodes of a triangle's box: at its first node, and per step.
     a, b, c = (flat[:, corner] for corner in range(3))
-    determinant = _cross(b - a, c - a)
-    offset = node - a[triangle]
-    v = _cross(offset, (c - a)[triangle]) / determinant[triangle]
-    w = _cross((b - a)[triangle], offset) / determinant[triangle]
+    (along_b, up_b), (along_c, up_c) = (b - a).T, (c - a).T
+    determinant = along_b * up_c - up_b * along_c
+    x, y = (first - a).T
+    v = np.array([x * up_c - y * along_c, up_c, -along_c]) / determinant
+    w = np.array([along_b * y - up_b * x, -up_b, along_b]) / determinant
+    height = v * (z[:, 1] - z[:, 0]) + w * (z[:, 2] - z[:, 0])
+    height[0] += z[:, 0]
+
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    row, column = np.divmod(within, np.repeat(size[:, 0], count))
+
+    def over(at_first: Array, per_column: Array, per_row: Array) -> Array:
+        values: Array = np.repeat(at_first, count)
+        values += np.repeat(per_column, count) * column
+        values += np.repeat(per_row, count) * row
+        return values
+
+    part_b, part_c = over(*v), over(*w)
     edge = 1e-9
-    covered = (v >= -edge) & (w >= -edge) & (v + w <= 1 + edge)
-    height = z[triangle, 0] + v * (z[:, 1] - z[:, 0])[triangle] + w * (z[:, 2] - z[:, 0])[triangle]
-    index = node[:, 1] * columns + node[:, 0]
-    np.minimum.at(buffer, index[covered], height[covered])
+    covered = np.flatnonzero((part_b >= -edge) & (part_c >= -edge) & (part_b + part_c <= 1 + edge))
+    index = np.repeat(first[:, 1] * columns + first[:, 0], count) + row * columns + column
+    np.minimum.at(buffer, index[covered], over(*height)[covered])
 
 
 def _cross(a: Array, b: Array) -> Array:
