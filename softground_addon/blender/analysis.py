@@ -18,6 +18,7 @@ from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
 from .character_setup import characters_of
+from .motion_assembly import frame_rate_of, time_stretch
 from .shots import Shot, estimate_shot, read_shot
 
 TRIALS = 4
@@ -155,9 +156,9 @@ def _keep(scene: bpy.types.Scene, analysis: Analysis) -> None:
 def _source(scene: bpy.types.Scene) -> Hashable:
     """What a shot is read from, as far as it is seen in the settings; edits of actions are told by a handler."""
     options = scene.softground
-    render = scene.render
     return (
-        (options.frame_start, options.frame_end, render.fps, render.fps_base, scene.unit_settings.scale_length),
+        (options.frame_start, options.frame_end),
+        (frame_rate_of(scene), time_stretch(scene), scene.unit_settings.scale_length),
         options.ground and options.ground.session_uid,
         (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(

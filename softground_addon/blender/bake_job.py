@@ -39,6 +39,7 @@ from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detai
 from .character_setup import characters_of, movers_of
 from .jobs import Job, Progress, aside
 from .materials import drafted
+from .motion_assembly import time_stretch
 from .properties import SoftGroundCharacter
 from .shots import Shot, estimate_shot, read_shot
 
@@ -210,6 +211,7 @@ def _write(
             stored,
             frame_rate=frame_rate,
             unit_scale=unit_scale,
+            time_stretch=time_stretch(scene),
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)

@@ -16,6 +16,7 @@ from ..core.simulation import CharacterLoads
 from . import properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, movers_of, title_of
 from .jobs import STAGES
+from .motion_assembly import time_stretch
 
 Array = NDArray[np.float64]
 
@@ -116,6 +117,7 @@ def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,
+        "time_stretch": time_stretch(scene),
         "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
     }
 

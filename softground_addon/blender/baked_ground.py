@@ -97,6 +97,7 @@ def write(
     *,
     frame_rate: float,
     unit_scale: float,
+    time_stretch: float = 1.0,
     shape_keys: bool = True,
 ) -> Job[bpy.types.Object]:
     """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
@@ -116,6 +117,8 @@ def write(
         Scene frames per second [Hz].
     unit_scale : float
         Metres per Blender unit.
+    time_stretch : float
+        See `motion_assembly.time_stretch`.
     shape_keys : bool
         See `ground_mesh.write`.
 
@@ -125,9 +128,10 @@ def write(
         If there is more than can be played; nothing is written then.
     """
     table = yield from aside("write", 0.9, timelines, over_time)
+    table = table.stretched(time_stretch)  # nodes are told the animation's frames
     lines = yield from aside("write", 0.9, polylines, table)
     up = ground_mesh.up_of(place.carrier, unit_scale)
-    with playback.player(lines, up=up, frame_rate=frame_rate) as group:
+    with playback.player(lines, up=up, frame_rate=frame_rate * time_stretch) as group:
         yield Progress("write", 0.9)
         if not place.is_draft:
             place.publish()

@@ -13,6 +13,7 @@ from ..core.key_reduction import kept_samples
 from ..core.motion import CharacterMotion
 from ..core.orientation import euler_angles, quaternions, rotation_matrices
 from .layer_curves import LayerCurve
+from .motion_assembly import time_stretch
 from .pose_sampling import BonePoses, RigPoses, sample_poses
 from .rig_controls import BODY, Control, RigControls, find_controls
 from .rig_mapping import RigMapping
@@ -64,11 +65,6 @@ def response_curves(
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
             curves += _bone_curves(armature, control, poses, moved, times, scene.unit_settings.scale_length)
     return curves
-
-
-def time_stretch(scene: bpy.types.Scene) -> float:
-    """Frames of the animation per frame of the scene: 1 unless its time is remapped."""
-    return float(scene.render.frame_map_old / scene.render.frame_map_new)
 
 
 def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> RigControls:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.solids import mass_properties
+from .motion_assembly import time_stretch
 from .properties import SoftGroundCharacter
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
 from .rig_sampling import is_simulated
@@ -141,12 +142,13 @@ def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int
 
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
     """Bake the frames of the first character; widen the range for further ones."""
-    settings = scene.softground
-    if frames and len(settings.characters) == 1:
-        settings.frame_start, settings.frame_end = frames
-    elif frames:
-        settings.frame_start = min(settings.frame_start, frames[0])
-        settings.frame_end = max(settings.frame_end, frames[1])
+    if not frames:
+        return
+    settings, stretch = scene.softground, time_stretch(scene)
+    start, end = floor(frames[0] / stretch), ceil(frames[1] / stretch)
+    if len(settings.characters) > 1:
+        start, end = min(settings.frame_start, start), max(settings.frame_end, end)
+    settings.frame_start, settings.frame_end = start, end
 
 
 def detect_bones(character: SoftGroundCharacter) -> None:

@@ -47,11 +47,15 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     point_cache.write(path, samples(), start_frame=start, points=len(rest), count=end - start + 1)
 
 
-def use_point_cache(ground: bpy.types.Object, path: Path, start: int) -> bpy.types.Modifier:
-    """Let the ground that carries the bake play a PC2 cache in place of its native playback."""
+def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stretch: float = 1.0) -> bpy.types.Modifier:
+    """Let the ground that carries the bake play a PC2 cache in place of its native playback.
+
+    The cache counts the scene's frames, its modifier the animation's; see `motion_assembly.time_stretch`.
+    """
     carrier = baked_ground.carrier_of(ground)
     modifier: Any = carrier.modifiers.get(CACHE_MODIFIER) or carrier.modifiers.new(CACHE_MODIFIER, "MESH_CACHE")
     modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), start
+    modifier.frame_scale = 1 / time_stretch
     modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"
     modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"
     carrier.modifiers.move(list(carrier.modifiers).index(modifier), 0)

@@ -181,6 +181,14 @@ def frame_rate_of(scene: bpy.types.Scene) -> float:
     return float(scene.render.fps / scene.render.fps_base)
 
 
+def time_stretch(scene: bpy.types.Scene) -> float:
+    """Frames of the animation per frame of the scene: 1 unless its time is remapped.
+
+    Keys, strips, nodes and caches count the animation's frames; the timeline, and with it a bake, the scene's.
+    """
+    return float(scene.render.frame_map_old / scene.render.frame_map_new)
+
+
 def gravity_of(scene: bpy.types.Scene) -> float:
     """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
     return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY

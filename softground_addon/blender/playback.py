@@ -54,7 +54,7 @@ def player(lines: Polylines, *, up: Array, frame_rate: float) -> Iterator[bpy.ty
     up : (3,) float array
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
-        Scene frames per second [Hz].
+        Frames of the table per second [Hz].
     """
     group = nodes.build(table=_table_object(lines), up=up.tolist(), frame_rate=frame_rate)
     try:

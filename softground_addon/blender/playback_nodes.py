@@ -49,7 +49,7 @@ def build(*, table: bpy.types.Object, up: Sequence[float], frame_rate: float) ->
     up : (3,) floats
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
-        Scene frames per second [Hz].
+        Frames of the table per second [Hz].
     """
     graph = _Graph(GROUP)
     geometry, frame = graph.inputs(up)

@@ -29,8 +29,9 @@ from ..core.response import (
 from ..core.simulation import CharacterLoads
 from ..core.tilt import TiltGains
 from . import nla_layer, settings
-from .character_keys import controls_of, response_curves, time_stretch
+from .character_keys import controls_of, response_curves
 from .character_setup import mapping_of
+from .motion_assembly import time_stretch
 from .properties import SoftGroundCharacter
 
 PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")

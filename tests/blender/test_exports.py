@@ -67,6 +67,26 @@ def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
         assert_stands_as_recorded(ground, frame, samples[frame - FRAMES[0]])
 
 
+@pytest.mark.parametrize("remapped", [(100, 200), (100, 50)])
+def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapped(scene, tmp_path, remapped):
+    scene.render.frame_map_old, scene.render.frame_map_new = remapped
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    assert options.frame_end == 72 * remapped[1] // remapped[0]
+    jobs.run(bake_job.bake(scene))
+    ground, frames = options.ground, (options.frame_start, options.frame_end)
+    exports.export_point_cache(scene, ground, tmp_path / "ground.pc2", *frames)
+    for cached in (False, True):
+        if cached:
+            exports.use_point_cache(ground, tmp_path / "ground.pc2", frames[0], remapped[0] / remapped[1])
+        for frame in np.linspace(*frames, 6).round().astype(int).tolist()[1:]:
+            world = played(ground, frame)
+            sample = recorded(ground, frame, *world[:, :2].T.astype(float))
+            moved = world[:, 2] - ground_mesh.rest_vertices(ground, 1.0)[:, 2]
+            assert np.abs(moved - sample.display).max() <= TOLERANCE + 2e-6
+
+
 def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
     exports.export_point_cache(scene, ground, path, *FRAMES)

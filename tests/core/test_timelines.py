@@ -114,3 +114,14 @@ def test_more_rows_than_can_be_told_apart_are_refused(monkeypatch):
     monkeypatch.setattr(timelines_module, "MOST_ROWS", rows - 1)
     with pytest.raises(InputError, match="larger cells"):
         timelines(Histories(heights, NO_RAMPS, no_visits(), 0.0))
+
+
+def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_stays_away():
+    visits = Visits(np.array([0]), np.array([4.0]), np.array([6.0]), np.array([1e4]))
+    heights = Ramps(np.array([0, 1]), np.array([2.0, 2.0]), np.array([8.0, 8.0]), np.array([-0.01, -0.02]))
+    table = timelines(Histories(heights, NO_RAMPS, visits, 0.0))
+    slow = table.stretched(0.5)
+    assert slow.frame.tolist() == (table.frame / 2).tolist()
+    assert slow.height.tolist() == table.height.tolist()
+    assert set(slow.visit_start.tolist()) == {2.0, NO_VISIT}
+    assert set(slow.visit_end.tolist()) == {3.0, NO_VISIT}
