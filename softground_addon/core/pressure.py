@@ -117,11 +117,12 @@ def pressure_field(x: Array, y: Array, area: Array, centre: Array, least_extent:
     wanted[:, 1:] = np.where(loaded[:, None], centre - middle, 0.0)
     field = np.linalg.solve(spread, wanted[..., None])[..., 0]
     eccentricity = np.sqrt(np.maximum(np.einsum("ni,ni->n", field[:, 1:], wanted[:, 1:]), 0.0))
-    within = np.minimum(1.0, KERN / np.maximum(eccentricity, KERN))[:, None]
+    off = np.flatnonzero(eccentricity > CLOSE)  # the others press evenly
+    within = np.zeros((len(x), 1))
+    within[off, 0] = np.minimum(1.0, KERN / np.maximum(eccentricity[off], KERN))
     wanted[:, 1:] *= within
     field[:, 1:] *= within
     highest = 1.0 + PEAK * np.minimum(eccentricity, KERN)
-    off = np.flatnonzero(eccentricity > CLOSE)
     near_x, near_y, part = near_x[off], near_y[off], part[off]
     sample = np.flatnonzero(np.arange(x.shape[1]) * GOLDEN % 1.0 < SAMPLE / x.shape[1])
     few = part[:, sample]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.contacts import runs
@@ -61,6 +61,7 @@ def test_a_force_off_the_middle_presses_like_a_beam_up_to_a_third_at_the_highest
 
 
 @settings(max_examples=25, deadline=None)
+@example("rectangle", 0.0, 0.00195)  # hardly off the middle
 @given(st.sampled_from(["rectangle", "ellipse", "triangle", "foot"]), st.floats(-1, 1), st.floats(-1, 1))
 def test_within_the_kern_the_force_acts_where_it_should_and_is_kept(shape, u, v):
     x, y, area = points_of(shape)
