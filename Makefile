@@ -6,18 +6,23 @@ TESTS ?= tests
 VENV := .venv$(if $(filter-out 4.5.15,$(BPY)),-$(BPY))
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready-$(BPY)
+PYTEST := $(BIN)/python -m pytest
+# One process for each processor, but no crowd of Blenders on a large machine. What measures time runs alone.
+SIDE_BY_SIDE := -n auto --maxprocesses 8 --dist worksteal
 
 # make demo MOTION=file.bvh SCALE=0.01 walks as in a motion file; UP=Y|Z names its up axis if it is not found.
 MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: demo scenes test slow versions marathon bench validate gui pictures package lint types clean
+.PHONY: ready blenders demo scenes test slow versions marathon bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet bpy==$(BPY) -r requirements/test.txt
 	touch $@
+
+ready: $(READY)
 
 demo: $(READY)
 	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
@@ -27,20 +32,20 @@ scenes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all
 
 test: $(READY)
-	$(BIN)/python -m pytest $(TESTS)
+	$(PYTEST) $(SIDE_BY_SIDE) $(TESTS)
 
 slow: $(READY)
-	$(BIN)/python -m pytest -m slow $(TESTS)
+	$(PYTEST) $(SIDE_BY_SIDE) -m slow $(TESTS)
 
 # One file baked in each Blender that is here, played in the others.
 versions: $(READY)
-	$(BIN)/python -m pytest -m versions -rs tests/blender/test_versions.py
+	$(PYTEST) -m versions -rs tests/blender/test_versions.py
 
 marathon: $(READY)
-	$(BIN)/python -m pytest -m marathon $(TESTS)
+	$(PYTEST) $(SIDE_BY_SIDE) -m marathon $(TESTS)
 
 bench: $(READY)
-	$(BIN)/python -m pytest -s -m benchmark $(TESTS)
+	$(PYTEST) -s -m benchmark $(TESTS)
 
 validate: $(READY)
 	$(BIN)/python -m tests.validation.validate $(DATA)
@@ -60,9 +65,13 @@ package: $(READY)
 # Real Blenders on a virtual screen: 4.3, and the newest that Debian has. Those that cannot be had are left out.
 REAL_BLENDER := ../shared/tools/real_blender.sh
 BLENDERS ?= trixie sid
-gui: $(READY)
+blenders:
 	for suite in $(BLENDERS); do [ ! -x $(REAL_BLENDER) ] || $(REAL_BLENDER) provision $$suite || true; done
-	$(BIN)/python -m pytest -m gui -rs tests/gui -k "$(subst $() , or ,$(strip $(BLENDERS)))"
+
+GUI := $(PYTEST) -rs tests/gui -k "$(subst $() , or ,$(strip $(BLENDERS)))"
+gui: $(READY) blenders
+	$(GUI) -m "gui and alone"
+	$(GUI) -m "gui and not alone" $(SIDE_BY_SIDE) --dist loadfile
 
 # The pictures in the docs, as the GUI tests took them in Blender 4.3.
 pictures: gui

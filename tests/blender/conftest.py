@@ -1,10 +1,29 @@
 """Each test starts in an empty file with the add-on registered."""
 
+import shutil
+
 import bpy
 import pytest
+
+from tests.blender import shots
 
 
 @pytest.fixture
 def scene(addon):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy.context.scene
+
+
+@pytest.fixture(scope="session")
+def saved_walker(addon, tmp_path_factory):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    shots.walker(bpy.context.scene, frames=40)
+    path = tmp_path_factory.mktemp("shot") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture
+def shot(scene, saved_walker, tmp_path):
+    """A saved file with an animated character and nothing of ours in it; another file is open."""
+    return shutil.copy(saved_walker, tmp_path / "shot.blend")

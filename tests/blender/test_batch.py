@@ -6,7 +6,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,9 +13,7 @@ import bpy
 import pytest
 
 from softground_addon.blender import batch, cli, ground_mesh
-from tests.blender import fingerprints, shots
-
-ROOT = Path(__file__).parents[2]
+from tests.blender import command_line, fingerprints, shots
 
 
 @pytest.fixture
@@ -38,14 +35,12 @@ def night(scene, tmp_path):
     return make
 
 
-def command(*arguments):
-    return [sys.executable, "-m", "softground_addon", "batch", *map(str, arguments)]
-
-
 def run(*arguments, timeout=300):
-    return subprocess.run(
-        command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False
-    )  # fmt: skip
+    return command_line.run("batch", *arguments, timeout=timeout)
+
+
+def begin(*arguments, **how):
+    return command_line.begin("batch", *arguments, **how)
 
 
 def results(folder):
@@ -82,9 +77,7 @@ def test_shots_baked_side_by_side_are_those_baked_one_by_one(night, capfd):
 @pytest.mark.slow
 def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night):
     manifest = night(3, frames=60)
-    process = subprocess.Popen(
-        command(manifest, "--progress", "json"), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = begin(manifest, "--progress", "json", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     for line in process.stdout:
         if line.startswith("{") and json.loads(line)["ended"] == 1:
@@ -106,7 +99,7 @@ def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night)
 @pytest.mark.slow
 def test_a_worker_ends_by_itself_when_its_batch_is_killed(night):
     manifest = night(1, frames=1500)
-    process = subprocess.Popen(command(manifest, "--progress", "json"), cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    process = begin(manifest, "--progress", "json", stdout=subprocess.PIPE)
     assert process.stdout is not None
     process.stdout.readline()
     process.kill()
@@ -203,7 +196,7 @@ def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
     chance = random.Random(5)
     finished: dict[Path, int] = {}
     for _ in range(5):
-        process = subprocess.Popen(command(manifest, "--jobs", 2, "--progress", "none"), cwd=ROOT)
+        process = begin(manifest, "--jobs", 2, "--progress", "none")
         time.sleep(chance.uniform(3.0, 9.0))
         process.kill()
         process.wait()
@@ -249,7 +242,7 @@ def test_the_command_line_adds_little_to_a_bake(night):
         assert cli.run_in_blender(["bake", *options]) == 0
         within.append(time.process_time() - started)
         started = sum(os.times()[2:4])
-        subprocess.run([sys.executable, "-m", "softground_addon", "bake", str(shot), *options], cwd=ROOT, check=True)
+        assert command_line.run("bake", shot, *options).returncode == 0
         whole.append(sum(os.times()[2:4]) - started)
     print(f"\nin process {min(within):.2f} s, command line {min(whole):.2f} s of processor time")
     assert min(whole) - min(within) <= 1.5

@@ -4,39 +4,19 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import bpy
 import pytest
 
 from softground_addon.blender import cli, ground_mesh
-from tests.blender import shots
-
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def shot(scene, tmp_path):
-    """A saved file with an animated character and nothing of ours in it."""
-    shots.walker(scene, frames=40)
-    path = tmp_path / "shot.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
+from tests.blender import command_line, shots
 
 
 def run(shot, *options):
     """Run the command in this process, with its file opened first, as `blender --command` does."""
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     return cli.run_in_blender(["bake", "--progress", "none", *map(str, options)])
-
-
-def standalone(*arguments, **kwargs):
-    return subprocess.run(
-        [sys.executable, "-m", "softground_addon", *map(str, arguments)],
-        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False, **kwargs,
-    )  # fmt: skip
 
 
 def test_it_sets_up_bakes_saves_and_reports_by_itself(shot, tmp_path):
@@ -63,7 +43,7 @@ def test_the_bpy_module_runs_the_same_command(shot, tmp_path):
     report = tmp_path / "report.json"
     assert run(shot, "--report", report) == 0
     here = json.loads(report.read_text(encoding="utf-8"))
-    done = standalone("bake", shot, "--report", report)
+    done = command_line.run("bake", shot, "--report", report)
     assert done.returncode == 0, done.stderr
     assert "steps, deepest" in done.stdout
     there = json.loads(report.read_text(encoding="utf-8"))
@@ -86,6 +66,7 @@ def test_options_reach_the_bake(shot, tmp_path):
 
 
 def test_in_place_replaces_the_opened_file_and_keeps_its_compression(shot):
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
     bpy.ops.wm.save_as_mainfile(filepath=str(shot), compress=True)
     assert run(shot, "--in-place") == 0
     assert shot.read_bytes()[:7] != b"BLENDER"
@@ -133,7 +114,7 @@ def test_a_broken_or_missing_file_exits_with_2(tmp_path):
     broken = tmp_path / "broken.blend"
     broken.write_bytes(b"BLENDER-v405" + b"\x00" * 100)
     for path in (broken, tmp_path / "missing.blend"):
-        done = standalone("bake", path, "--dry-run")
+        done = command_line.run("bake", path, "--dry-run")
         assert done.returncode == 2
         assert "Traceback" not in done.stderr
         assert path.name in done.stderr
@@ -156,10 +137,9 @@ def test_an_interrupted_bake_exits_with_130_and_writes_nothing(scene, tmp_path):
     path = tmp_path / "long.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     original = path.read_bytes()
-    process = subprocess.Popen(
-        [sys.executable, "-u", "-m", "softground_addon", "bake", str(path), "--in-place", "--progress", "plain"],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    process = command_line.begin(
+        "bake", path, "--in-place", "--progress", "plain", stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     assert process.stdout is not None
     for line in process.stdout:
         if line.startswith("sample"):

@@ -9,7 +9,7 @@ import pytest
 
 from softground_addon.blender import bake_job, baked_ground, cli, export_formats, exports, jobs, playback
 from softground_addon.core import point_cache
-from tests.blender import shots
+from tests.blender import command_line, shots
 from tests.blender.test_bake import plane
 from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image
 
@@ -169,6 +169,27 @@ def test_the_command_line_writes_what_it_names_and_keeps_the_blend(scene, tmp_pa
     assert cli.run_in_blender(["export", "--format", "fbx"]) == cli.EXIT_BAD_INPUT
     assert cli.run_in_blender(["export", "--format", "exr", "--resolution", "0"]) == cli.EXIT_BAD_INPUT
     assert cli.run_in_blender(["export", "--format", "obj", "--scene", "None"]) == cli.EXIT_BAD_INPUT
+
+
+def test_the_bpy_module_writes_the_same_file(scene, tmp_path):
+    within, alone = tmp_path / "within.pc2", tmp_path / "alone.pc2"
+    options = ("--format", "pc2", "--frames", "30-31", "--output")
+    assert cli.run_in_blender(["export", *options, str(within)]) == cli.EXIT_DONE
+    done = command_line.run("export", tmp_path / "shot.blend", *options, alone)
+    assert done.returncode == cli.EXIT_DONE, done.stderr
+    assert done.stdout.splitlines()[-1] == str(alone)
+    assert alone.read_bytes() == within.read_bytes()
+
+
+@pytest.mark.parametrize("shot", ["missing.blend", "flat.blend"])
+def test_the_bpy_module_names_a_shot_that_cannot_be_exported(addon, tmp_path, shot):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "flat.blend"))
+    done = command_line.run("export", tmp_path / shot, "--format", "obj")
+    assert done.returncode == cli.EXIT_BAD_INPUT
+    assert done.stderr.startswith("softground: ")
+    assert "Traceback" not in done.stderr
+    assert files_in(tmp_path) == []
 
 
 @pytest.mark.parametrize("kind", ["alembic", "obj"])

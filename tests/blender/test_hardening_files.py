@@ -8,40 +8,25 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import time
-from pathlib import Path
+from functools import partial
 
 import bpy
 import pytest
 
 from softground_addon.blender import cli
-from tests.blender import shots
-
-ROOT = Path(__file__).parents[2]
+from tests.blender import command_line
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")
-
-
-@pytest.fixture
-def shot(scene, tmp_path):
-    shots.walker(scene, frames=40)
-    path = tmp_path / "shot.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
-def bake(*options):
-    return [sys.executable, "-m", "softground_addon", "bake", *map(str, options)]
 
 
 def checksum(path):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def kill_at(moment, command):
-    """Run a command and kill it after that many seconds; whether it had ended before."""
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def kill_at(moment, *arguments):
+    """Bake and kill the process after that many seconds; whether it had ended before."""
+    process = command_line.begin("bake", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         process.wait(timeout=moment)
     except subprocess.TimeoutExpired:
@@ -59,16 +44,16 @@ def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, 
     """Kill -9 at random moments, most of them around the saving."""
     old = shot.read_bytes()
     before, receipt = checksum(shot), tmp_path / "receipt.json"
-    command = bake(shot, "--in-place", "--progress=none", "--receipt", receipt)
+    options = (shot, "--in-place", "--progress=none", "--receipt", receipt)
     started = time.perf_counter()
-    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    assert command_line.run("bake", *options).returncode == 0
     whole = time.perf_counter() - started
     chance = random.Random(1)
     seen = {"old": 0, "new": 0}
     for attempt in range(kills):
         shot.write_bytes(old)
         receipt.unlink(missing_ok=True)
-        kill_at(whole * (chance.uniform(0.6, 1.1) if attempt % 4 else chance.uniform(0.0, 1.0)), command)
+        kill_at(whole * (chance.uniform(0.6, 1.1) if attempt % 4 else chance.uniform(0.0, 1.0)), *options)
         found = checksum(shot)
         if found == before:
             seen["old"] += 1
@@ -120,10 +105,8 @@ def test_a_disk_that_fills_up_while_the_report_is_written_leaves_no_trace(shot, 
 @posix
 def test_a_limit_on_the_size_of_files_leaves_the_old_one(shot):
     old = shot.read_bytes()
-    done = subprocess.run(
-        bake(shot, "--in-place"), cwd=ROOT, capture_output=True, text=True, check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
-    )  # fmt: skip
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (100_000, 100_000))
+    done = command_line.run("bake", shot, "--in-place", preexec_fn=limit)
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert shot.read_bytes() == old
@@ -144,13 +127,8 @@ def test_a_folder_that_cannot_be_written_is_named(shot, option, capfd):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_a_bake_cleanly_at_any_moment(shot, number):
     old = shot.read_bytes()
-    process = subprocess.Popen(
-        [*bake(shot, "--in-place"), "--progress=json"],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    options = (shot, "--in-place", "--progress=json")
+    process = command_line.begin("bake", *options, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     for line in process.stdout:
         if '"simulate"' in line:
@@ -170,7 +148,7 @@ def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
     broken = tmp_path / "broken.blend"
     content = shot.read_bytes()
     broken.write_bytes(content[: int(len(content) * share)])
-    done = subprocess.run(bake(broken, "--in-place"), cwd=ROOT, capture_output=True, text=True, check=False)
+    done = command_line.run("bake", broken, "--in-place")
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert broken.read_bytes() == content[: int(len(content) * share)]

@@ -25,6 +25,9 @@ PACKAGE = REPOSITORY / "build" / "softground.zip"
 SUITES = ("trixie", "sid")
 """Blender 4.3, which is always to be had, and the newest one where it was provisioned."""
 
+WORKER = os.environ.get("PYTEST_XDIST_WORKER", "alone")
+"""Which of the processes that share the tests this is; each has a Blender with a home of its own."""
+
 STORY_SECONDS = 1200
 """Longest story on a machine that does other things too; a quiet one takes a minute or two."""
 
@@ -44,10 +47,14 @@ def built() -> Path:
     return PACKAGE
 
 
+def home(suite: str) -> Path:
+    """Where the suite's Blender keeps its preferences and extensions."""
+    return OUTPUT / suite / "home" / WORKER
+
+
 def blender(suite: str, verb: str, *arguments: str, seconds: int = 120) -> str:
     """Run the suite's Blender in its own home; returns what it printed."""
-    home = OUTPUT / suite / "home"
-    environment = {**os.environ, "REAL_BLENDER_HOME": str(home), "TMPDIR": str(OUTPUT / suite)}
+    environment = {**os.environ, "REAL_BLENDER_HOME": str(home(suite)), "TMPDIR": str(OUTPUT / suite)}
     command = [str(TOOL), verb, suite, *arguments]
     done = subprocess.run(
         command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=seconds, check=False
@@ -58,9 +65,8 @@ def blender(suite: str, verb: str, *arguments: str, seconds: int = 120) -> str:
 @cache
 def installed(suite: str) -> str:
     """Install the package in a fresh home; returns what Blender printed when it started with it."""
-    home = OUTPUT / suite / "home"
-    shutil.rmtree(home, ignore_errors=True)
-    home.mkdir(parents=True)
+    shutil.rmtree(home(suite), ignore_errors=True)
+    home(suite).mkdir(parents=True)
     message = blender(suite, "run", "--command", "extension", "install-file", "-r", "user_default", "-e", str(built()))
     assert "Installed" in message, message
     return blender(suite, "run", "-b", "--python-expr", PREFERENCES)

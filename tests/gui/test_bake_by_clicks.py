@@ -2,7 +2,7 @@
 
 import pytest
 
-pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
+pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(1500)]
 
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
