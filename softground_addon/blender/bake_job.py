@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..core import record, report
 from ..core.cell_limits import check_cell_size
 from ..core.footprints import Footprint
-from ..core.histories import histories
+from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
 from ..core.simulation import CharacterLoads, simulate
@@ -201,7 +201,7 @@ def _write(
         stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
         across = place.position[:, :2].T
         sample = yield from aside("write", 0.6, pressed.sample, *across)
-        over_time = yield from aside("write", 0.7, partial(histories, footprints, *across, blur_sigma=blur_sigma))
+        over_time = yield from aside("write", 0.7, partial(polylines_at, footprints, *across, blur_sigma=blur_sigma))
         marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
         yield Progress("write", 0.9)
         carrier = yield from baked_ground.write(

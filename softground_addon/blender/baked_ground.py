@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
-from ..core.histories import Histories
-from ..core.polylines import polylines
+from ..core.polylines import Polylines
 from ..core.pressed_ground import GroundSample, PressedGround
-from ..core.timelines import timelines
 from . import created_ground, ground_mesh, playback, trail_detail
 from .created_ground import Layout
-from .jobs import Job, Progress, aside
+from .jobs import Job, Progress
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -92,7 +90,7 @@ def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Plac
 def write(
     place: Place,
     sample: GroundSample,
-    over_time: Histories,
+    over_time: Polylines,
     stored: bytes,
     *,
     frame_rate: float,
@@ -109,7 +107,7 @@ def write(
     place : Place
     sample : GroundSample
         The finished ground at the place's positions.
-    over_time : Histories
+    over_time : Polylines
         Of the place's positions.
     stored : bytes
         The footprints, from `core.record`.
@@ -121,15 +119,8 @@ def write(
         See `motion_assembly.time_stretch`.
     shape_keys : bool
         See `ground_mesh.write`.
-
-    Raises
-    ------
-    InputError
-        If there is more than can be played; nothing is written then.
     """
-    table = yield from aside("write", 0.9, timelines, over_time)
-    table = table.stretched(time_stretch)  # nodes are told the animation's frames
-    lines = yield from aside("write", 0.9, polylines, table)
+    lines = over_time.stretched(time_stretch)  # nodes are told the animation's frames
     up = ground_mesh.up_of(place.carrier, unit_scale)
     with playback.player(lines, up=up, frame_rate=frame_rate * time_stretch) as group:
         yield Progress("write", 0.9)
@@ -138,7 +129,7 @@ def write(
         ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.9)
-        playback.attach(place.carrier, place.index[table.point], group)
+        playback.attach(place.carrier, place.index[lines.point], group)
         if place.is_draft:
             yield Progress("write", 0.9)
             place.publish()

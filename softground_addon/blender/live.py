@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.heightfield import Window
-from ..core.histories import histories
 from ..core.playhead import Playhead
+from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
 from ..core.soft_ground import SoftGround
 from . import analysis, baked_ground, ground_mesh, jobs, session, settings
@@ -120,7 +120,7 @@ class LiveMode:
         stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
-        over_time = histories(footprints, *across, blur_sigma=sigma)
+        over_time = polylines_at(footprints, *across, blur_sigma=sigma)
         writing = baked_ground.write(
             place,
             pressed.sample(*across),

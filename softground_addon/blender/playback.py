@@ -10,8 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.polylines import Polylines, polylines
-from ..core.timelines import Timelines
+from ..core.polylines import Polylines
 from . import playback_nodes as nodes
 from .compat import straighten
 
@@ -27,7 +26,7 @@ _VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_COLOR": "
 
 
 def install(
-    ground: bpy.types.Object, index: Indices, table: Timelines, *, up: Array, frame_rate: float
+    ground: bpy.types.Object, index: Indices, lines: Polylines, *, up: Array, frame_rate: float
 ) -> bpy.types.Modifier:
     """Put the playback on a ground, in place of the one that may be there: `player` and `attach` in one go.
 
@@ -35,13 +34,13 @@ def install(
     ----------
     ground : bpy.types.Object
     index : (K,) int array
-        Vertices that the places of the timelines stand for.
-    table : Timelines
+        Vertices that the places stand for.
+    lines : Polylines
     up, frame_rate
         See `player`.
     """
-    with player(polylines(table), up=up, frame_rate=frame_rate) as group:
-        return attach(ground, index[table.point], group)
+    with player(lines, up=up, frame_rate=frame_rate) as group:
+        return attach(ground, index[lines.point], group)
 
 
 @contextmanager

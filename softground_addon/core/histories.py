@@ -89,6 +89,7 @@ def histories(
         time, they share it.
     """
     places = _Places(x, y)
+    footprints = _near(footprints, places, blur_sigma)
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
@@ -149,6 +150,22 @@ def _inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.
     """Which places lie in the cells of a window."""
     column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
     return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)
+
+
+def _near(footprints: Sequence[Footprint], places: _Places, blur_sigma: float) -> list[Footprint]:
+    """The footprints that may reach some of the places."""
+    if not len(places.x):
+        return []
+    low, high = (np.array([bound(places.x), bound(places.y)]) for bound in (np.min, np.max))
+    near = []
+    for footprint in footprints:
+        size, window = footprint.cell_size, footprint.window
+        reach = _margin(gaussian_kernel(blur_sigma / size)) * size
+        first = np.array([window.column, window.row]) * size - reach
+        last = first + np.array([window.columns, window.rows]) * size + 2 * reach
+        if (first <= high).all() and (last >= low).all():
+            near.append(footprint)
+    return near
 
 
 def _margin(kernel: Array) -> int:

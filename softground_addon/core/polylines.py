@@ -1,17 +1,22 @@
 """Timelines as polylines over time, the form in which Blender's nodes sample them.
 
 Between two points all is linear; where something jumps, two points share a frame. The pressure of a contact, which
-timelines tell by its frames and its peak, becomes points too.
+timelines tell by its frames and its peak, becomes points too. They are made part by part of the ground, so that only
+what is kept of them takes memory everywhere at once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .timelines import Timelines
+from .footprints import Footprint
+from .histories import Histories, histories
+from .ramps import TOLERANCE
+from .timelines import NO_VISIT, Timelines, timelines
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -27,6 +32,8 @@ class Polylines:
 
     Attributes
     ----------
+    point : (P,) int array
+        The places.
     first : (P + 1,) int array
         Where the points of each place begin, and of the last end.
     frame : (R,) float32 array
@@ -37,30 +44,81 @@ class Polylines:
     start, end : (P,) float32 arrays
         First and last frame of each place: before, nothing has happened to it; after, all but the pressure, which is
         none, stays as it is at the last.
+    error : float
+        Largest error of a displayed height, at any place and frame [m].
     """
 
+    point: Indices
     first: Indices
     frame: Floats
     state: Floats
     start: Floats
     end: Floats
+    error: float
+
+    def stretched(self, factor: float) -> Polylines:
+        """The same on a clock that counts `factor` frames where this one counts 1."""
+        state = self.state.copy()
+        contact = state[:, 2]
+        contact[contact < NO_VISIT] *= factor
+        frame, start, end = (factor * frames for frames in (self.frame, self.start, self.end))
+        return replace(self, frame=frame, start=start, end=end, state=state)
 
 
-def polylines(table: Timelines) -> Polylines:
-    """The timelines as polylines.
+PLACES_AT_ONCE = 20_000
+"""Places whose histories are worked out together: a few tens of megabytes."""
+
+PART = 1.0
+"""Side of the squares by which places are put together [m]: as large as a few footprints."""
+
+
+def polylines_at(
+    footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
+) -> Polylines:
+    """The record as polylines at given places; see `histories.histories`.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    x, y : (K,) float arrays
+        World positions [m].
+    blur_sigma : float
+        Standard deviation of the display blur [m].
+    tolerance : float
+        Largest error of a displayed height while it moves [m].
+    """
+    order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
+    parts = []
+    for number in range(0, max(len(order), 1), PLACES_AT_ONCE):
+        places = order[number : number + PLACES_AT_ONCE]
+        part = polylines(histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance))
+        parts.append(replace(part, point=places[part.point]))
+    sizes = np.concatenate([np.diff(part.first) for part in parts])
+    return Polylines(
+        first=np.concatenate([[0], np.cumsum(sizes)]),
+        error=max(part.error for part in parts),
+        **{
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in ("point", "frame", "state", "start", "end")
+        },
+    )
+
+
+def polylines(over_time: Histories) -> Polylines:
+    """The histories as polylines.
 
     Examples
     --------
     A contact from frame 2 to 12 on ground that does not move:
 
-    >>> from softground_addon.core.histories import Histories, Visits
+    >>> from softground_addon.core.histories import Visits
     >>> from softground_addon.core.ramps import Ramps
-    >>> from softground_addon.core.timelines import timelines
     >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
-    >>> lines = polylines(timelines(Histories(Ramps.joined([]), Ramps.joined([]), visits, 0.0)))
+    >>> lines = polylines(Histories(Ramps.joined([]), Ramps.joined([]), visits, 0.0))
     >>> lines.start.tolist(), lines.frame.tolist(), lines.state[:, 3].tolist()
     ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
     """
+    table = timelines(over_time)
     place = np.repeat(np.arange(len(table.point)), np.diff(table.first))
     row, frame = _with_turns(table, place)
     jump = np.flatnonzero(table.frame == table.visit_start)
@@ -74,11 +132,13 @@ def polylines(table: Timelines) -> Polylines:
     size = np.bincount(place[points], minlength=len(table.point))
     start = table.frame[table.first[:-1]]
     return Polylines(
+        point=table.point,
         first=np.concatenate([[0], np.cumsum(size)]),
         frame=(when - np.repeat(start, size)).astype(np.float32),
         state=_states(table, points, when),
         start=start.astype(np.float32),
         end=table.frame[table.first[1:] - 1].astype(np.float32),
+        error=over_time.error,
     )
 
 

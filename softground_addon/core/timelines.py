@@ -6,13 +6,11 @@ are a polyline per place: what it is like at a time lies between two rows.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
 from .histories import Histories
 from .ramps import QUANTUM, Ramps
 
@@ -21,9 +19,6 @@ Indices = NDArray[np.intp]
 
 NO_VISIT = 1e9
 """Frame of visits that never come."""
-
-MOST_ROWS = 2**29
-"""Blender numbers points with 32 bits; a row becomes four of them at most (see `polylines`)."""
 
 
 @dataclass(frozen=True)
@@ -56,27 +51,11 @@ class Timelines:
     visit_end: Array
     pressure: Array
 
-    def stretched(self, factor: float) -> Timelines:
-        """The same on a clock that counts `factor` frames where this one counts 1."""
-        visited = self.visit_start < NO_VISIT
-        start, end = (np.where(visited, factor * frame, frame) for frame in (self.visit_start, self.visit_end))
-        return dataclasses.replace(self, frame=factor * self.frame, visit_start=start, visit_end=end)
-
-    @property
-    def longest(self) -> int:
-        """Largest number of rows of one place."""
-        return int(np.diff(self.first).max(initial=0))
-
 
 def timelines(over_time: Histories) -> Timelines:
     """The histories as one table.
 
     Values are rounded to `ramps.QUANTUM`, which those at rest are multiples of.
-
-    Raises
-    ------
-    InputError
-        If there are more than `MOST_ROWS`.
 
     Examples
     --------
@@ -101,11 +80,6 @@ def timelines(over_time: Histories) -> Timelines:
     point, frame = point[order][new], frame[order][new]
     sizes = [len(heights.point)] * 2 + [len(compression.point)] * 2 + [len(visits.point)]
     parts = np.split(row, np.cumsum(sizes))
-    if len(point) > MOST_ROWS:
-        raise InputError(
-            f"The ground moves too much to be played: {len(point):,} changes where {MOST_ROWS:,} fit. Choose larger "
-            "cells, or bake fewer frames at a time onto grounds of their own."
-        )
     places, first = np.unique(point, return_index=True)
     first = np.append(first, len(point))
     start, end, pressure = _latest(visits.start, visits.end, visits.pressure, parts[4], first)

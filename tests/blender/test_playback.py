@@ -9,10 +9,9 @@ import pytest
 
 from softground_addon.blender import ground_mesh, playback
 from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.histories import histories
+from softground_addon.core.polylines import polylines_at
 from softground_addon.core.pressed_ground import PressedGround
 from softground_addon.core.ramps import TOLERANCE
-from softground_addon.core.timelines import timelines
 from tests.core.walkers import pressed, walk
 
 SAND = GroundMaterial(330e3, 0.45, 0.1, blur_sigma=0.01)
@@ -49,8 +48,8 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True
     place = surface.vertices[index, :2].T
     ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
-    table = timelines(histories(footprints, *place, blur_sigma=material.blur_sigma))
-    playback.install(ground, index, table, up=up, frame_rate=30.0)
+    lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma)
+    playback.install(ground, index, lines, up=up, frame_rate=30.0)
     return surface
 
 

@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softground_addon.core.histories import Histories, Visits
-from softground_addon.core.polylines import LOADING, polylines
+from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.histories import Histories, Visits, histories
+from softground_addon.core.polylines import LOADING, polylines, polylines_at
 from softground_addon.core.ramps import QUANTUM, Ramps
 from softground_addon.core.timelines import NO_VISIT, timelines
+from tests.core.walkers import pressed, walk
 
 NO_RAMPS = Ramps.joined([])
 POINTS = 4
@@ -43,10 +45,9 @@ def sampled(lines, place, frame):
 def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts):
     rng = np.random.default_rng(seed)
     heights, compression, visits = random_ramps(rng, ramps), random_ramps(rng, ramps // 2), random_visits(rng, contacts)
-    table = timelines(Histories(heights, compression, visits, 0.0))
-    lines = polylines(table)
-    assert (np.diff(lines.frame)[np.diff(np.repeat(table.point, np.diff(lines.first))) == 0] >= 0).all()
-    for place, point in enumerate(table.point):
+    lines = polylines(Histories(heights, compression, visits, 0.0))
+    assert (np.diff(lines.frame)[np.diff(np.repeat(lines.point, np.diff(lines.first))) == 0] >= 0).all()
+    for place, point in enumerate(lines.point):
         for frame in rng.uniform(lines.start[place], lines.end[place], 15):
             height, sunk, contact_end, pressure = sampled(lines, place, frame)
             assert height == pytest.approx(heights.at(frame, POINTS)[point], abs=2 * QUANTUM)
@@ -64,19 +65,48 @@ def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts)
 
 def test_at_the_end_nothing_presses_any_more():
     rng = np.random.default_rng(1)
-    lines = polylines(timelines(Histories(random_ramps(rng, 9), NO_RAMPS, random_visits(rng, 20), 0.0)))
+    lines = polylines(Histories(random_ramps(rng, 9), NO_RAMPS, random_visits(rng, 20), 0.0))
     assert (lines.state[lines.first[1:] - 1, 3] == 0.0).all()
 
 
 def test_a_contact_adds_three_points_at_most_to_those_of_its_timeline():
     rng = np.random.default_rng(2)
     visits = random_visits(rng, 150)
-    table = timelines(Histories(random_ramps(rng, 40), NO_RAMPS, visits, 0.0))
-    assert len(polylines(table).frame) <= len(table.frame) + 3 * len(visits.point)
+    over_time = Histories(random_ramps(rng, 40), NO_RAMPS, visits, 0.0)
+    assert len(polylines(over_time).frame) <= len(timelines(over_time).frame) + 3 * len(visits.point)
 
 
 def test_nothing_makes_no_polylines():
     nobody = Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
-    lines = polylines(timelines(Histories(NO_RAMPS, NO_RAMPS, nobody, 0.0)))
+    lines = polylines(Histories(NO_RAMPS, NO_RAMPS, nobody, 0.0))
     assert lines.first.tolist() == [0]
     assert lines.state.shape == (0, 4)
+
+
+def test_made_part_by_part_they_are_the_same(monkeypatch):
+    _, footprints = pressed(walk(steps=5), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
+    x, y = np.random.default_rng(0).uniform((-0.3, -0.3), (2.5, 0.3), (3000, 2)).T
+    whole = polylines(histories(footprints, x, y, blur_sigma=0.005))
+    monkeypatch.setattr("softground_addon.core.polylines.PLACES_AT_ONCE", 400)
+    parts = polylines_at(footprints, x, y, blur_sigma=0.005)
+    assert parts.error == pytest.approx(whole.error)
+    order = np.argsort(parts.point)
+    np.testing.assert_array_equal(parts.point[order], whole.point)
+    np.testing.assert_array_equal(parts.start[order], whole.start)
+    np.testing.assert_array_equal(parts.end[order], whole.end)
+    for place, number in enumerate(order.tolist()):
+        mine, theirs = (slice(*lines.first[k : k + 2]) for lines, k in ((parts, number), (whole, place)))
+        np.testing.assert_array_equal(parts.frame[mine], whole.frame[theirs])
+        np.testing.assert_allclose(parts.state[mine], whole.state[theirs], rtol=1e-6, atol=1e-6)
+
+
+def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_stays_away():
+    visits = Visits(np.array([0]), np.array([4.0]), np.array([6.0]), np.array([1e4]))
+    heights = Ramps(np.array([0, 1]), np.array([2.0, 2.0]), np.array([8.0, 8.0]), np.array([-0.01, -0.02]))
+    lines = polylines(Histories(heights, NO_RAMPS, visits, 0.0))
+    slow = lines.stretched(0.5)
+    for name in ("frame", "start", "end"):
+        assert getattr(slow, name).tolist() == (getattr(lines, name) / 2).tolist()
+    assert slow.state[:, :2].tolist() == lines.state[:, :2].tolist()
+    assert set(lines.state[:, 2].tolist()) == {6.0, NO_VISIT}
+    assert set(slow.state[:, 2].tolist()) == {3.0, NO_VISIT}
