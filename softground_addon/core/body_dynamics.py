@@ -137,8 +137,7 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
 
 def _frame_step(motion: CharacterMotion) -> float:
     """Time between the scene frames among the steps [s]."""
-    sampled = motion.on_frames
-    return float(motion.time_step * len(sampled) / sampled.sum())
+    return motion.at_frames().time_step
 
 
 def _usual_cutoff(motion: CharacterMotion) -> float:
