@@ -142,8 +142,7 @@ def _frame_step(motion: CharacterMotion) -> float:
 
 def _usual_cutoff(motion: CharacterMotion) -> float:
     """Cut-off for a body of this size at this frame rate [Hz]."""
-    pendulum = np.sqrt(motion.gravity / motion.leg_length) / (2 * np.pi)
-    return float(min(CUTOFF * pendulum, HIGHEST_CUTOFF / _frame_step(motion)))
+    return min(CUTOFF / (2 * np.pi * motion.pendulum_time), HIGHEST_CUTOFF / _frame_step(motion))
 
 
 def _falling_freely(

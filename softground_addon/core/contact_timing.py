@@ -1,4 +1,4 @@
-"""Heel strike and toe-off to a few milliseconds: from the sole's acceleration and from the forces on the whole body.
+"""Heel strike and toe-off to a few milliseconds, from the forces on the whole body.
 
 Heights and speeds tell that a foot is on the ground, not quite when it got there: a swinging foot comes in flat and
 slow, and a toe leaves while it hardly moves. The forces do: in double support the point through which the total force
@@ -86,7 +86,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
     body : BodyDynamics
         Of that motion, before anything is known about flight.
     """
-    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    unit = motion.pendulum_time / motion.time_step
     touching = _supported(motion, contacts, body.force[:, 2])
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
@@ -126,7 +126,7 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     Feet that float by more in one step than in another are missed by their height. Such a contact may overlap those
     before and after it for a moment, as in double support.
     """
-    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    unit = motion.pendulum_time / motion.time_step
     overlap = round(SEARCH * unit)
     same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
     clearance, touching = contacts.clearance, contacts.touching.copy()
@@ -140,7 +140,7 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     speed = _sole_speeds(motion)
     about_as_low = clearance < clearance.min(axis=1, keepdims=True) + same_height
     slowest = np.where(about_as_low, speed, np.inf).min(axis=1, keepdims=True)
-    about_as_slow = speed < slowest + TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length)
+    about_as_slow = speed < slowest + TOUCH_SPEED * motion.froude_speed
     bearing = about_as_low & about_as_slow & (force > 0)[:, None]
     for first, last in unsupported:
         begin, end = max(first - overlap, 0), last + overlap
@@ -154,7 +154,7 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
 
 def _sole_speeds(motion: CharacterMotion) -> Array:
     """Horizontal speed of each sole's slowest landmark, (N, S) [m/s]."""
-    cutoff = EDGE_CUTOFF * np.sqrt(motion.gravity / motion.leg_length) / (2 * np.pi)
+    cutoff = EDGE_CUTOFF / (2 * np.pi * motion.pendulum_time)
     frames = motion.at_frames()
     points = [sole.landmark_positions()[..., :2] for sole in frames.soles]
     path = np.concatenate(points, axis=1)

@@ -101,7 +101,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.solid is None]
     drift = _ground_drift(feet or tracks, motion)
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
-    limit = np.maximum(TOUCH_SPEED * np.sqrt(motion.gravity * motion.leg_length), body_speed)
+    limit = np.maximum(TOUCH_SPEED * motion.froude_speed, body_speed)
     found = [
         _detect(track, drift, limit, motion, FLOAT_LIMIT if sole.sole.solid is None else SOLID_FLOAT_LIMIT)
         for track, sole in zip(tracks, motion.soles, strict=True)
@@ -152,7 +152,7 @@ def clearances(sole: SoleMotion, terrain: Terrain, *, reach: float) -> tuple[Arr
 
 def hysteresis(start: Mask, stop: Mask) -> Mask:
     """States that `start` switches on and `stop` switches off along the first axis, off before either."""
-    step = np.arange(1, len(start) + 1)
+    step = np.arange(1, len(start) + 1).reshape(-1, *[1] * (start.ndim - 1))
     last_start = np.maximum.accumulate(np.where(start & ~stop, step, 0))
     last_stop = np.maximum.accumulate(np.where(stop, step, 0))
     return last_start > last_stop
@@ -225,7 +225,7 @@ def _ground_drift(tracks: list[_Track], motion: CharacterMotion) -> Array:
     """
     low = [track.velocity[track.clearance < _low(track.clearance, motion.leg_length)] for track in tracks]
     drift = np.median(np.concatenate(low), axis=0) * (1.0, 1.0, 0.0) if any(map(len, low)) else np.zeros(3)
-    return drift * (np.linalg.norm(drift) > REST_SPEED * np.sqrt(motion.gravity * motion.leg_length))
+    return drift * (np.linalg.norm(drift) > REST_SPEED * motion.froude_speed)
 
 
 def _low(clearance: Array, leg_length: float) -> float:
@@ -240,22 +240,22 @@ def _detect(
     """When one sole touches, and the float that was removed."""
     leg = motion.leg_length
     speed = np.linalg.norm(track.velocity - drift, axis=-1)
-    offset = _float(track.clearance, speed / np.sqrt(motion.gravity * leg), float_limit * leg)
+    offset = _float(track.clearance, speed / motion.froude_speed, float_limit * leg)
     height = (track.clearance - offset) / leg
     touching = hysteresis(
         (height < TOUCH_HEIGHT) & (speed < limit), (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED * limit)
     )
-    unit = np.sqrt(leg / motion.gravity) / motion.time_step
+    unit = motion.pendulum_time / motion.time_step
     touching = close_short(touching, round(SHORTEST_CONTACT * unit))
     return _sharpened(touching, track, motion), offset
 
 
 def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
     """Contacts from landing to toe-off: later starts, and ends where the last landmark accelerates upward most."""
-    unit = np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
+    unit = motion.pendulum_time / motion.time_step
     search = round(EDGE_SEARCH * unit)
     rise = np.where(np.isfinite(track.rise), track.rise, 0.0)
-    cutoff = EDGE_CUTOFF / (2 * np.pi * unit * motion.time_step)
+    cutoff = EDGE_CUTOFF / (2 * np.pi * motion.pendulum_time)
     _, _, acceleration = smooth_path(rise, motion.time_step, cutoff)
     sharp = np.zeros_like(touching)
     for first, last in zip(*runs(touching), strict=True):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import runs
+from .interpolation import cubic
 from .motion import CharacterMotion, orthonormal
 
 Array = NDArray[np.float64]
@@ -37,8 +38,8 @@ def without_holds(motion: CharacterMotion) -> CharacterMotion:
     held = _held(motion)
     if not held.any():
         return motion
-    known = np.flatnonzero(~held)
-    return _mapped(motion, lambda samples: _hermite(samples[known], known.astype(float), len(held)))
+    known, every = np.flatnonzero(~held), np.arange(len(held), dtype=float)
+    return _mapped(motion, lambda samples: cubic(samples[known], every, known.astype(float)))
 
 
 def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
@@ -54,7 +55,7 @@ def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
         Which of its frames are those of the given motion.
     """
     count = len(motion.frames)
-    margin = max(1, round(CONTINUATION * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step))
+    margin = max(1, round(CONTINUATION * motion.pendulum_time / motion.time_step))
     if count < 2 * margin:
         return motion, slice(0, count)
     before = _most_like(motion, 0, np.arange(margin, count))
@@ -85,7 +86,7 @@ def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) ->
     step = np.diff(points, axis=0) / motion.time_step
     # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
     velocity = np.concatenate([step, step[-1:]]) if frame == 0 else np.concatenate([step[:1], step])
-    weight = VELOCITY_WEIGHT * np.sqrt(motion.leg_length / motion.gravity)
+    weight = VELOCITY_WEIGHT * motion.pendulum_time
     difference = (points[others] - points[frame]) ** 2 + (weight * (velocity[others] - velocity[frame])) ** 2
     distance = np.sqrt(difference.sum(axis=-1).mean(axis=-1))
     best = int(distance.argmin())
@@ -118,17 +119,3 @@ def _mapped(motion: CharacterMotion, change: Callable[[Array], Array]) -> Charac
     """The motion with every pose and joint path changed likewise."""
     soles = tuple(dataclasses.replace(sole, transforms=orthonormal(change(sole.transforms))) for sole in motion.soles)
     return dataclasses.replace(motion, soles=soles, joints={name: change(path) for name, path in motion.joints.items()})
-
-
-def _hermite(samples: Array, places: Array, count: int) -> Array:
-    """C1 cubic interpolation of samples at uneven places, at 0, 1, ... count - 1."""
-    at = np.arange(count, dtype=float)
-    index = np.clip(np.searchsorted(places, at, side="right") - 1, 0, max(len(places) - 2, 0))
-    if len(places) < 2:
-        return np.repeat(samples, count, axis=0)
-    slope = np.gradient(samples, places, axis=0)
-    width = places[index + 1] - places[index]
-    shape = (-1, *[1] * (samples.ndim - 1))
-    u, width = np.clip((at - places[index]) / width, 0.0, 1.0).reshape(shape), width.reshape(shape)
-    a, b, da, db = samples[index], samples[index + 1], slope[index] * width, slope[index + 1] * width
-    return a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db)))

@@ -150,7 +150,7 @@ def _foot_impacts(motion: CharacterMotion, contacts: Contacts, smoothing: float)
     """
     step = motion.time_step
     impacts = np.zeros(contacts.touching.shape)
-    duration = IMPACT_TIME * np.sqrt(motion.leg_length / motion.gravity)
+    duration = IMPACT_TIME * motion.pendulum_time
     for sole, first, last, speed in _landings(motion, contacts):
         momentum = FOOT_FRACTION * motion.mass * speed
         time = (np.arange(last - first) + 0.5) * step

@@ -188,7 +188,7 @@ def _slope(motions: Sequence[CharacterMotion]) -> Array:
 
 def _footholds(motion: CharacterMotion) -> Array:
     """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which may rest on nothing."""
-    limit = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
+    limit = REST_SPEED * motion.froude_speed
     found = [np.zeros((0, 3))]
     for sole in (sole for sole in motion.soles if sole.sole.solid is None):
         points = sole.landmark_positions()

@@ -34,7 +34,7 @@ def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, bo
         point_of_action(lowest, touching, body),
         touching,
         deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
-        longest=max(1, round(LONGEST_RAMP * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step)),
+        longest=max(1, round(LONGEST_RAMP * motion.pendulum_time / motion.time_step)),
     )
 
 

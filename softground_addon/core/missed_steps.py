@@ -53,9 +53,9 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
         In the order of time. Those of a foot that comes down beside the ground while the other stands on it are
         among them only where the ground ends.
     """
-    shortest = REST_TIME * np.sqrt(motion.leg_length / motion.gravity) / motion.time_step
     if motion.centre is not None:
         return []  # a thing may lie anywhere
+    shortest = REST_TIME * motion.pendulum_time / motion.time_step
     carried = contacts.touching.any(axis=1)
     missed = []
     for number, sole in enumerate(motion.soles):
@@ -76,8 +76,7 @@ def _rests(sole: SoleMotion, motion: CharacterMotion) -> Mask:
     if len(points) < 2:
         return np.zeros(len(points), dtype=bool)
     speed = np.linalg.norm(np.gradient(points, motion.time_step, axis=0), axis=-1).min(axis=1)
-    limit = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
-    return np.asarray(speed < limit)
+    return np.asarray(speed < REST_SPEED * motion.froude_speed)
 
 
 def advice(name: str, missed: Sequence[MissedStep], ground: str) -> str:

@@ -13,8 +13,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from .orientation import quaternions
-from .rigid import rotation
+from .interpolation import cubic, linear, turning
 from .solids import Solid
 
 Array = NDArray[np.float64]
@@ -135,8 +134,8 @@ class SoleMotion:
         so that what rolls keeps its shape and what stops at once does not swing past.
         """
         if self.sole.solid is None:
-            return dataclasses.replace(self, transforms=orthonormal(_interpolate(self.transforms, position)))
-        return dataclasses.replace(self, transforms=interpolated_poses(self.transforms, position))
+            return dataclasses.replace(self, transforms=orthonormal(cubic(self.transforms, position)))
+        return dataclasses.replace(self, transforms=turning(self.transforms, position))
 
 
 @dataclass(frozen=True)
@@ -189,6 +188,16 @@ class CharacterMotion:
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
 
     @property
+    def pendulum_time(self) -> float:
+        """sqrt(leg length/gravity) [s], 0.3 s for an adult: times in this unit suit a mouse and a giant."""
+        return float(np.sqrt(self.leg_length / self.gravity))
+
+    @property
+    def froude_speed(self) -> float:
+        """sqrt(gravity·leg length) [m/s], 3 m/s for an adult: the speed at a Froude number of 1."""
+        return float(np.sqrt(self.gravity * self.leg_length))
+
+    @property
     def on_frames(self) -> NDArray[np.bool_]:
         """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
         return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
@@ -224,8 +233,8 @@ class CharacterMotion:
             self,
             frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
             soles=tuple(sole.at(position) for sole in self.soles),
-            joints={name: _interpolate(path, position) for name, path in self.joints.items()},
-            centre=None if self.centre is None else _linear(self.centre, position),
+            joints={name: cubic(path, position) for name, path in self.joints.items()},
+            centre=None if self.centre is None else linear(self.centre, position),
         )
 
 
@@ -234,44 +243,11 @@ def steps_per_frame(frame_rate: float) -> int:
     return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
 
 
-def interpolated_poses(poses: Array, position: Array) -> Array:
-    """Rigid poses (F, ..., 4, 4) at fractional sample indices (K,): turned evenly, moved along a straight line."""
-    last = len(poses) - 1
-    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
-    a, b = poses[index], poses[np.minimum(index + 1, last)]
-    turn = np.swapaxes(a[..., :3, :3], -1, -2) @ b[..., :3, :3]
-    w, *axis = quaternions(turn.reshape(-1, 3, 3)).T
-    sine = np.linalg.norm(axis, axis=0)
-    angle = 2 * np.arctan2(sine, w) / np.maximum(sine, 1e-300)
-    vector = (angle * np.array(axis)).T.reshape(*turn.shape[:-2], 3)
-    u = (position - index).reshape(-1, *[1] * (vector.ndim - 1))
-    result = a.copy()
-    result[..., :3, :3] = a[..., :3, :3] @ rotation(u * vector)
-    result[..., :3, 3] += u * (b[..., :3, 3] - a[..., :3, 3])
-    return result
-
-
-def _linear(samples: Array, position: Array) -> Array:
-    """Straight interpolation along the first axis at fractional sample indices."""
-    index = np.arange(len(samples))
-    return np.stack([np.interp(position, index, column) for column in samples.T], axis=-1)
-
-
-def _interpolate(samples: Array, position: Array) -> Array:
-    """Catmull-Rom interpolation along the first axis at fractional sample indices."""
-    last = len(samples) - 1
-    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
-    u = (position - index).reshape(-1, *[1] * (samples.ndim - 1))
-    slope = np.gradient(samples, axis=0)
-    a, b = samples[index], samples[np.minimum(index + 1, last)]
-    da, db = slope[index], slope[np.minimum(index + 1, last)]
-    return a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db)))
-
-
 def orthonormal(transforms: Array) -> Array:
     """Nearly rigid transforms made rigid: one Newton step of the polar decomposition."""
     rotation = transforms[..., :3, :3]
     gram = np.swapaxes(rotation, -1, -2) @ rotation
-    transforms[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
-    transforms[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
-    return transforms
+    rigid = transforms.copy()
+    rigid[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
+    rigid[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return rigid

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .interpolation import cubic
 from .motion import Array, Sole, SolePatch
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
 from .solids import Solid, supports
@@ -56,6 +57,9 @@ _OUTLINE = np.array(
 """Outline of a left foot: (distance from the heel over length, distance to the left of the axis over breadth); the big
 toe and the arch are on the right (medial) side. Drawn after the outline of a standing foot of the proportions above."""
 
+_CURVE_POINTS = 6
+"""Points of the outline from one of these to the next."""
+
 _ARCH_RELIEF, _HEEL_RELIEF, _TOE_RELIEF = 0.020, 0.012, 0.020
 """Heights over foot length of the medial arch, the back of the heel and the toe tips: slight, as under load."""
 
@@ -80,7 +84,6 @@ def anatomical_sole(
     *,
     name: str,
     side: str,
-    breadth: float | None = None,
     ball: float | None = None,
     medial: float | None = None,
 ) -> PlacedSole:
@@ -88,8 +91,8 @@ def anatomical_sole(
 
     Parameters
     ----------
-    length, breadth : float
-        Foot length and breadth [m]; the breadth follows from `FOOT_BREADTH` where it is not given.
+    length : float
+        Foot length [m].
     name, side : str
         As in `Sole`.
     ball : float, optional
@@ -105,11 +108,11 @@ def anatomical_sole(
     Raises
     ------
     InputError
-        If a size is not a positive number.
+        If the length is not a positive number.
     """
-    breadth = FOOT_BREADTH * length if breadth is None else breadth
-    if not (np.isfinite(length) and np.isfinite(breadth) and length > 0 and breadth > 0):
-        raise InputError(f"The sole '{name}' would be {length} m long and {breadth} m wide: give it a positive size.")
+    if not (np.isfinite(length) and length > 0):
+        raise InputError(f"The sole '{name}' would be {length} m long: give it a positive size.")
+    breadth = FOOT_BREADTH * length
     medial = {"L": -1.0, "R": 1.0}.get(side, 0.0) if medial is None else medial
     outline = _smooth_loop(_outline_for(medial)) * (length, breadth)
 
@@ -311,12 +314,7 @@ def _outline_for(medial: float) -> Array:
     return np.concatenate([ends[0], right, ends[1], (right * (1, -1))[::-1]])
 
 
-def _smooth_loop(control: Array, samples: int = 6) -> Array:
-    """Closed Catmull-Rom curve through control points."""
-    before, after, further = (np.roll(control, -shift, axis=0) for shift in (-1, 1, 2))
-    u = (np.arange(samples) / samples)[:, None, None]
-    slope, next_slope = (after - before) / 2, (further - control) / 2
-    curve = control + u * (
-        slope + u * (3 * (after - control) - 2 * slope - next_slope + u * (2 * (control - after) + slope + next_slope))
-    )
-    return curve.transpose(1, 0, 2).reshape(-1, 2)
+def _smooth_loop(control: Array) -> Array:
+    """Closed Catmull-Rom curve through control points (N, 2)."""
+    around = np.concatenate([control[-1:], control, control[:2]])
+    return cubic(around, 1 + np.arange(len(control) * _CURVE_POINTS) / _CURVE_POINTS)

@@ -12,7 +12,8 @@ from .bed import Bed, Imprints
 from .deformation import GroundMaterial, compression_rate
 from .heightfield import Surface, Window
 from .indentation import stress
-from .motion import Sole, interpolated_poses
+from .interpolation import turning
+from .motion import Sole
 from .rim import in_contact, rim_weights
 from .solid_imprint import ground_under
 from .solids import Solid
@@ -130,7 +131,7 @@ class SolidStance(Stance):
         known = np.concatenate([self._steps.approach[-1:], self._steps.poses])[:, 0]
         first = len(known) - len(self._steps.poses) + start - self.first  # where `start` is among them
         at = first - 1 + np.arange(0 if before else 1, (end - start) * parts + 1) / parts
-        return interpolated_poses(known, np.maximum(at, 0.0))
+        return turning(known, np.maximum(at, 0.0))
 
     def _hollow(
         self, pose: Array, force: float, cells: Surface, material: GroundMaterial, factors: Factors | None

@@ -1,0 +1,70 @@
+"""What lies between samples: straight lines, C1 cubics, and rigid poses that turn evenly.
+
+Positions are given in samples: 2.25 is a quarter of the way from sample 2 to sample 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .orientation import quaternions
+from .rigid import rotation
+
+Array = NDArray[np.float64]
+
+
+def linear(samples: Array, position: Array) -> Array:
+    """Samples (F, ...) along straight lines, at positions (K,), (K, ...)."""
+    index, u = _span(len(samples), position)
+    a, b = samples[index], samples[np.minimum(index + 1, len(samples) - 1)]
+    return np.asarray(a + _over(u, samples) * (b - a))
+
+
+def cubic(samples: Array, position: Array, places: Array | None = None) -> Array:
+    """Samples (F, ...) along cubics that pass them with the slopes of their neighbours, at positions (K,), (K, ...).
+
+    Parameters
+    ----------
+    samples : (F, ...) float array
+    position : (K,) float array
+        Between the first place and the last.
+    places : (F,) float array, optional
+        Where the samples are, ascending; by default at 0, 1, 2 and so on (Catmull-Rom).
+    """
+    if len(samples) < 2:
+        return np.repeat(samples, len(position), axis=0)
+    places = np.arange(len(samples), dtype=float) if places is None else places
+    index = np.clip(np.searchsorted(places, position, side="right") - 1, 0, len(places) - 2)
+    width = _over(places[index + 1] - places[index], samples)
+    u = _over(position - places[index], samples) / width
+    slope = np.gradient(samples, places, axis=0)
+    a, b, da, db = samples[index], samples[index + 1], slope[index] * width, slope[index + 1] * width
+    return np.asarray(a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db))))
+
+
+def turning(poses: Array, position: Array) -> Array:
+    """Rigid poses (F, ..., 4, 4) that turn evenly and move along straight lines, at positions (K,), (K, ..., 4, 4)."""
+    index, u = _span(len(poses), position)
+    a, b = poses[index], poses[np.minimum(index + 1, len(poses) - 1)]
+    turn = np.swapaxes(a[..., :3, :3], -1, -2) @ b[..., :3, :3]
+    w, *axis = quaternions(turn.reshape(-1, 3, 3)).T
+    sine = np.linalg.norm(axis, axis=0)
+    angle = 2 * np.arctan2(sine, w) / np.maximum(sine, 1e-300)
+    vector = (angle * np.array(axis)).T.reshape(*turn.shape[:-2], 3)
+    part = _over(u, vector)
+    result = a.copy()
+    result[..., :3, :3] = a[..., :3, :3] @ rotation(part * vector)
+    result[..., :3, 3] += part * (b[..., :3, 3] - a[..., :3, 3])
+    return result
+
+
+def _span(count: int, position: Array) -> tuple[NDArray[np.intp], Array]:
+    """The sample before each position, and how far the position is from it to the next."""
+    index = np.clip(np.floor(position).astype(int), 0, max(count - 2, 0))
+    return index, position - index
+
+
+def _over(values: Array, samples: Array) -> Array:
+    """Values (K,) that go with the first axis of (K, ...)."""
+    return values.reshape(-1, *[1] * (samples.ndim - 1))
