@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import Contacts, ground_normal, hysteresis, runs
-from .forces import ContactForces
+from .forces import UP, ContactForces
 from .heightfield import Terrain
+from .interpolation import linear
 from .load_sharing import share_by_moment
 from .motion import CharacterMotion, SoleMotion
 from .solids import posed
@@ -80,57 +81,69 @@ def free_loads(
         from the speed of the fall to that of what follows, and the weight meanwhile.
     """
     assert motion.centre is not None, motion.name
-    path = motion.centre
-    feet = [_approach(sole, terrain) for sole in motion.soles]
-    offset = np.array([_offset(foot.clearance, path, motion, foot.size) for foot in feet])
-    clearance = np.stack([foot.clearance for foot in feet], axis=1) - offset
-    touching = np.stack(
-        [
-            hysteresis(height < TOUCH_HEIGHT * foot.size, height > LEAVE_HEIGHT * foot.size)
-            for foot, height in zip(feet, clearance.T, strict=True)
-        ],
-        axis=1,
-    )
-    touching |= _bounces(path, clearance, motion) & ~_with_neighbours(touching)
-    normal = np.stack([foot.normal for foot in feet], axis=1)
-    place = np.stack([foot.place for foot in feet], axis=1)
+    approaches = [_approach(sole, terrain) for sole in motion.soles]
+    offset = np.array([_offset(approach, motion) for approach in approaches])
+    normal = np.stack([approach.normal for approach in approaches], axis=1)
+    clearance = np.stack([approach.clearance for approach in approaches], axis=1) - offset
+    size = np.array([approach.size for approach in approaches])
+    touching = hysteresis(clearance < TOUCH_HEIGHT * size, clearance > LEAVE_HEIGHT * size)
+    touching |= _bounces(clearance, motion) & ~_with_neighbours(touching)
+    seen = Contacts(touching, offset, normal, clearance)
 
     fine = motion.resampled(steps)
-    frame_of = np.minimum(np.arange(len(fine.frames)) // steps, len(path) - 1)
+    frame_of = np.minimum(np.arange(len(fine.frames)) // steps, len(motion.frames) - 1)
+    shortest = round(SHORTEST_CONTACT / fine.time_step)
     shown = touching[frame_of]
-    least = round(SHORTEST_CONTACT / fine.time_step)
-    for number in range(len(feet)):
+    for number in range(len(approaches)):
         for start in runs(shown[:, number])[0]:
-            shown[start : start + least, number] = True
-    along = np.arange(len(fine.frames)) / steps
-    place = _straight(place, along)
-    momentum = np.zeros((len(fine.frames), 3))
-    for first, last in zip(*runs(touching.any(axis=1)), strict=True):
-        height = float(clearance[max(first - 1, 0)].min())
-        up = normal[first, int(clearance[first].argmin())]
-        impulse = force_model == "IMPULSE"
-        changes = _velocity_changes(path, int(first), int(last), up, height, motion, landing_only=impulse)
-        end = min(max(int(last) * steps, int(first) * steps + least), len(momentum))
-        for frame, change in changes.items():
-            start = frame * steps
-            lasting = max(1, round(characteristic_time / fine.time_step))
-            if not impulse:
-                lasting = min(lasting, end - start)
-            stop = min(start + lasting, end)
-            momentum[start:stop] += change / (lasting * fine.time_step)
-    grounded = shown.any(axis=1)
-    weight = motion.mass * motion.gravity * np.array([0.0, 0.0, 1.0]) * grounded[:, None]
-    total = weight + motion.mass * momentum
+            shown[start : start + shortest, number] = True
+    pushed = _pushed(
+        motion,
+        seen,
+        steps=steps,
+        shortest=shortest,
+        lasting=max(1, round(characteristic_time / fine.time_step)),
+        landing_only=force_model == "IMPULSE",
+    )
+    weight = motion.mass * motion.gravity * UP * shown.any(axis=1)[:, None]
+    total = weight + motion.mass * pushed
     total[total[:, 2] <= 0] = 0.0
-    share = share_by_moment(place[..., :2], _straight(path, along)[:, :2], shown)
+    along = np.arange(len(fine.frames)) / steps
+    place = linear(np.stack([approach.place for approach in approaches], axis=1), along)
+    share = share_by_moment(place[..., :2], linear(motion.centre, along)[:, :2], shown)
     forces = share[..., None] * total[:, None]
     carried = np.minimum(share * weight[:, 2:], forces[..., 2])
-    clear = np.where(np.isfinite(clearance), clearance, np.inf)[frame_of]
     return (
         fine,
-        Contacts(shown, offset, normal[frame_of], clear),
+        Contacts(shown, offset, normal[frame_of], clearance[frame_of]),
         ContactForces(forces, total, place, carried, forces[..., 2] - carried),
     )
+
+
+def _pushed(
+    motion: CharacterMotion, seen: Contacts, *, steps: int, shortest: int, lasting: int, landing_only: bool
+) -> Array:
+    """What the ground's push beyond the weight accelerates a body by at each of N steps, (N, 3) [m/s²].
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    seen : Contacts
+        At its frames.
+    steps, shortest, lasting : int
+        Steps in a frame, of the shortest contact, and over which a change of velocity acts.
+    landing_only : bool
+        Only what stops the fall, over that time even where the contact ends before.
+    """
+    assert motion.centre is not None, motion.name
+    pushed = np.zeros(((len(motion.frames) - 1) * steps + 1, 3))
+    for first, last in zip(*runs(seen.touching.any(axis=1)), strict=True):
+        end = min(max(int(last) * steps, int(first) * steps + shortest), len(pushed))
+        for frame, change in _velocity_changes(motion, seen, int(first), int(last), landing_only=landing_only).items():
+            start = frame * steps
+            over = lasting if landing_only else min(lasting, end - start)
+            pushed[start : min(start + over, end)] += change * steps / (over * motion.time_step)
+    return pushed
 
 
 @dataclass(frozen=True)
@@ -178,22 +191,24 @@ def _approach(sole: SoleMotion, terrain: Terrain) -> _Approach:
     return _Approach(np.concatenate(clearance), where, normal, size)
 
 
-def _offset(clearance: Array, path: Array, motion: CharacterMotion, size: float) -> float:
+def _offset(approach: _Approach, motion: CharacterMotion) -> float:
     """The clearance at which a body that is carried stands [m], 0 when it never does."""
-    carried = np.zeros(len(path), bool)
-    if len(path) > 2:
-        push = np.diff(path[:, 2], 2) / motion.time_step**2 / motion.gravity + 1.0
-        carried[1:-1] = np.abs(push - 1.0) < FALLING
-    standing = carried & (np.abs(clearance) < FLOAT_LIMIT * size)
-    return float(np.percentile(clearance[standing], FLOAT_PERCENTILE)) if standing.any() else 0.0
+    assert motion.centre is not None, motion.name
+    carried = np.zeros(len(motion.centre), bool)
+    if len(carried) > 2:
+        excess = np.diff(motion.centre[:, 2], 2) / motion.time_step**2 / motion.gravity
+        carried[1:-1] = np.abs(excess) < FALLING
+    standing = carried & (np.abs(approach.clearance) < FLOAT_LIMIT * approach.size)
+    return float(np.percentile(approach.clearance[standing], FLOAT_PERCENTILE)) if standing.any() else 0.0
 
 
-def _bounces(path: Array, clearance: Array, motion: CharacterMotion) -> Mask:
+def _bounces(clearance: Array, motion: CharacterMotion) -> Mask:
     """Frames at which the nearest sole hits the ground between two frames, (F, S)."""
+    assert motion.centre is not None, motion.name
     hits = np.zeros(clearance.shape, bool)
-    if len(path) < 3:
+    if len(clearance) < 3:
         return hits
-    velocity = np.diff(path[:, 2]) / motion.time_step
+    velocity = np.diff(motion.centre[:, 2]) / motion.time_step
     before, after = velocity[:-1], velocity[1:]
     lowest = clearance[1:-1].min(axis=1)
     back = (before < 0) & (after > 0) & (after - before > 2 * motion.gravity * motion.time_step)
@@ -212,17 +227,18 @@ def _with_neighbours(mask: Mask) -> Mask:
 
 
 def _velocity_changes(
-    path: Array, first: int, last: int, up: Array, height: float, motion: CharacterMotion, *, landing_only: bool
+    motion: CharacterMotion, seen: Contacts, first: int, last: int, *, landing_only: bool
 ) -> dict[int, Array]:
     """Changes of velocity beyond gravity's during a contact from frame `first` to before `last`, by frame [m/s]."""
-    velocity = np.diff(path, axis=0) / motion.time_step  # between frame i and i + 1
+    assert motion.centre is not None, motion.name
+    velocity = np.diff(motion.centre, axis=0) / motion.time_step  # between frame i and i + 1
     changes: dict[int, Array] = {}
-    for frame in range(first, min(last, len(velocity))):
-        if frame > 0 and frame == first:
-            falling = _landing_velocity(velocity, first, up, height, motion)
-            change = velocity[frame] - falling
-            changes[frame] = -min(float(falling @ up), 0.0) * up if landing_only else change
-        elif frame > 0 and not landing_only:
+    if 0 < first < len(velocity):
+        up = seen.normal[first, int(seen.clearance[first].argmin())]
+        falling = _landing_velocity(velocity, first, up, float(seen.clearance[first - 1].min()), motion)
+        changes[first] = -min(float(falling @ up), 0.0) * up if landing_only else velocity[first] - falling
+    if not landing_only:
+        for frame in range(first + 1, min(last, len(velocity))):
             changes[frame] = velocity[frame] - velocity[frame - 1]
     return changes
 
@@ -248,12 +264,3 @@ def _landing_velocity(velocity: Array, first: int, up: Array, height: float, mot
     time = min(2 * max(height, 0.0) / whole, step) if whole > 0 else step
     landing: Array = start + pull * time
     return landing if landing @ up < mean @ up else mean
-
-
-def _straight(samples: Array, position: Array) -> Array:
-    """Straight interpolation along the first axis at fractional sample indices."""
-    last = len(samples) - 1
-    index = np.clip(np.floor(position).astype(int), 0, max(last - 1, 0))
-    u = (position - index).reshape(-1, *[1] * (samples.ndim - 1))
-    between: Array = samples[index] + u * (samples[np.minimum(index + 1, last)] - samples[index])
-    return between
