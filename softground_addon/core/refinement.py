@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cell_keys import Keys, among, keys_of, parents_of
+from .triangles import enumerated
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -187,11 +188,11 @@ def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
     ends[edges] = True
     near = np.flatnonzero(np.logical_or.reduceat(ends[surface.corner_vertex], surface.face_start[:-1]))
     count = np.diff(surface.face_start)[near]
-    face = np.repeat(near, count)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
+    owner, within = enumerated(count)
+    face = near[owner]
     first = surface.face_start[face]
     here = surface.corner_vertex[first + within]
-    there = surface.corner_vertex[first + (within + 1) % np.repeat(count, count)]
+    there = surface.corner_vertex[first + (within + 1) % count[owner]]
     size = len(surface.vertices)
     keys = np.minimum(here, there) * size + np.maximum(here, there)
     faces[face[np.isin(keys, edges[:, 0] * size + edges[:, 1])]] = True

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .triangles import barycentric, enumerated
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -95,7 +96,7 @@ class MeshTerrain:
         shape = np.floor(extent / size).astype(np.intp) + 1
         from_bin = np.floor((low - origin) / size).astype(np.intp)
         span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
-        triangle, within = _expand(span.prod(axis=1))
+        triangle, within = enumerated(span.prod(axis=1))
         bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
         bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
         bin_index = bin_y * shape[0] + bin_x
@@ -137,17 +138,13 @@ class MeshTerrain:
         at_bin = at_bin[inside].astype(np.intp)
         bin_index = at_bin[:, 1] * self.shape[0] + at_bin[:, 0]
         start, stop = self.first[bin_index], self.first[bin_index + 1]
-        pair, within = _expand(stop - start)
+        pair, within = enumerated(stop - start)
         triangle = self.members[start[pair] + within]
         point = inside[pair]
-        a, b, c = (self.corners[triangle, k] for k in range(3))
-        ab, ac, ap = b - a, c - a, place[point] - a[:, :2]
-        area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-        u = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
-        v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
-        on_edge = 1e-9  # points on a shared edge belong to both triangles; without slack they could fall between
-        hit = (u >= -on_edge) & (v >= -on_edge) & (u + v <= 1 + on_edge)
-        return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a[:, 2] + u * ab[:, 2] + v * ac[:, 2])[hit])
+        corners = self.corners[triangle]
+        u, v, hit = barycentric(corners[..., :2], place[point])
+        a, b, c = corners[..., 2].T
+        return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
 
 
 class _Hits(NamedTuple):
@@ -158,9 +155,3 @@ class _Hits(NamedTuple):
     u: Array
     v: Array
     z: Array
-
-
-def _expand(counts: Indices) -> tuple[Indices, Indices]:
-    """For counts (2, 3): owner (0, 0, 1, 1, 1) and number within the owner (0, 1, 0, 1, 2)."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .triangles import SLACK, cross
+
 Array = NDArray[np.float64]
 
 _SUPERSAMPLING = 4
@@ -76,7 +78,7 @@ def lowest_surface(
     rows, columns = shape
     corners = vertices[triangles]
     flat = (corners[..., :2] - origin) / spacing
-    lying = np.abs(_cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
+    lying = np.abs(cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])) > _UPRIGHT
     corners, flat = corners[lying], flat[lying]
     a, b, c = np.moveaxis(flat, 1, 0)  # over an axis of three, pairs are many times faster than a reduction
     first = np.clip(np.ceil(np.minimum(np.minimum(a, b), c)).astype(int), 0, (columns, rows))
@@ -126,14 +128,9 @@ def _draw(
         return values
 
     part_b, part_c = over(*v), over(*w)
-    edge = 1e-9
-    covered = np.flatnonzero((part_b >= -edge) & (part_c >= -edge) & (part_b + part_c <= 1 + edge))
+    covered = np.flatnonzero((part_b >= -SLACK) & (part_c >= -SLACK) & (part_b + part_c <= 1 + SLACK))
     index = np.repeat(first[:, 1] * columns + first[:, 0], count) + row * columns + column
     np.minimum.at(buffer, index[covered], over(*height)[covered])
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def continue_outside(heights: Array) -> Array:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .triangles import barycentric, enumerated
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -53,26 +55,14 @@ def rasterise(uv: Array, place: Array, width: int, height: int) -> Pixels:
     batch = np.cumsum(counts[some]) // PAIRS_AT_ONCE
     for number in np.unique(batch):
         chosen = some[batch == number]
-        triangle = np.repeat(chosen, counts[chosen])
-        within = np.arange(len(triangle)) - np.repeat(np.cumsum(counts[chosen]) - counts[chosen], counts[chosen])
+        owner, within = enumerated(counts[chosen])
+        triangle = chosen[owner]
         row, column = np.divmod(within, span[triangle, 0])
         pixel = np.stack([column, row], axis=-1) + low[triangle]
-        weights, inside = _barycentric(corner[triangle], pixel)
+        u, v, inside = barycentric(corner[triangle], pixel)
+        weights = np.stack([1 - u - v, u, v], axis=-1)[inside]
         index.append((pixel[:, 1] * width + pixel[:, 0])[inside])
-        position.append(np.einsum("nk,nki->ni", weights[inside], place[triangle[inside]]))
+        position.append(np.einsum("nk,nki->ni", weights, place[triangle[inside]]))
     all_index, all_position = np.concatenate(index), np.concatenate(position)
     last = len(all_index) - 1 - np.unique(all_index[::-1], return_index=True)[1]
     return Pixels(all_index[last], all_position[last])
-
-
-def _barycentric(corner: Array, pixel: Indices) -> tuple[Array, NDArray[np.bool_]]:
-    """Barycentric coordinates (N, 3) of pixels in triangles (N, 3, 2), and whether they lie inside."""
-    a, b, c = (corner[:, k] for k in range(3))
-    ab, ac, ap = b - a, c - a, pixel - a
-    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    flat = np.abs(area) < 1e-12
-    area = np.where(flat, 1.0, area)
-    u = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
-    v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
-    slack = 1e-9  # pixels on a shared edge belong to both triangles
-    return np.stack([1 - u - v, u, v], axis=-1), ~flat & (u >= -slack) & (v >= -slack) & (u + v <= 1 + slack)
