@@ -25,7 +25,7 @@ from .performance import (
     swing_change,
 )
 from .slopes import fitted_slope, smoothed
-from .tilt import LARGEST_LEAN, TiltGains, along_heading, lean, ring_around
+from .tilt import TiltGains, along_heading, lean, ring_around
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -181,7 +181,7 @@ def _unmoved(count: int) -> Placement:
 def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt: TiltOptions) -> Array:
     slope = along_heading(seen_slope(motion, touching, history), _heading(motion), tilt.lateral)
     supported = smoothed(touching.any(axis=1).astype(float), 1.0)
-    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=supported, limit=LARGEST_LEAN)
+    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=supported)
 
 
 def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) -> Array:
@@ -202,7 +202,7 @@ def _heading(motion: CharacterMotion) -> Array:
     path = smoothed(hips_of(motion)[:, :2], width)
     velocity = np.gradient(path, axis=0) * motion.frame_rate if len(path) > 1 else np.zeros_like(path)
     feet = np.mean([sole.transforms[:, 0, :2, 0] for sole in motion.soles], axis=0)
-    slow = 0.05 * np.sqrt(motion.gravity * motion.leg_length)
+    slow = 0.05 * motion.froude_speed
     direction = velocity + slow * smoothed(feet, width)
     return np.asarray(direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9))
 

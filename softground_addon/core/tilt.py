@@ -98,8 +98,6 @@ def lean(
     frame_rate: float,
     gains: TiltGains,
     supported: Array | None = None,
-    offset: Array | None = None,
-    limit: float = LARGEST_LEAN,
 ) -> Array:
     """Lean of a body over time.
 
@@ -114,17 +112,13 @@ def lean(
         [Hz]
     gains : TiltGains
     supported : (F,) float array, optional
-        1 where the body stands, 0 where nothing touches and no torque acts.
-    offset : (F, 2) float array, optional
-        How far the source's own centre of mass is off the middle of its support, over the height of the centre of
-        mass: what the printed Eq. 1 also acts on. By default the source counts as balanced.
-    limit : float
-        Largest lean [rad].
+        1 where the body stands, 0 where nothing touches: there no torque turns it back, and it comes to rest.
 
     Returns
     -------
     (F, 2) float array
-        Angle by which the body leans toward +x and +y [rad].
+        Angle by which the body leans toward +x and +y [rad], at most `LARGEST_LEAN`. The source counts as balanced,
+        wherever its own centre of mass is.
 
     Examples
     --------
@@ -136,7 +130,7 @@ def lean(
            [0.1, 0.1]])
     """
     count = len(slope)
-    balance = np.clip(slope if offset is None else slope - np.arcsin(np.clip(offset, -0.9, 0.9)), -limit, limit)
+    balance = np.clip(slope, -LARGEST_LEAN, LARGEST_LEAN)
     grip = np.ones(count) if supported is None else supported
     substeps = max(1, ceil(SUBSTEP_RATE / frame_rate - 1e-9))
     step = 1.0 / (frame_rate * substeps)
@@ -148,16 +142,17 @@ def lean(
     for k in range(1, count):
         targets = balance[k - 1] + fraction[:, None] * (balance[k] - balance[k - 1])
         stiffness = natural**2 * (grip[k - 1] + fraction * (grip[k] - grip[k - 1]))
-        angle, speed = _swing(angle, speed, targets, stiffness, 2 * gains.damping * natural, step, limit)
+        angle, speed = _swing(angle, speed, targets, stiffness, 2 * gains.damping * natural, step)
         result[k] = angle
     return result
 
 
 def _swing(
-    angle: Array, speed: Array, targets: Array, stiffness: Array, damping: float, step: float, limit: float
+    angle: Array, speed: Array, targets: Array, stiffness: Array, damping: float, step: float
 ) -> tuple[Array, Array]:
     """The sub-steps of one frame, in plain numbers: faster than arrays of two."""
     (x, y), (vx, vy) = angle.tolist(), speed.tolist()
+    limit = float(LARGEST_LEAN)
     drag = 1.0 / (1.0 + damping * step)  # damping taken at the end of the step, stable at any size
     for (tx, ty), k in zip(targets.tolist(), stiffness.tolist(), strict=True):
         vx = (vx - step * k * sin(x - tx)) * drag
