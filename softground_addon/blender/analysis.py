@@ -18,7 +18,6 @@ from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
 from .character_setup import characters_of
-from .motion_assembly import frame_rate_of, time_stretch
 from .shots import Shot, estimate_shot, read_shot
 
 TRIALS = 4
@@ -158,7 +157,7 @@ def _source(scene: bpy.types.Scene) -> Hashable:
     options = scene.softground
     return (
         (options.frame_start, options.frame_end),
-        (frame_rate_of(scene), time_stretch(scene), scene.unit_settings.scale_length),
+        (settings.frame_rate_of(scene), settings.time_stretch_of(scene), scene.unit_settings.scale_length),
         options.ground and options.ground.session_uid,
         (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(

@@ -39,8 +39,6 @@ from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detai
 from .character_setup import characters_of, movers_of
 from .jobs import Job, Progress, aside
 from .materials import drafted
-from .motion_assembly import time_stretch
-from .properties import SoftGroundCharacter
 from .shots import Shot, estimate_shot, read_shot
 
 Array = NDArray[np.float64]
@@ -94,7 +92,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     gaps = response_job.gap_table(answers)
     if gaps is None:
         gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
-    layers = (yield from _layers(scene, characters, answers)) if write else []
+    layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
     if shot.surface and shot.surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(shot.surface.factors.tobytes()):08x}"
@@ -211,7 +209,7 @@ def _write(
             stored,
             frame_rate=frame_rate,
             unit_scale=unit_scale,
-            time_stretch=time_stretch(scene),
+            time_stretch=settings.time_stretch_of(scene),
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
@@ -251,19 +249,6 @@ def _press(
         footprints, forces = yield from _simulate(scene, shot, loads)
     check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
     return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)
-
-
-def _layers(
-    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[response_job.Answer]
-) -> Job[list[response_job.Layer]]:
-    """The keys of each character's layer."""
-    job = response_job.layers_of(scene, characters, answers)
-    while True:
-        try:
-            yield Progress("write", next(job))
-        except StopIteration as finished:
-            layers: list[response_job.Layer] = finished.value
-            return layers
 
 
 def _simulate(

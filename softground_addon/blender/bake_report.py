@@ -16,7 +16,6 @@ from ..core.simulation import CharacterLoads
 from . import properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, movers_of, title_of
 from .jobs import STAGES
-from .motion_assembly import time_stretch
 
 Array = NDArray[np.float64]
 
@@ -117,7 +116,7 @@ def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
         "frame_rate": scene.render.fps / scene.render.fps_base,
-        "time_stretch": time_stretch(scene),
+        "time_stretch": settings.time_stretch_of(scene),
         "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
     }
 

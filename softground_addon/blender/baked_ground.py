@@ -116,7 +116,7 @@ def write(
     unit_scale : float
         Metres per Blender unit.
     time_stretch : float
-        See `motion_assembly.time_stretch`.
+        See `settings.time_stretch_of`.
     shape_keys : bool
         See `ground_mesh.write`.
     """

@@ -12,11 +12,12 @@ from ..core.grounding import Response
 from ..core.key_reduction import kept_samples
 from ..core.motion import CharacterMotion
 from ..core.orientation import euler_angles, quaternions, rotation_matrices
+from ..core.rigid import carried, rotation, unit
 from .layer_curves import LayerCurve
-from .motion_assembly import time_stretch
 from .pose_sampling import BonePoses, RigPoses, sample_poses
 from .rig_controls import BODY, Control, RigControls, find_controls
 from .rig_mapping import RigMapping
+from .settings import time_stretch_of
 
 Array = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def response_curves(
     poses = yield from sample_poses(scene, armature, frames, controls.bones)
     moved = _parts_in_armature(response, motion, poses, scene.unit_settings.scale_length)
     curves: list[LayerCurve] = []
-    times = motion.frames * time_stretch(scene)
+    times = motion.frames * time_stretch_of(scene)
     for control in controls.controls:
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
             curves += _bone_curves(armature, control, poses, moved, times, scene.unit_settings.scale_length)
@@ -79,13 +80,11 @@ def _parts_in_armature(response: Response, motion: CharacterMotion, poses: RigPo
     parts = {BODY: response.body}
     for side, leg in response.legs.items():
         knee = motion.joints[f"knee_{side}"]
-        shift = np.broadcast_to(np.eye(4), leg.thigh.shape).copy()
-        shift[:, :3, 3] = (leg.thigh[:, :3, :3] @ knee[..., None])[..., 0] + leg.thigh[:, :3, 3] - knee
         parts |= {
             f"thigh_{side}": leg.thigh,
             f"shank_{side}": leg.shank,
             f"foot_{side}": leg.foot,
-            f"knee_{side}": shift,
+            f"knee_{side}": _translation_at(leg.thigh, knee),
         }
     parts |= {f"arm_{side}": response.body @ arm for side, arm in response.arms.items()}
     to_world = poses.world
@@ -143,19 +142,11 @@ def _channel_rotation(mode: str, pose: BonePoses) -> Array:
     if mode == "QUATERNION":
         return rotation_matrices(pose.rotation_quaternion)
     if mode == "AXIS_ANGLE":
-        angle, axis = pose.rotation_axis_angle[:, :1], pose.rotation_axis_angle[:, 1:]
-        length = np.linalg.norm(axis, axis=1, keepdims=True)
-        axis = np.where(length > 0, axis / np.maximum(length, 1e-12), (0.0, 1.0, 0.0))
-        return rotation_matrices(np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1))
-    turns = {axis: rotation_matrices(_about(axis, pose.rotation_euler[:, "XYZ".index(axis)])) for axis in "XYZ"}
+        axis = unit(pose.rotation_axis_angle[:, 1:])
+        axis[~axis.any(axis=1)] = (0.0, 1.0, 0.0)
+        return rotation(pose.rotation_axis_angle[:, :1] * axis)
+    turns = {axis: rotation(pose.rotation_euler * about) for axis, about in zip("XYZ", np.eye(3), strict=True)}
     return turns[mode[2]] @ turns[mode[1]] @ turns[mode[0]]
-
-
-def _about(axis: str, angle: Array) -> Array:
-    quaternion = np.zeros((len(angle), 4))
-    quaternion[:, 0] = np.cos(angle / 2)
-    quaternion[:, 1 + "XYZ".index(axis)] = np.sin(angle / 2)
-    return quaternion
 
 
 def _rotation_layer(mode: str, pose: BonePoses, new: Array) -> tuple[str, Array, float]:
@@ -182,6 +173,7 @@ def _pure_rotation(matrices: Array) -> Array:
 
 
 def _translation_at(displacement: Array, points: Array) -> Array:
+    """How far displacements (F, 4, 4) carry points (F, 3), as displacements that do not turn."""
     result = np.broadcast_to(np.eye(4), displacement.shape).copy()
-    result[:, :3, 3] = (displacement[:, :3, :3] @ points[..., None])[..., 0] + displacement[:, :3, 3] - points
+    result[:, :3, 3] = carried(displacement, points) - points
     return result

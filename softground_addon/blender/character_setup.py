@@ -10,10 +10,10 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.solids import mass_properties
-from .motion_assembly import time_stretch
 from .properties import SoftGroundCharacter
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
 from .rig_sampling import is_simulated
+from .settings import time_stretch_of
 from .solid_extraction import surface_of
 
 _SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
@@ -144,7 +144,7 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
     """Bake the frames of the first character; widen the range for further ones."""
     if not frames:
         return
-    settings, stretch = scene.softground, time_stretch(scene)
+    settings, stretch = scene.softground, time_stretch_of(scene)
     start, end = floor(frames[0] / stretch), ceil(frames[1] / stretch)
     if len(settings.characters) > 1:
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)

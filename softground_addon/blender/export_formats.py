@@ -13,7 +13,6 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..core.errors import InputError
 from . import bake_report, exports, image_exports, settings
-from .motion_assembly import time_stretch
 from .operators import OnBake, reports_errors
 from .translation import rpt_
 
@@ -223,7 +222,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
         )
         if self.format == "PC2" and self.use_cache:
-            exports.use_point_cache(options.ground, path, start, time_stretch(scene))
+            exports.use_point_cache(options.ground, path, start, settings.time_stretch_of(scene))
         if len(written) == 1:
             self.report({"INFO"}, rpt_("Wrote {path}").format(path=written[0]))
         else:

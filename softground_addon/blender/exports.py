@@ -50,7 +50,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
 def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stretch: float = 1.0) -> bpy.types.Modifier:
     """Let the ground that carries the bake play a PC2 cache in place of its native playback.
 
-    The cache counts the scene's frames, its modifier the animation's; see `motion_assembly.time_stretch`.
+    The cache counts the scene's frames, its modifier the animation's; see `settings.time_stretch_of`.
     """
     carrier = baked_ground.carrier_of(ground)
     modifier: Any = carrier.modifiers.get(CACHE_MODIFIER) or carrier.modifiers.new(CACHE_MODIFIER, "MESH_CACHE")

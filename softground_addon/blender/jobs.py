@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -53,6 +54,32 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
             return result
         if show:
             show(progress)
+
+
+def counted(
+    work: Generator[int, None, Result], stage: str, count: int, *, part: int = 0, parts: int = 1, share: float = 1.0
+) -> Job[Result]:
+    """A job of work that yields how many of `count` things are done.
+
+    Parameters
+    ----------
+    work : generator of int
+    stage : str
+        One of `STAGES`.
+    count : int
+    part, parts : int
+        Which of several equal parts the work is.
+    share : float
+        What all of them together are of the stage, from its beginning.
+    """
+    with closing(work):
+        while True:
+            try:
+                done = next(work)
+            except StopIteration as finished:
+                result: Result = finished.value
+                return result
+            yield Progress(stage, share * (part + done / count) / parts)
 
 
 def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:

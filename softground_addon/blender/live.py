@@ -24,7 +24,6 @@ from . import analysis, baked_ground, ground_mesh, jobs, session, settings
 from .character_setup import characters_of
 from .created_ground import create_ground
 from .live_ground import LiveGround
-from .motion_assembly import time_stretch
 from .operators import reports_errors
 from .translation import rpt_
 
@@ -128,7 +127,7 @@ class LiveMode:
             stored,
             frame_rate=self._frame_rate,
             unit_scale=unit_scale,
-            time_stretch=time_stretch(scene),
+            time_stretch=settings.time_stretch_of(scene),
             shape_keys=scene.softground.shape_keys,
         )
         jobs.run(writing)

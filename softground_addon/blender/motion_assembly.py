@@ -20,14 +20,13 @@ from ..core.foot_attitude import (
     standing_up,
 )
 from ..core.motion import Array, CharacterMotion, SoleMotion
+from ..core.rigid import displacement, nearest_rotation, unit
 from ..core.soles import solid_sole
 from ..core.solids import capsule
 from .jobs import meanwhile
 from .rig_mapping import RigMapping, SoleSource
+from .settings import frame_rate_of, gravity_of
 from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
-
-STANDARD_GRAVITY = 9.81
-"""For scenes whose gravity is switched off [m/s²]."""
 
 _REST_IS_FLAT = np.radians(10.0)
 """Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
@@ -176,24 +175,6 @@ def _used(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[
     return vertices[kept], index.reshape(-1, 3)
 
 
-def frame_rate_of(scene: bpy.types.Scene) -> float:
-    """Scene frames per second [Hz]."""
-    return float(scene.render.fps / scene.render.fps_base)
-
-
-def time_stretch(scene: bpy.types.Scene) -> float:
-    """Frames of the animation per frame of the scene: 1 unless its time is remapped.
-
-    Keys, strips, nodes and caches count the animation's frames; the timeline, and with it a bake, the scene's.
-    """
-    return float(scene.render.frame_map_old / scene.render.frame_map_new)
-
-
-def gravity_of(scene: bpy.types.Scene) -> float:
-    """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
-    return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
-
-
 def along_bone(matrices: Array, distance: float) -> Array:
     """Path of the point at a distance from the bone's head, in units of the bone, (F, 3)."""
     return matrices[:, :3, 1] * distance + matrices[:, :3, 3]
@@ -242,9 +223,7 @@ class RestPose:
             return False
         left, right = (np.array([self.end(*mapping.joints[name]) for name in names[side::2]]) for side in (0, 1))
         hip, ankle, shoulder, wrist = (left + right) / 2
-        leg, trunk, arm = (
-            line / max(np.linalg.norm(line), 1e-9) for line in (ankle - hip, shoulder - hip, wrist - shoulder)
-        )
+        leg, trunk, arm = (unit(line) for line in (ankle - hip, shoulder - hip, wrist - shoulder))
         return bool(abs(leg @ trunk) < _ACROSS and leg @ arm > _ALONG)
 
     def facing(self, mapping: RigMapping) -> Array:
@@ -358,14 +337,10 @@ def _mirror_images(feet: Sequence[_Foot]) -> list[dict[int, Array]]:
             if foot.source.name[:-1] != other.source.name[:-1]:
                 continue
             mirror = reflection(across)
-            gap = _direction(foot.hinge - foot.ankle) - mirror @ _direction(other.hinge - other.ankle)
+            gap = unit(foot.hinge - foot.ankle) - mirror @ unit(other.hinge - other.ankle)
             if np.linalg.norm(gap) < _MIRROR_TOLERANCE:
                 images[i][j] = mirror
     return images
-
-
-def _direction(vector: Array) -> Array:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)
 
 
 def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[NDArray[np.bool_]]) -> list[FootSize]:
@@ -384,16 +359,4 @@ def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[
 def _rigid_motion(matrices: Array, rest: Array) -> Array:
     """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
     turn = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
-    motion = np.zeros_like(matrices)
-    motion[:, :3, :3] = turn
-    motion[:, :3, 3] = matrices[:, :3, 3] - turn @ rest[:3, 3]
-    motion[:, 3, 3] = 1.0
-    return motion
-
-
-def nearest_rotation(matrices: Array) -> Array:
-    """Rotations closest to the given matrices (polar decomposition)."""
-    u, _, vh = np.linalg.svd(matrices)
-    handed = np.ones(matrices.shape[:-1])
-    handed[..., 2] = np.sign(np.linalg.det(u @ vh))
-    return (u * handed[..., None, :]) @ vh
+    return displacement(turn, rest[:3, 3], matrices[:, :3, 3])

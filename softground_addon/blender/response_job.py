@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,7 @@ from ..core.tilt import TiltGains
 from . import nla_layer, settings
 from .character_keys import controls_of, response_curves
 from .character_setup import mapping_of
-from .motion_assembly import time_stretch
+from .jobs import Job, counted
 from .properties import SoftGroundCharacter
 
 PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
@@ -42,6 +42,9 @@ NOTICEABLE_LEAN = np.radians(0.25)
 LEAN_PASSES = 4
 """Most times that the ground is pressed anew by the leaning bodies. The lean of a frame follows from the ground before
 it, so that each pass makes the shot right further on (Picard iteration); two are mostly enough."""
+
+SHARE_OF_WRITING = 0.1
+"""Part of a bake's last stage in which the rigs are read that get a layer."""
 
 
 @dataclass(frozen=True)
@@ -147,9 +150,8 @@ def leaning(
 
 def leans_anew(now: Leaning, before: Leaning | None) -> bool:
     """Whether a lean differs from the one that pressed the ground by so much that the forces must be found anew."""
-    upright = before is None
-    pairs = zip(now.leans, now.leans if upright else before.leans, strict=True)
-    return any(float(np.abs(lean - (0.0 if upright else then)).max()) > NOTICEABLE_LEAN for lean, then in pairs)
+    then = before.leans if before is not None else [np.zeros(2)] * len(now.leans)
+    return any(float(np.abs(lean - was).max()) > NOTICEABLE_LEAN for lean, was in zip(now.leans, then, strict=True))
 
 
 def answers_of(
@@ -176,18 +178,14 @@ def answers_of(
 
 def layers_of(
     scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[Answer]
-) -> Generator[float, None, list[Layer]]:
-    """The keys of each character's layer; yields the part that is done."""
+) -> Job[list[Layer]]:
+    """The keys of each character's layer; none without answers."""
     layers: list[Layer] = []
     for number, (character, answer) in enumerate(zip(rigged(characters), answers, strict=False)):
-        job = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
-        while True:
-            try:
-                read = next(job)
-            except StopIteration as finished:
-                layers.append(Layer(finished.value, _notes(scene, character, answer)))
-                break
-            yield (number + read / len(answer.motion.frames)) / len(answers)
+        reading = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
+        frames = len(answer.motion.frames)
+        curves = yield from counted(reading, "write", frames, part=number, parts=len(answers), share=SHARE_OF_WRITING)
+        layers.append(Layer(curves, _notes(scene, character, answer)))
     return layers
 
 
@@ -214,7 +212,7 @@ def put_layers(
     layers: Sequence[Layer],
 ) -> None:
     """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
-    stretch = time_stretch(scene)
+    stretch = settings.time_stretch_of(scene)
     span = scene.softground.frame_start * stretch, scene.softground.frame_end * stretch
     for number, character in enumerate(rigged(characters)):
         if number < len(layers) and layers[number].curves:

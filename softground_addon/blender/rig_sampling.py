@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..core.errors import InputError
 from ..core.motion import CharacterMotion
 from .compat import remove_scene
-from .motion_assembly import Recording, assemble_motion, frame_rate_of, gravity_of
+from .motion_assembly import Recording, assemble_motion
 from .nla_layer import without_layer
 from .rig_mapping import RigMapping, SoleSource, require_armature
+from .settings import frame_rate_of, gravity_of
 from .solid_extraction import check_things, solid_motion
 
 Sampling = Generator[int, None, CharacterMotion]
@@ -30,7 +31,7 @@ _SCALE_TOLERANCE = 1e-3
 _FARTHEST = 1e6
 """Largest coordinate that a pose may have [Blender units]: single precision knows no centimetres beyond."""
 
-_TEMPORARY = "SoftGround Sampling"
+TEMPORARY = "SoftGround Sampling"
 """Name of what exists only while a rig is read."""
 
 _SCENE_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
@@ -137,34 +138,6 @@ def sample_thing(
     )
 
 
-def sample_character_now(
-    scene: bpy.types.Scene,
-    armature: bpy.types.Object,
-    mapping: RigMapping,
-    *,
-    mass: float,
-    frame_start: int,
-    frame_end: int,
-    frame_step: int = 1,
-) -> CharacterMotion:
-    """`sample_character` in one go."""
-    sampling = sample_character(
-        scene,
-        armature,
-        mapping,
-        mass=mass,
-        frame_start=frame_start,
-        frame_end=frame_end,
-        frame_step=frame_step,
-    )
-    while True:
-        try:
-            next(sampling)
-        except StopIteration as finished:
-            motion: CharacterMotion = finished.value
-            return motion
-
-
 def _frames(first: int, last: int, step: int) -> NDArray[np.int_]:
     frames = np.arange(first, last + 1, step) if step > 0 else np.empty(0, dtype=int)
     if not len(frames):
@@ -228,8 +201,8 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
     It holds a probe that depends on them instead of themselves: so they are evaluated even where the user hides them,
     and the objects' meshes are not.
     """
-    temporary = bpy.data.scenes.new(_TEMPORARY)
-    probe = bpy.data.objects.new(_TEMPORARY, None)
+    temporary = bpy.data.scenes.new(TEMPORARY)
+    probe = bpy.data.objects.new(TEMPORARY, None)
     names = temporary.name, probe.name
     try:
         for setting in _SCENE_TIME:

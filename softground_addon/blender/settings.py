@@ -13,6 +13,9 @@ from ..core.presets import MATERIAL_RANGES, Preset
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
+STANDARD_GRAVITY = 9.81
+"""For scenes whose gravity is switched off [m/s²]."""
+
 
 def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     """The context's scene, which an operator or a panel always has."""
@@ -33,6 +36,24 @@ def material_of(scene: bpy.types.Scene) -> GroundMaterial:
     """The scene's ground material as the core's type."""
     values = scene.softground.material
     return GroundMaterial(**{field: typed(getattr(values, field)) for field in MATERIAL_FIELDS})
+
+
+def frame_rate_of(scene: bpy.types.Scene) -> float:
+    """Scene frames per second [Hz]."""
+    return float(scene.render.fps / scene.render.fps_base)
+
+
+def time_stretch_of(scene: bpy.types.Scene) -> float:
+    """Frames of the animation per frame of the scene: 1 unless its time is remapped.
+
+    Keys, strips, nodes and caches count the animation's frames; the timeline, and with it a bake, the scene's.
+    """
+    return float(scene.render.frame_map_old / scene.render.frame_map_new)
+
+
+def gravity_of(scene: bpy.types.Scene) -> float:
+    """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
+    return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
 
 
 def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:

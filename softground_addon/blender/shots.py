@@ -21,7 +21,7 @@ from . import ground_mesh, painted_ground, settings
 from .bake_checks import check_contacts
 from .character_setup import characters_of, mapping_of, title_of
 from .ground_mesh import GroundSurface
-from .jobs import Job, Progress, aside
+from .jobs import Job, Progress, aside, counted
 from .properties import SoftGroundCharacter
 from .rig_sampling import sample_character, sample_thing
 from .solid_extraction import check_things
@@ -150,11 +150,5 @@ def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCha
             job = sample_character(scene, character.armature, mapping, mass=mass, **frames)
         else:
             job = sample_thing(scene, character.name, mapping, mass=mass, **frames)
-        while True:
-            try:
-                read = next(job)
-            except StopIteration as finished:
-                motions.append(finished.value)
-                break
-            yield Progress("sample", (number + read / count) / len(characters))
+        motions.append((yield from counted(job, "sample", count, part=number, parts=len(characters))))
     return motions

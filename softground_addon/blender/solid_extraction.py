@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from ..core.errors import InputError
 from ..core.motion import Array, SoleMotion
+from ..core.rigid import displacement, nearest_rotation
 from ..core.soles import solid_sole
 from ..core.solids import mass_properties
 from . import mesh_arrays
-from .motion_assembly import nearest_rotation
 from .rig_mapping import SoleSource
 
 _SAME_SIZE = 0.01
@@ -113,9 +113,6 @@ def solid_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) ->
     vertices, triangles = surface_of(scene, thing)
     vertices = vertices @ stretch.T
     mass = mass_properties(vertices, triangles)
-    transforms = np.zeros_like(matrices)
-    transforms[:, :3, :3] = rotation
-    transforms[:, :3, 3] = matrices[:, :3, 3] + rotation @ mass.centre
-    transforms[:, 3, 3] = 1.0
+    transforms = displacement(rotation, -mass.centre, matrices[:, :3, 3])
     sole = solid_sole(vertices - mass.centre, triangles, name=source.name, side=source.side)
     return SoleMotion(sole, transforms[:, None]), mass.volume

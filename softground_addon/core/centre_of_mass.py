@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .motion import CharacterMotion
+from .rigid import unit
 
 Array = NDArray[np.float64]
 
@@ -143,7 +144,7 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
         (table.trunk * table.trunk_centre, hips),
         (table.trunk * (1 - table.trunk_centre) / 2, neck),
         (table.trunk * (1 - table.trunk_centre) / 2, shoulders),
-        (table.head, neck + table.head_centre * trunk_length * _direction(joints["head"] - neck)),
+        (table.head, neck + table.head_centre * trunk_length * unit(joints["head"] - neck)),
     ]
     parts = list(range(len(points)))
     for part, (fraction, start, end, centre) in enumerate(table.limbs, start=len(points)):
@@ -197,12 +198,6 @@ def fitted_to_free_fall(
     return MassPoints(points.positions, fractions / fractions.sum(), points.parts), float(misfit)
 
 
-def _direction(vectors: Array) -> Array:
-    """Unit vectors, 0 where there is no direction."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
-
-
 class _Joints:
     """Paths of joints by name, with stand-ins for those that are not mapped."""
 
@@ -219,7 +214,7 @@ class _Joints:
             return (self._mapped["shoulder_l"] + self._mapped["shoulder_r"]) / 2  # the far end of a four-legged trunk
         joint, _, side = name.partition("_")
         parent = _TOWARD_HIPS[joint]
-        return self[f"{parent}_{side}" if side and f"{parent}" not in ("neck", "hips") else parent]
+        return self[f"{parent}_{side}" if side and parent not in ("neck", "hips") else parent]
 
 
 def _hips(motion: CharacterMotion) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .motion import Array
+from .rigid import unit
 from .soles import ANKLE_HEIGHT, ANKLE_POSITION, BALL_POSITION, FOOT_TO_LEG
 
 UP = np.array((0.0, 0.0, 1.0))
@@ -132,9 +133,9 @@ def typical_direction(directions: Array) -> Array | None:
     """
     if not len(directions):
         return None
-    centre = _unit(np.median(directions, axis=0))
+    centre = unit(np.median(directions, axis=0))
     near = directions @ centre >= np.cos(_MOST_SPREAD)
-    return _unit(directions[near].mean(axis=0)) if near.any() else None
+    return unit(directions[near].mean(axis=0)) if near.any() else None
 
 
 @dataclass(frozen=True)
@@ -204,11 +205,11 @@ def flat_foot(
     FlatFoot
         With the origin at the height of the ankle.
     """
-    forward = _unit(forward - (forward @ foot_up) * foot_up)
+    forward = unit(forward - (forward @ foot_up) * foot_up)
     foot_axes = np.column_stack([forward, np.cross(foot_up, forward), foot_up])
     carried = typical_direction(toe_turns @ forward)
     toe_forward = forward if carried is None else carried
-    toe_forward = _unit(toe_forward - (toe_forward @ toe_up) * toe_up)
+    toe_forward = unit(toe_forward - (toe_forward @ toe_up) * toe_up)
     toe_axes = np.column_stack([toe_forward, np.cross(toe_up, toe_forward), toe_up])
 
     in_sole = foot_axes.T @ (ball - ankle)
@@ -221,8 +222,8 @@ def flat_foot(
 
 def reflection(normal: Array) -> Array:
     """(3, 3) matrix that mirrors in the plane across a direction."""
-    unit = _unit(normal)
-    return np.eye(3) - 2 * np.outer(unit, unit)
+    across = unit(normal)
+    return np.eye(3) - 2 * np.outer(across, across)
 
 
 @dataclass(frozen=True)
@@ -278,8 +279,3 @@ def _frame(axes: Array, origin: Array) -> Array:
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = axes, origin
     return frame
-
-
-def _unit(vector: Array) -> Array:
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 0 else vector

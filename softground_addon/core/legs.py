@@ -35,21 +35,34 @@ class Leg:
     toward_toes: Array
 
     @property
+    def thigh(self) -> Array:
+        """Length of the thigh, (F,) [m]."""
+        return _distance(self.hip, self.knee)
+
+    @property
+    def shank(self) -> Array:
+        """Length of the shank, (F,) [m]."""
+        return _distance(self.knee, self.ankle)
+
+    @property
     def length(self) -> Array:
         """Thigh and shank together, (F,) [m]."""
-        return np.asarray(
-            np.linalg.norm(self.knee - self.hip, axis=-1) + np.linalg.norm(self.ankle - self.knee, axis=-1)
-        )
+        return self.thigh + self.shank
+
+    @property
+    def span(self) -> Array:
+        """Distance from hip to ankle, (F,) [m]."""
+        return _distance(self.hip, self.ankle)
 
     @property
     def extension(self) -> Array:
         """Distance from hip to ankle over the leg's length, (F,)."""
-        return np.asarray(np.linalg.norm(self.ankle - self.hip, axis=-1) / np.maximum(self.length, 1e-12))
+        return np.asarray(self.span / np.maximum(self.length, 1e-12))
 
     @property
     def flexion(self) -> Array:
         """Angle by which the knee is bent, (F,) [rad], 0 where the leg is straight."""
-        return self.flexion_at(np.linalg.norm(self.ankle - self.hip, axis=-1))[0]
+        return self.flexion_at(self.span)[0]
 
     def flexion_at(self, span: Array, nearly_straight: float = 0.0) -> tuple[Array, Array]:
         """Flexion of the knee with which the ankle is so far from the hip, and how it changes with that distance.
@@ -67,8 +80,7 @@ class Leg:
         slope : (F,) float array [rad/m]
             Negative.
         """
-        thigh = np.linalg.norm(self.knee - self.hip, axis=-1)
-        shank = np.linalg.norm(self.ankle - self.knee, axis=-1)
+        thigh, shank = self.thigh, self.shank
         product = np.maximum(thigh * shank, 1e-12)
         flexion = np.arccos(np.clip((span**2 - thigh**2 - shank**2) / (2 * product), -1.0, 1.0))
         sine = np.maximum(np.sin(flexion), max(np.sin(nearly_straight), 1e-9))
@@ -96,11 +108,9 @@ def solve(leg: Leg, hip: Array, ankle: Array) -> SolvedLeg:
     hip, ankle : (F, 3) float arrays
         Where they go [m].
     """
-    thigh = np.linalg.norm(leg.knee - leg.hip, axis=-1)
-    shank = np.linalg.norm(leg.ankle - leg.knee, axis=-1)
-    span = np.linalg.norm(ankle - hip, axis=-1)
-    farthest = np.maximum((thigh + shank) * (1 - _CLOSEST), np.linalg.norm(leg.ankle - leg.hip, axis=-1))
-    span = np.clip(span, np.abs(thigh - shank) + _CLOSEST * (thigh + shank), farthest)
+    thigh, shank = leg.thigh, leg.shank
+    farthest = np.maximum((thigh + shank) * (1 - _CLOSEST), leg.span)
+    span = np.clip(_distance(hip, ankle), np.abs(thigh - shank) + _CLOSEST * (thigh + shank), farthest)
     axis, source_axis = unit(ankle - hip), unit(leg.ankle - leg.hip)
 
     along = (thigh**2 - shank**2 + span**2) / (2 * np.maximum(span, 1e-12))
@@ -127,6 +137,10 @@ def _bend(leg: Leg, axis: Array, aside: Array) -> Array:
     deviation = np.arctan2(np.sum(offset * sideways, axis=-1), np.sum(offset * forward, axis=-1))
     kept = deviation * np.minimum(1.0, distance / np.maximum(aside, 1e-12))
     return np.asarray(np.cos(kept)[:, None] * forward + np.sin(kept)[:, None] * sideways)
+
+
+def _distance(start: Array, end: Array) -> Array:
+    return np.asarray(np.linalg.norm(end - start, axis=-1))
 
 
 def _across(axis: Array) -> Array:

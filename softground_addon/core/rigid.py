@@ -43,6 +43,14 @@ def turn_between(start: Array, end: Array) -> Array:
     return np.asarray(direction * np.arctan2(sine, cosine))
 
 
+def nearest_rotation(matrices: Array) -> Array:
+    """Rotations (..., 3, 3) closest to the given matrices (polar decomposition)."""
+    u, _, vh = np.linalg.svd(matrices)
+    handed = np.ones(matrices.shape[:-1])
+    handed[..., 2] = np.sign(np.linalg.det(u @ vh))
+    return np.asarray((u * handed[..., None, :]) @ vh)
+
+
 def unit(vectors: Array) -> Array:
     """Unit vectors (..., 3), 0 where there is no direction."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)

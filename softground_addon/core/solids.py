@@ -17,6 +17,8 @@ FEW_VERTICES = 400
 """Meshes with fewer vertices are probed between them too: the faces of a box are larger than bumps of the ground."""
 _CAPSULE_RINGS, _CAPSULE_SIDES = 6, 24
 """Rings of each round end of a capsule, and corners of each."""
+_DIRECTIONS = 64
+"""Directions in which the outermost points of a body are looked for."""
 _FLATTEST = 0.1
 """Least size of a body over its longest extent: a sheet has no volume."""
 
@@ -134,10 +136,10 @@ def capsule(start: Array, end: Array, radius: float) -> tuple[Array, Indices]:
     return points.reshape(-1, 3) @ frame + start, np.concatenate(halves).reshape(-1, 3)
 
 
-def supports(points: Array, count: int = 64) -> Array:
-    """Those of the points that are furthest out in evenly spread directions, (K, 3) with K at most `count`."""
-    step = np.arange(count) + 0.5
-    z = 1 - 2 * step / count
+def supports(points: Array) -> Array:
+    """Those of the points that are furthest out in evenly spread directions, (K, 3) with K at most `_DIRECTIONS`."""
+    step = np.arange(_DIRECTIONS) + 0.5
+    z = 1 - 2 * step / _DIRECTIONS
     turn = np.pi * (1 + np.sqrt(5.0)) * step  # the golden angle: Fibonacci's lattice on the sphere
     around = np.sqrt(1 - z**2)
     directions = np.stack([around * np.cos(turn), around * np.sin(turn), z], axis=-1)

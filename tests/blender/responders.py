@@ -9,7 +9,8 @@ from sample_scenes.body import BONES
 from softground_addon.blender import bake_job, jobs
 from softground_addon.blender.character_setup import mapping_of
 from softground_addon.blender.compat import action_curves
-from softground_addon.blender.rig_sampling import sample_character_now
+from softground_addon.blender.jobs import run
+from softground_addon.blender.rig_sampling import sample_character
 from softground_addon.core.foot_placement import lowest_clearance, posed_points
 from softground_addon.core.ground_history import GroundHistory
 from softground_addon.core.grounding import leg_soles
@@ -158,13 +159,15 @@ def source_motion(scene, character=None):
     """The character without its layer."""
     character = character or scene.softground.characters[0]
     options = scene.softground
-    return sample_character_now(
-        scene,
-        character.armature,
-        mapping_of(character),
-        mass=character.mass,
-        frame_start=options.frame_start,
-        frame_end=options.frame_end,
+    return run(
+        sample_character(
+            scene,
+            character.armature,
+            mapping_of(character),
+            mass=character.mass,
+            frame_start=options.frame_start,
+            frame_end=options.frame_end,
+        )
     )
 
 

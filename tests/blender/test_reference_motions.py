@@ -10,7 +10,8 @@ from scipy.spatial import KDTree
 
 from softground_addon.blender import bake_job, jobs
 from softground_addon.blender.character_setup import mapping_of
-from softground_addon.blender.rig_sampling import sample_character_now
+from softground_addon.blender.jobs import run
+from softground_addon.blender.rig_sampling import sample_character
 from tests.blender import shots
 
 STEPS = {"walk": 6, "run": 15, "jumping": 6, "jumping_jacks": 14}
@@ -31,13 +32,15 @@ def bake_of(name):
     result = jobs.run(bake_job.bake(scene))
     options = scene.softground
     character = options.characters[0]
-    motion = sample_character_now(
-        scene,
-        character.armature,
-        mapping_of(character),
-        mass=character.mass,
-        frame_start=options.frame_start,
-        frame_end=options.frame_end,
+    motion = run(
+        sample_character(
+            scene,
+            character.armature,
+            mapping_of(character),
+            mass=character.mass,
+            frame_start=options.frame_start,
+            frame_end=options.frame_end,
+        )
     )
     return name, result, motion
 

@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.jobs import run
 from softground_addon.blender.rig_mapping import RigMapping, SoleSource, map_rig
-from softground_addon.blender.rig_sampling import sample_character, sample_character_now
+from softground_addon.blender.rig_sampling import sample_character
 from softground_addon.core.errors import InputError
 
 from . import fingerprints, rigs, shots
@@ -18,14 +19,16 @@ BLENDER = rigs.FAMILIES["blender"]
 
 
 def sample(scene, armature, mapping=None, *, start=1, end=20, **options):
-    return sample_character_now(
-        scene,
-        armature,
-        mapping or map_rig(armature),
-        mass=70.0,
-        frame_start=start,
-        frame_end=end,
-        **options,
+    return run(
+        sample_character(
+            scene,
+            armature,
+            mapping or map_rig(armature),
+            mass=70.0,
+            frame_start=start,
+            frame_end=end,
+            **options,
+        )
     )
 
 
@@ -420,7 +423,7 @@ def test_settings_that_cannot_be_used_are_refused(scene, change, message):
     settings = {"mapping": map_rig(armature), "mass": 70.0, "frame_start": 1, "frame_end": 5, **change}
     mapping = settings.pop("mapping")
     with pytest.raises(InputError, match=message):
-        sample_character_now(scene, armature, mapping, **settings)
+        run(sample_character(scene, armature, mapping, **settings))
 
 
 def test_left_and_right_are_not_swapped_whatever_way_the_rig_faces(scene):

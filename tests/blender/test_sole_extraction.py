@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.jobs import run
 from softground_addon.blender.rig_mapping import map_rig
-from softground_addon.blender.rig_sampling import sample_character_now
+from softground_addon.blender.rig_sampling import sample_character
 
 from . import rigs
 
@@ -21,7 +22,7 @@ def standing(**options):
 
 
 def sample(armature):
-    return sample_character_now(bpy.context.scene, armature, map_rig(armature), mass=70.0, frame_start=1, frame_end=10)
+    return run(sample_character(bpy.context.scene, armature, map_rig(armature), mass=70.0, frame_start=1, frame_end=10))
 
 
 def box(x, y, bottom=0.0, top=0.06):

@@ -14,16 +14,19 @@ def loads_in_blender(scene, body, motion, terrain=None):
     """Loads of a character that plays a motion, mapped and sampled as a user's."""
     from sample_scenes.character import create_character
     from sample_scenes.keys import write_action
+    from softground_addon.blender.jobs import run
     from softground_addon.blender.rig_mapping import map_rig
-    from softground_addon.blender.rig_sampling import sample_character_now
+    from softground_addon.blender.rig_sampling import sample_character
     from softground_addon.core.simulation import estimate_loads
 
     armature = create_character("Body", body, scene.collection)
     write_action(armature, motion, "Motion", first_frame=0)
     scene.render.fps = round(motion.frame_rate)
     scene.render.fps_base = round(motion.frame_rate) / motion.frame_rate
-    sampled = sample_character_now(
-        scene, armature, map_rig(armature), mass=body.mass, frame_start=0, frame_end=len(motion.hips) - 1
+    sampled = run(
+        sample_character(
+            scene, armature, map_rig(armature), mass=body.mass, frame_start=0, frame_end=len(motion.hips) - 1
+        )
     )
     return estimate_loads(sampled, terrain or FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 

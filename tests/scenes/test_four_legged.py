@@ -144,8 +144,9 @@ class TestInBlender:
     def loads(self, scene, gait):
         from sample_scenes.character import create_character
         from sample_scenes.keys import write_action
+        from softground_addon.blender.jobs import run
         from softground_addon.blender.rig_mapping import RigMapping, SoleSource, map_rig
-        from softground_addon.blender.rig_sampling import sample_character_now
+        from softground_addon.blender.rig_sampling import sample_character
         from softground_addon.core.heightfield import FlatTerrain
         from softground_addon.core.simulation import estimate_loads
         from tests.scenes.estimates import SNOW
@@ -158,7 +159,7 @@ class TestInBlender:
             SoleSource(f"{bone}.{side}", side, bone=f"{bone}.{side}") for bone in ("foot", "hand") for side in SIDES
         ]
         mapping = RigMapping(map_rig(armature).joints, tuple(soles))
-        sampled = sample_character_now(scene, armature, mapping, mass=dog.mass, frame_start=0, frame_end=119)
+        sampled = run(sample_character(scene, armature, mapping, mass=dog.mass, frame_start=0, frame_end=119))
         return estimate_loads(sampled, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
     def test_the_add_on_takes_it_for_an_animal(self, loads):
