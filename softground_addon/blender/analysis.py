@@ -123,6 +123,11 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
             material, youngs_modulus=matching_modulus(analysis.stances, material, aim, scene.softground.pressure)
         )
         reached = _simulated_depth(scene, analysis, material)
+        if not reached > 0:
+            raise InputError(
+                "No stiffness gives a print: the ground takes none under the feet. Look at what is painted on it, and "
+                "at the crust of its material."
+            )
         if abs(reached - depth) <= CLOSE_ENOUGH * depth:
             break
         aim *= depth / reached  # sliding feet print less deep than predicted
@@ -156,8 +161,8 @@ def _source(scene: bpy.types.Scene) -> Hashable:
     """What a shot is read from, as far as it is seen in the settings; edits of actions are told by a handler."""
     options = scene.softground
     return (
-        (options.frame_start, options.frame_end),
-        (settings.frame_rate_of(scene), settings.time_stretch_of(scene), scene.unit_settings.scale_length),
+        (options.frame_start, options.frame_end, settings.frame_rate_of(scene), settings.time_stretch_of(scene)),
+        (settings.gravity_of(scene), scene.unit_settings.scale_length),
         options.ground and options.ground.session_uid,
         (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(

@@ -115,8 +115,10 @@ def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
         "painted": [options.painted.stiffness, options.painted.layer_depth, options.painted.rim],
         "cell_size_m": settings.cell_size_of(scene),
         "frames": [options.frame_start, options.frame_end],
-        "frame_rate": scene.render.fps / scene.render.fps_base,
+        "frame_rate": settings.frame_rate_of(scene),
         "time_stretch": settings.time_stretch_of(scene),
+        "gravity_m_s2": settings.typed(settings.gravity_of(scene)),
+        "unit_scale_m": settings.typed(scene.unit_settings.scale_length),
         "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
     }
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, jobs, painted_ground, settings
+from softground_addon.blender import analysis, bake_job, jobs, painted_ground, settings
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import MATERIAL_RANGES, find
@@ -160,3 +160,10 @@ def test_a_name_that_is_not_there_or_of_another_kind_is_refused_with_the_remedy(
         bake(walk)
     walk.softground.painted.stiffness = ""
     bake(walk)
+
+
+def test_a_depth_cannot_be_matched_on_ground_that_takes_no_print(walk):
+    walk.softground.ground = plane(walk)
+    paint(walk.softground.ground, "softground_layer_depth", np.zeros(len(walk.softground.ground.data.vertices)))
+    with pytest.raises(InputError, match="takes none under the feet"):
+        analysis.match_depth(walk, 0.05)

@@ -3,7 +3,7 @@
 import bpy
 import pytest
 
-from softground_addon.blender import bake_report, baked_ground
+from softground_addon.blender import analysis, bake_report, baked_ground
 from tests.blender import shots
 from tests.blender.test_bake import plane
 
@@ -59,6 +59,18 @@ def move_key(scene):
     curve.keyframe_points[3].co.y += 0.001
 
 
+def remap_time(scene):
+    scene.render.frame_map_new = 120
+
+
+def halve_gravity(scene):
+    scene.gravity.z /= 2
+
+
+def change_unit(scene):
+    scene.unit_settings.scale_length = 0.5
+
+
 def add_strip(scene):
     armature = scene.softground.characters[0].armature
     track = armature.animation_data.nla_tracks.new()
@@ -70,6 +82,9 @@ def add_strip(scene):
     [
         (change_setting, "settings"),
         (change_mass, "settings"),
+        (remap_time, "settings"),
+        (halve_gravity, "settings"),
+        (change_unit, "settings"),
         (move_ground, "'Field' has changed"),
         (delete_vertex, "'Field"),
         (move_key, "animation of 'Walker'"),
@@ -84,6 +99,16 @@ def test_every_change_of_the_inputs_makes_it_stale_until_the_next_bake(baked, ch
     if change is not delete_vertex or baked.softground.detail == "ALWAYS":
         bpy.ops.softground.bake()
         assert bake_report.stale_reasons(baked) == ()
+
+
+@pytest.mark.parametrize("change", [remap_time, halve_gravity, change_unit])
+def test_what_was_read_at_another_time_scale_gravity_or_unit_is_not_known(scene, change):
+    shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    analysis.read(scene)
+    assert analysis.known(scene) is not None
+    change(scene)
+    assert analysis.known(scene) is None
 
 
 def test_a_cleared_ground_is_not_stale(baked):
