@@ -6,9 +6,10 @@ from contextlib import suppress
 
 import bpy
 
-from . import bake_report, baked_ground, ground_mesh, staleness
+from ..core.errors import InputError
+from . import bake_report, baked_ground, ground_mesh, response_job, staleness
 from .bake_job import BakeResult, bake
-from .character_setup import movers_of
+from .character_setup import characters_of, movers_of
 from .jobs import Job
 
 
@@ -25,9 +26,11 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     Raises
     ------
     SoftGroundError
-        As `bake`.
+        As `bake`, and if there is nobody with feet.
     """
     options = scene.softground
+    if not response_job.rigged(characters_of(scene)):
+        raise InputError("Nothing here has feet to let down: add a character with an animated armature.")
     settings = options.grounding.use, options.output
     up_to_date = not bake_report.stale_reasons(scene)
     options.grounding.use = True

@@ -51,6 +51,14 @@ def test_feet_that_cannot_be_let_down_leave_the_settings_as_they_were(baked):
     assert baked.softground.output == "PRINTS"
 
 
+def test_things_without_feet_are_refused_and_the_settings_stay(scene):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.25, location=(0, 0, 0.25))
+    bpy.ops.softground.add_character()
+    with pytest.raises(RuntimeError, match="feet to let down"):
+        bpy.ops.softground.sink_feet()
+    assert not scene.softground.grounding.use
+
+
 def test_a_sinking_that_is_cancelled_leaves_everything_as_it_was(baked):
     before = fingerprints.of_file()
     job = sink_feet.sink_feet(baked)
