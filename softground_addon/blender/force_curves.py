@@ -13,10 +13,9 @@ import numpy as np
 from bpy.props import StringProperty
 from numpy.typing import NDArray
 
-from ..core import files, record
-from ..core.errors import InputError
+from ..core import files
 from ..core.footprints import Footprint
-from . import baked_ground, compat, ground_mesh, settings
+from . import baked_ground, compat, settings
 from .operators import OnBake, reports_errors
 from .translation import rpt_
 
@@ -115,12 +114,8 @@ def _animate(thing: bpy.types.Object, name: str, frames: Array, values: Array, *
 def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
     """The record on the scene's ground, and the frames that it covers."""
     scene = settings.scene_of(context)
-    ground = scene.softground.ground
-    if ground is None or not baked_ground.is_baked(ground):
-        raise InputError("There is no bake on the ground: press Bake Footprints first.")
-    footprints, about = record.load(bytes(ground_mesh.mesh_of(baked_ground.carrier_of(ground))[ground_mesh.RECORD]))
-    inputs: Any = about.get("inputs", {})
-    first, last = inputs.get("frames", (scene.softground.frame_start, scene.softground.frame_end))
+    footprints, about = baked_ground.load(scene.softground.ground)
+    first, last = about.get("inputs", {}).get("frames", (scene.softground.frame_start, scene.softground.frame_end))
     return footprints, np.arange(first, last + 1, dtype=float)
 
 
@@ -159,8 +154,7 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         footprints, frames = _baked(context)
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
-        render = settings.scene_of(context).render
-        files.write_text(path, table(footprints, frames, render.fps / render.fps_base))
+        files.write_text(path, table(footprints, frames, settings.frame_rate_of(settings.scene_of(context))))
         self.report({"INFO"}, rpt_("Wrote {path}").format(path=path))
         return {"FINISHED"}
 

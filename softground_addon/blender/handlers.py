@@ -10,15 +10,13 @@ from bpy.app.handlers import persistent
 
 from . import analysis, bake_report, live, modal_bake, overlay, session
 from .compat import remove_scene
+from .rig_sampling import TEMPORARY
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does."""
 
 SETTLED = 0.3
 """Time without edits after which what takes a while is worked out anew [s]."""
-
-LEFT_OVER = "SoftGround Sampling"
-"""Scenes in which rigs are read; one may come back with an undo step or an autosave from within a bake."""
 
 
 @persistent
@@ -43,10 +41,10 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
 
 def compare_bake() -> None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
-    for window in bpy.context.window_manager.windows:
-        session.current().stale = "\n".join(bake_report.stale_reasons(window.scene))
+    windows = bpy.context.window_manager.windows
+    if windows:
+        session.current().stale = "\n".join(bake_report.stale_reasons(windows[0].scene))
         session.redraw()
-        return
 
 
 def _later(job: Callable[[], None]) -> None:
@@ -99,7 +97,8 @@ def after_load(*_: Any) -> None:
 
 
 def _remove_left_over_scenes() -> None:
-    for scene in [scene for scene in bpy.data.scenes if scene.name.split(".")[0] == LEFT_OVER]:
+    """Scenes in which rigs are read may come back with an undo step or an autosave from within a bake."""
+    for scene in [scene for scene in bpy.data.scenes if scene.name.split(".")[0] == TEMPORARY]:
         remove_scene(scene)
 
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ..core.errors import InputError
 from ..core.files import replacing
-from ..core.footprints import Footprint
+from ..core.footprints import NEVER, Footprint
 from ..core.histories import Histories, histories
 from ..core.uv_raster import Pixels, rasterise
-from . import baked_ground, ground_mesh, refined_mesh
+from . import baked_ground, ground_mesh, refined_mesh, settings
 from .exports import baked_carrier
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def export_images(
             mask = np.stack([compression, np.maximum(height + compression, 0.0), age], axis=-1)
             for kind, channels, empty in (
                 (DISPLACEMENT, np.repeat(height[:, None], 3, axis=1), (0.0, 0.0, 0.0)),
-                (MASK, mask, (0.0, 0.0, -1.0)),
+                (MASK, mask, (0.0, 0.0, NEVER)),
             ):
                 path = folder / f"{stem}_{kind}_{frame:04d}.exr"
                 _save(image, resolution, pixels.index, channels, empty, path)
@@ -93,8 +93,7 @@ def _age(over_time: Histories, frame: float, points: int, scene: bpy.types.Scene
     latest = np.full(points, -np.inf)
     begun = visits.start <= frame
     np.maximum.at(latest, visits.point[begun], np.minimum(visits.end[begun], frame))
-    rate = scene.render.fps / scene.render.fps_base
-    return np.where(np.isfinite(latest), (frame - latest) / rate, -1.0)
+    return np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
 
 
 def _pixels(

@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 import softground_addon
-from softground_addon.blender import analysis, ground_mesh, handlers, live
+from softground_addon.blender import analysis, ground_mesh, handlers, live, rig_sampling
 from tests.blender.shots import walker
 
 IDLE_COST = 5e-6
@@ -60,6 +60,6 @@ def test_an_edited_action_makes_the_prediction_worthless(scene):
 
 
 def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene):
-    bpy.data.scenes.new(handlers.LEFT_OVER)
+    bpy.data.scenes.new(rig_sampling.TEMPORARY)
     handlers.after_load()
     assert [s.name for s in bpy.data.scenes] == [scene.name]
