@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .contacts import runs
 from .errors import InputError
 from .simulation import CharacterLoads
 
@@ -25,10 +26,10 @@ def pressed_area(loads: Sequence[CharacterLoads]) -> float:
     area = 0.0
     for character in loads:
         for index, sole in enumerate(character.motion.soles):
-            touching = character.contacts.touching[:, index].astype(int)
-            steps = int((np.diff(touching, prepend=0) > 0).sum())
+            touching = character.contacts.touching[:, index]
+            steps = len(runs(touching)[0])
             paths = sole.landmark_positions()[..., :2].mean(axis=1)
-            travel = np.linalg.norm(np.diff(paths, axis=0), axis=1)[touching[1:] > 0].sum()
+            travel = np.linalg.norm(np.diff(paths, axis=0), axis=1)[touching[1:]].sum()
             area += steps * sole.sole.area + float(travel) * float(np.ptp(sole.sole.outline[:, 1]))
     return area
 
@@ -45,7 +46,7 @@ def check_cell_size(loads: Sequence[CharacterLoads], cell_size: float, available
         Memory [bytes]; that of the machine by default, where the system tells it.
     """
     for character in loads:
-        length = max(float(np.ptp(sole.sole.outline[:, 0])) for sole in character.motion.soles)
+        length = max(sole.sole.length for sole in character.motion.soles)
         if length < cell_size:
             raise InputError(
                 f"The soles of '{character.motion.name}' are {length * 1e3:.3g} mm long, smaller than a cell of "

@@ -185,8 +185,10 @@ class SparseGrid:
         left, low = np.floor(column), np.floor(row)
         u, v = column - left, row - low
         left, low = left.astype(int), low.astype(int)
-        values = (self._gather(left, low) * (1 - u) + self._gather(left + 1, low) * u) * (1 - v)
-        values += (self._gather(left, low + 1) * (1 - u) + self._gather(left + 1, low + 1) * u) * v
+        around = self._gather(np.concatenate([left, left + 1] * 2), np.concatenate([low, low, low + 1, low + 1]))
+        below, below_right, above, above_right = np.split(around, 4, axis=1)
+        values = (below * (1 - u) + below_right * u) * (1 - v)
+        values += (above * (1 - u) + above_right * u) * v
         return values.reshape(self.channels, *x.shape)
 
     def nearest(self, x: Array, y: Array) -> Array:

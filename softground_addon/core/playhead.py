@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import count as numbers
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from .simulation import CharacterLoads, FrameResult, Simulation
 from .soft_ground import SoftGround
 
 Array = NDArray[np.float64]
-Series = TypeVar("Series", bound=Any)
 
 
 @dataclass(frozen=True)
@@ -152,14 +150,5 @@ def _until(frame: float, character: CharacterLoads) -> CharacterLoads:
     """The loads up to a scene frame."""
     motion = character.motion
     count = int(np.searchsorted(motion.frames, frame, side="right"))
-    return CharacterLoads(
-        motion.first(count),
-        _first(character.contacts, count),
-        _first(character.forces, count),
-    )
-
-
-def _first(series: Series, steps: int) -> Series:
-    """The first steps of every array over time (N, ...) that a dataclass holds; what holds for all time is (S,)."""
-    values = {field.name: getattr(series, field.name) for field in fields(series)}
-    return replace(series, **{name: value[:steps] for name, value in values.items() if value.ndim > 1})
+    steps = slice(count)
+    return CharacterLoads(motion.first(count), character.contacts.during(steps), character.forces.during(steps))
