@@ -148,7 +148,7 @@ def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: Groun
 
 def _estimated(scene: bpy.types.Scene, shot: Shot) -> Analysis:
     loads = jobs.run(estimate_shot(scene, shot))
-    stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene))
+    stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene), shot.variation)
     return Analysis(_source(scene), _terms(scene), shot, loads, stances)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
@@ -16,6 +17,10 @@ STAGES = {"sample": 6, "simulate": 3, "write": 1}
 
 PATIENCE = 0.005
 """Longest wait for a computation that runs aside before its driver gets to do something else [s]."""
+
+SWITCH = 5e-4
+"""Longest wait of Blender's own thread for Python while a computation runs aside [s]: it needs it for each panel that
+it draws."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +94,13 @@ def aside(stage: str, fraction: float, function: Callable[..., Result], *argumen
 
 def meanwhile(state: State, function: Callable[..., Result], *arguments: object) -> Generator[State, None, Result]:
     """What `aside` does, for generators that yield something else than their progress: the same over and over."""
-    with ThreadPoolExecutor(1) as thread:
-        outcome = thread.submit(function, *arguments)
-        while not wait([outcome], timeout=PATIENCE).done:
-            yield state
-    return outcome.result()
+    patience = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH)
+    try:
+        with ThreadPoolExecutor(1) as thread:
+            outcome = thread.submit(function, *arguments)
+            while not wait([outcome], timeout=PATIENCE).done:
+                yield state
+        return outcome.result()
+    finally:
+        sys.setswitchinterval(patience)

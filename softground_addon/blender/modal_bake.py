@@ -19,6 +19,9 @@ TICK = 0.03
 TIMER_STEP = 0.005
 """Time left to the events between two ticks [s]."""
 
+SHOWN_FOR = 0.15
+"""Time between two drawings of the progress [s]: they cost more than many a tick."""
+
 STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
 
 _NAVIGATION = (
@@ -68,7 +71,8 @@ class _Bake(bpy.types.Operator):
     def _start(self, context: bpy.types.Context) -> set[str]:
         self._job = self._job_of(settings.scene_of(context))
         self._needed = _read_by_bake(settings.scene_of(context))
-        self._started = self._ticked = time.perf_counter()
+        self._started = self._ticked = self._shown = time.perf_counter()
+        self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
@@ -100,8 +104,14 @@ class _Bake(bpy.types.Operator):
         waited, self._ticked = now - self._ticked, now
         if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
             self._started += waited
-            session.current().status = iface_("Waiting for the render")
-            self._show_status()
+            if now - self._shown > SHOWN_FOR:
+                self._shown = now
+                session.current().status = iface_("Waiting for the render")
+                self._show_status()
+            return {"PASS_THROUGH"}
+        if self._progress and now - self._shown > SHOWN_FOR:  # a tick works or draws: both take their time
+            self._shown = now
+            self._show_progress(self._progress)
             return {"PASS_THROUGH"}
         until = now + TICK
         try:
@@ -120,7 +130,7 @@ class _Bake(bpy.types.Operator):
         except BaseException:
             self._end()
             raise
-        self._show_progress(progress)
+        self._progress = progress
         return {"PASS_THROUGH"}
 
     def _show_progress(self, progress: jobs.Progress) -> None:

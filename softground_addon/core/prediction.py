@@ -17,12 +17,14 @@ from .contacts import runs
 from .deformation import GroundMaterial, compress, compression_rate, sink, target_compression, touching_fraction
 from .errors import InputError
 from .heightfield import Terrain, TerrainTiles, Window
-from .indentation import Springs
+from .indentation import Springs, stress
 from .pressure import Pressure, pressure_field
 from .simulation import CharacterLoads
-from .sole_points import contact_window, places, point_contact, sole_points
+from .sole_points import contact_window, places, point_contact, sole_points, under_points
 from .solid_imprint import ground_under
 from .solids import posed
+from .stance import descent
+from .variation import Factors, Variation, VariationTiles
 
 Array = NDArray[np.float64]
 
@@ -55,10 +57,14 @@ class StanceLoad:
         Places of the points [m].
     centre : (N, 2) float array
         Centre of pressure [m].
+    factors : Factors or None
+        How the ground varies, (N, Q) float arrays of what is under each point.
     tolerance : float
         See `deformation.touching_fraction` [m].
     step : float
         Time step [s].
+    landing_speed : float
+        See `deformation.compression_rate` [m/s].
     """
 
     character: str
@@ -70,24 +76,38 @@ class StanceLoad:
     x: Array
     y: Array
     centre: Array
+    factors: Factors | None
     tolerance: float
     step: float
+    landing_speed: float
 
     def depth(self, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> float:
         """Depth of its print [m]: exact for a foot that rolls, too large for one that slides."""
         sinking = sink(
-            self.clearance, self.area, self.force, tolerance=self.tolerance, step=self.step, material=material
+            self.clearance,
+            self.area,
+            self.force,
+            tolerance=self.tolerance,
+            step=self.step,
+            material=material,
+            landing_speed=self.landing_speed,
+            softness=self.factors.softness if self.factors else None,
         )
         touching = touching_fraction(self.clearance, sinking.sinkage[:, None], self.tolerance)
-        compression = np.zeros(self.clearance.shape[1])
-        rate = compression_rate(self.step, material)
+        rate = compression_rate(self.step, material, sinking.target, self.landing_speed)
+        rate = np.broadcast_to(rate, sinking.target.shape)
+        normal_stress = (self.force / np.maximum(sinking.area, 1e-300))[:, None]
         target = sinking.target[:, None]
         if pressure == "CENTRE_OF_PRESSURE":
             field = pressure_field(self.x, self.y, self.area * touching, self.centre, self.tolerance)
-            stress = self.force / np.maximum(sinking.area, 1e-300)
-            target = target_compression(stress[:, None] * field.at(self.x, self.y), material)
+            normal_stress = normal_stress * field.at(self.x, self.y)
+        if pressure == "CENTRE_OF_PRESSURE" or self.factors:
+            varying = {"stiffness": self.factors.stiffness, "depth": self.factors.depth} if self.factors else {}
+            target = target_compression(normal_stress, material, **varying)
+        holds = np.broadcast_to(normal_stress < material.crust_stress, touching.shape)
+        compression = np.zeros(self.clearance.shape[1])
         for step in np.flatnonzero(sinking.target):
-            compression = compress(compression, touching[step], target[step], rate)
+            compression = compress(compression, touching[step], target[step], rate[step], holds=holds[step])
         return float(compression.max(initial=0.0))
 
 
@@ -118,10 +138,19 @@ class SolidLoad:
         Its pressure follows from its shape, whatever is chosen for soles.
         """
         loads = zip(self.springs, self.force.tolist(), strict=True)
-        return max((springs.sinkage(force, material) for springs, force in loads), default=0.0)
+        return max((_depth_under(springs, force, material) for springs, force in loads), default=0.0)
 
 
-def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float) -> list[StanceLoad | SolidLoad]:
+def _depth_under(springs: Springs, force: float, material: GroundMaterial) -> float:
+    """Largest compression under a lasting force, where the crust gives way to it [m]."""
+    compression = springs.compression(springs.sinkage(force, material), material)
+    loaded = stress(compression, material, stiffness=springs.stiffness, depth=springs.depth)
+    return float(compression.max(initial=0.0, where=loaded >= material.crust_stress))
+
+
+def stance_loads(
+    loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float, variation: Variation | None = None
+) -> list[StanceLoad | SolidLoad]:
     """Every stance of the characters, in the order of their first contact.
 
     Parameters
@@ -131,14 +160,18 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
         The undisturbed ground.
     cell_size : float
         Side of a cell [m]: the ground's height is looked up once per cell.
+    variation : Variation, optional
+        How the ground varies from place to place.
     """
+    varying = VariationTiles(variation, cell_size) if variation else None
     tiles: dict[int, TerrainTiles] = {}
     stances: list[StanceLoad | SolidLoad] = []
     for character in loads:
         motion, contacts = character.motion, character.contacts
         for index, sole in enumerate(motion.soles):
             if sole.sole.solid:
-                stances += _solid_loads(character, index, tiles.setdefault(1, TerrainTiles(terrain, cell_size)))
+                under = tiles.setdefault(1, TerrainTiles(terrain, cell_size))
+                stances += _solid_loads(character, index, under, varying)
                 continue
             points = sole_points(sole.sole, sole.transforms)
             divisions = points.cell_divisions(cell_size)
@@ -148,8 +181,13 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
                 poses, normals = sole.transforms[steps], contacts.normal[steps, index]
                 if not len(poses):
                     continue
-                window = contact_window(points, poses, cell_size).refined(divisions)
-                contact = point_contact(points, poses, tiles[divisions].surface(window))
+                window = contact_window(points, poses, cell_size)
+                contact = point_contact(points, poses, tiles[divisions].surface(window.refined(divisions)))
+                x, y = places(points, poses)
+                factors = None
+                if varying:
+                    factors = Factors(*(under_points(one, window, cell_size, x, y) for one in varying.factors(window)))
+                landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
                 force = np.einsum("ni,ni->n", character.forces.forces[steps, index], normals)
                 stances.append(
                     StanceLoad(
@@ -159,16 +197,21 @@ def stance_loads(loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: f
                         contact.clearance,
                         contact.area / normals[:, 2:],
                         np.maximum(force, 0.0),
-                        *places(points, poses),
+                        x,
+                        y,
                         character.forces.centre_of_pressure[steps, index, :2],
+                        factors,
                         points.tolerance,
                         motion.time_step,
+                        descent(sole.sole, landing, normals[0]) / motion.time_step,
                     )
                 )
     return sorted(stances, key=lambda stance: float(stance.frames[0]))
 
 
-def _solid_loads(character: CharacterLoads, index: int, tiles: TerrainTiles) -> list[StanceLoad | SolidLoad]:
+def _solid_loads(
+    character: CharacterLoads, index: int, tiles: TerrainTiles, varying: VariationTiles | None
+) -> list[StanceLoad | SolidLoad]:
     """Every contact of a body."""
     motion = character.motion
     sole, force = motion.soles[index], character.forces.forces[:, index]
@@ -185,7 +228,8 @@ def _solid_loads(character: CharacterLoads, index: int, tiles: TerrainTiles) -> 
         for step in chosen:
             place = posed(solid.vertices, sole.transforms[step, 0])[:, :2]
             window = Window.around(place.min(axis=0), place.max(axis=0), tiles.cell_size)
-            under = ground_under(solid, sole.transforms[step, 0], tiles.surface(window), np.inf)
+            factors = varying.factors(window) if varying else None
+            under = ground_under(solid, sole.transforms[step, 0], tiles.surface(window), np.inf, factors)
             if under is not None:
                 springs.append(under.springs)
                 pressing.append(normal_force[step])

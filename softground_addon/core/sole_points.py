@@ -207,6 +207,14 @@ def places(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
     return along[0], along[1]
 
 
+def under_points(values: Array, window: Window, cell_size: float, x: Array, y: Array) -> Array:
+    """The values (rows, columns) of the cells of a window that lie under places (N, Q) [m]."""
+    column = np.floor(x / cell_size).astype(int) - window.column
+    row = np.floor(y / cell_size).astype(int) - window.row
+    under: Array = values[np.clip(row, 0, window.rows - 1), np.clip(column, 0, window.columns - 1)]
+    return under
+
+
 def contact_window(points: SolePoints, transforms: Array, cell_size: float) -> Window:
     """The cells that a sole may touch during these steps."""
     low, high = reach(points, transforms)

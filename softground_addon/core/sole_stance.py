@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from .bed import Bed, Imprints
 from .deformation import compression_rate, sink, target_compression, touching_fraction
-from .heightfield import Surface, Window
+from .heightfield import Window
 from .imprint import cell_coverage
 from .motion import Sole
 from .pressure import pressure_field
 from .rim import in_contact, rim_weights
-from .sole_points import SolePoints, centroid, contact_window, places, point_contact
+from .sole_points import SolePoints, centroid, contact_window, places, point_contact, under_points
 from .stance import Stance
 
 Array = NDArray[np.float64]
@@ -55,7 +55,9 @@ class SoleStance(Stance):
             material=material,
             sinkage=self._sinkage,
             landing_speed=self._descent / step,
-            softness=_at_points(factors.softness, points, poses, cells) if factors else None,
+            softness=under_points(factors.softness, cells.window, cells.cell_size, *places(points, poses))
+            if factors
+            else None,
         )
         self._sinkage = sinking.reached
         pressing = sinking.target > 0
@@ -105,12 +107,3 @@ class SoleStance(Stance):
     def _middles(self, poses: Array) -> Array:
         area = np.concatenate([patch.area for patch in self.points.patches])
         return centroid(self.points, poses, np.broadcast_to(area, (len(poses), len(area))))
-
-
-def _at_points(values: Array, points: SolePoints, poses: Array, ground: Surface) -> Array:
-    """The values (rows, columns) of the cells that lie under a sole's points, (N, Q)."""
-    x, y = places(points, poses)
-    column = np.floor(x / ground.cell_size).astype(int) - ground.window.column
-    row = np.floor(y / ground.cell_size).astype(int) - ground.window.row
-    under: Array = values[np.clip(row, 0, ground.window.rows - 1), np.clip(column, 0, ground.window.columns - 1)]
-    return under

@@ -90,7 +90,7 @@ class Stance(ABC):
         approach = steps.approach if len(steps.approach) else steps.poses[:1]
         path, here = self._middles(np.concatenate([approach, steps.poses])), len(approach)
         if not self._frames:
-            self._descent = _descent(self.sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
+            self._descent = descent(self.sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
             self.lean = lean_of_landing(path[here - 1 : here + 1], self._length)[None]
         self.lean = leaning(path[here - 1 :], self._length, self.lean[-1])
         self.first, self.end = steps.first, steps.first + len(steps.frames)
@@ -177,7 +177,7 @@ class Stance(ABC):
         """Middle of what can touch at poses (N, P, 4, 4), (N, 3) [m]."""
 
 
-def _descent(sole: Sole, poses: Array, normal: Array) -> float:
+def descent(sole: Sole, poses: Array, normal: Array) -> float:
     """Furthest that the landmark which lands first came down between two of the last poses (K, P, 4, 4) [m]."""
     pose = poses[:, sole.landmark_patch]
     height = (np.einsum("klij,lj->kli", pose[..., :3, :3], sole.landmarks) + pose[..., :3, 3]) @ normal

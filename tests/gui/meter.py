@@ -1,24 +1,27 @@
-"""How long Blender leaves its user waiting. Runs inside Blender."""
+"""How long Blender leaves its user waiting, and how much of that is the add-on's. Runs inside Blender."""
 
 from __future__ import annotations
 
+import sys
 import time
+from contextlib import contextmanager
 from itertools import pairwise
 
 import bpy
 
 
 class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
-    """Notes the time of every event during a bake, until it is told to stop."""
+    """Notes the time of every event during a bake, and how far the bake is, until it is told to stop."""
 
     bl_idname = "test.pauses"
     bl_label = "Measure Pauses"
 
-    times: list[float] = []  # noqa: RUF012
+    events: list[tuple[float, float]] = []  # noqa: RUF012
     running = False
+    only_bakes = True
 
     def invoke(self, context, _event):
-        type(self).times.clear()
+        type(self).events.clear()
         type(self).running = True
         self.timer = context.window_manager.event_timer_add(0.005, window=context.window)
         context.window_manager.modal_handler_add(self)
@@ -28,13 +31,35 @@ class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
         if not type(self).running:
             context.window_manager.event_timer_remove(self.timer)
             return {"FINISHED"}
-        if context.window_manager.softground.is_baking:
-            type(self).times.append(time.perf_counter())
+        state = context.window_manager.softground
+        if state.is_baking or not type(self).only_bakes:
+            type(self).events.append((time.perf_counter(), state.progress))
         return {"PASS_THROUGH"}
 
 
-def longest() -> tuple[float, float]:
-    """The longest pause between two events [s], and how long after the start it came."""
-    times = TEST_OT_pauses.times
-    gaps = [(after - before, before - times[0]) for before, after in pairwise(times)]
-    return max(gaps)
+def longest_pauses(count: int = 8) -> list[tuple[float, float, float]]:
+    """The longest pauses between two events [s], how long after the start they came, and how far the bake was."""
+    events = TEST_OT_pauses.events
+    first = events[0][0]
+    gaps = [(after - before, before - first, progress) for (before, progress), (after, _) in pairwise(events)]
+    return sorted(gaps, reverse=True)[:count]
+
+
+@contextmanager
+def ticks_timed():
+    """Durations of the bake's ticks, each with how far it was after it: what is the add-on's own in the pauses [s]."""
+    module = next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.modal_bake"))
+    tick, ticks = module._Bake._tick, []
+
+    def timed(operator):
+        started = time.perf_counter()
+        try:
+            return tick(operator)
+        finally:
+            ticks.append((time.perf_counter() - started, bpy.context.window_manager.softground.progress))
+
+    module._Bake._tick = timed
+    try:
+        yield ticks
+    finally:
+        module._Bake._tick = tick

@@ -6,6 +6,8 @@ pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(1500)]
 
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
+SCREEN = 1.5
+"""Where drawing the panel alone takes longer, as in software on a busy machine: longest such time, in times of that."""
 
 
 @pytest.fixture
@@ -45,9 +47,12 @@ def test_clearing_a_reopened_bake_flattens_the_ground(facts):
     assert facts["cleared: deepest vertex"] == 0.0
 
 
-@pytest.mark.xfail(reason="making and writing a new ground of 180,000 vertices takes single longer calls of Blender")
 def test_blender_answers_while_it_bakes(facts):
-    assert facts["longest pause"] < LONGEST_PAUSE, f"{facts['longest pause at']:.2f} s after the start"
+    print("longest pauses (s, seconds after the start, progress):", facts["longest pauses"])
+    print("of these, ticks of the bake (s, progress after it):", facts["longest ticks"])
+    print("pauses while the screen alone is drawn:", facts["pauses of the screen"])
+    assert facts["longest ticks"][0][0] < LONGEST_PAUSE
+    assert facts["longest pauses"][0][0] < max(LONGEST_PAUSE, SCREEN * facts["pauses of the screen"][0][0])
 
 
 def test_nothing_goes_wrong_on_the_console(facts):
