@@ -19,10 +19,12 @@ from ..core.heightfield import Window
 from ..core.playhead import Playhead
 from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
+from ..core.refinement import refine
 from ..core.soft_ground import SoftGround
-from . import analysis, baked_ground, ground_mesh, jobs, session, settings
+from . import analysis, baked_ground, ground_mesh, jobs, session, settings, trail_detail
+from .bake_checks import expected_coverage, wants_detail
 from .character_setup import characters_of
-from .created_ground import create_ground
+from .created_ground import create_ground, reach_for
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .translation import rpt_
@@ -51,7 +53,8 @@ class LiveMode:
             known = analysis.read(scene)
         self.scene = scene.session_uid
         self.rendering = False
-        self._ground = LiveGround(options.ground, known.shot, scene.unit_settings.scale_length)
+        self._owner = options.ground.session_uid
+        self._ground = _carrier(scene, known)
         self._begin(scene, known)
 
     def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
@@ -134,9 +137,32 @@ class LiveMode:
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        ground = self._ground.object()
+        owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner), None)
+        ground = owner or self._ground.object()
         if ground is not None:
-            ground_mesh.restore(ground)
+            baked_ground.clear(ground)
+
+
+def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
+    """What takes the prints: the scene's ground, or a copy that is fine where its characters will step.
+
+    Raises
+    ------
+    InputError
+        If the ground is too coarse and is to stay so.
+    """
+    options, unit_scale = scene.softground, scene.unit_settings.scale_length
+    ground, shot, cell_size = options.ground, known.shot, settings.cell_size_of(scene)
+    vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
+    footfalls = shot.plan.footfalls
+    if footfalls is not None and wants_detail(
+        ground, expected_coverage(vertices, footfalls, cell_size), options.detail, cell_size, known.loads
+    ):
+        surface = trail_detail.surface_of(ground, unit_scale)
+        refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
+        with trail_detail.draft(ground, surface, refinement) as draft:
+            ground, vertices = trail_detail.publish(ground, draft), refinement.vertices(surface)
+    return LiveGround(ground, vertices, shot, unit_scale)
 
 
 _mode: LiveMode | None = None

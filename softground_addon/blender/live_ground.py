@@ -66,16 +66,17 @@ class LiveGround:
     ----------
     ground : bpy.types.Object
         Carries no bake.
+    vertices : (V, 3) float array
+        World positions of its vertices [m].
     shot : Shot
-        Read from that ground.
+        Read from that ground, or from the one that it stands in for.
     unit_scale : float
         Metres per Blender unit.
     """
 
-    def __init__(self, ground: bpy.types.Object, shot: Shot, unit_scale: float) -> None:
+    def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
         self.uid = ground.session_uid
         self.name = ground.name
-        vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
         x, y, z = vertices.T
         near = ((vertices[:, :2] >= shot.plan.lower) & (vertices[:, :2] <= shot.plan.upper)).all(axis=1)
         near = np.flatnonzero(near)

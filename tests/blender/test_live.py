@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_mesh, handlers, live
+from softground_addon.blender import baked_ground, ground_mesh, handlers, live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 
@@ -178,6 +178,79 @@ def test_a_file_saved_in_live_mode_can_be_cleared_after_it_is_opened_again(live_
     bpy.ops.softground.clear_bake()
     bpy.context.view_layer.update()
     assert np.abs(heights(scene)).max() < LEVEL
+
+
+@pytest.fixture
+def coarse_shot(scene):
+    """A walk over a plane of four corners."""
+    walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    scene.softground.ground = bpy.context.object
+    bpy.context.object.select_set(False)  # Blender lets go of what is hidden
+    scene.frame_set(1)
+    bpy.context.view_layer.update()
+    yield scene
+    live.discard()
+
+
+def carrier_heights(scene):
+    carrier = baked_ground.carrier_of(scene.softground.ground)
+    return ground_mesh.displayed_positions(carrier)[:, 2] - ground_mesh.rest_positions(carrier.data)[:, 2]
+
+
+def test_a_plane_of_four_corners_shows_the_prints_that_a_bake_gives_it(coarse_shot):
+    bpy.ops.softground.live()
+    coarse_shot.frame_set(48)
+    live_depth = carrier_heights(coarse_shot).min()
+    assert coarse_shot.softground.ground.hide_get() or coarse_shot.softground.ground.hide_viewport
+    coarse_shot.frame_set(1)
+    assert np.abs(carrier_heights(coarse_shot)).max() == 0.0
+    live.discard()
+    bpy.ops.softground.bake()
+    assert live_depth == pytest.approx(carrier_heights(coarse_shot).min(), rel=0.05)
+
+
+def test_discarding_live_prints_takes_the_fine_copy_away(coarse_shot):
+    before = fingerprints.of_file()
+    bpy.ops.softground.live()
+    coarse_shot.frame_set(40)
+    assert fingerprints.of_file() != before
+    coarse_shot.frame_set(1)
+    bpy.ops.softground.live()
+    bpy.context.view_layer.update()
+    assert fingerprints.of_file() == before
+
+
+def test_kept_live_prints_stay_on_the_fine_copy_until_they_are_cleared(coarse_shot):
+    before = fingerprints.of_file()
+    bpy.ops.softground.live()
+    coarse_shot.frame_set(30)
+    shown = carrier_heights(coarse_shot)
+    bpy.ops.softground.live(keep=True)
+    assert carrier_heights(coarse_shot) == pytest.approx(shown, abs=3e-4)
+    assert baked_ground.load(coarse_shot.softground.ground)[0]
+    bpy.ops.softground.clear_bake()
+    coarse_shot.frame_set(1)
+    assert fingerprints.of_file() == before
+
+
+def test_live_mode_on_a_coarse_ground_that_is_to_stay_coarse_says_what_to_do(coarse_shot):
+    coarse_shot.softground.detail = "NEVER"
+    before = fingerprints.of_file()
+    with pytest.raises(RuntimeError, match=r"is too coarse: .* Set Detail to Automatic"):
+        bpy.ops.softground.live()
+    assert not live.is_on()
+    assert fingerprints.of_file() == before
+
+
+def test_a_coarse_ground_deleted_in_live_mode_leaves_no_prints_behind(coarse_shot):
+    bpy.ops.softground.live()
+    coarse_shot.frame_set(40)
+    bpy.data.objects.remove(coarse_shot.softground.ground)
+    coarse_shot.frame_set(41)
+    live.discard()
+    assert not live.is_on()
 
 
 def test_live_mode_waits_until_a_bake_is_cleared(shot):

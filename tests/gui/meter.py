@@ -47,16 +47,16 @@ def longest_pauses(count: int = 8) -> list[tuple[float, float, float]]:
 
 @contextmanager
 def ticks_timed():
-    """Durations of the bake's ticks, each with how far it was after it: what is the add-on's own in the pauses [s]."""
+    """What the ticks of a bake take of the processor [s], each with how far it was: the add-on's own in the pauses."""
     module = next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.modal_bake"))
     tick, ticks = module._Bake._tick, []
 
     def timed(operator):
-        started = time.perf_counter()
+        started = time.thread_time()
         try:
             return tick(operator)
         finally:
-            ticks.append((time.perf_counter() - started, bpy.context.window_manager.softground.progress))
+            ticks.append((time.thread_time() - started, bpy.context.window_manager.softground.progress))
 
     module._Bake._tick = timed
     try:

@@ -6,7 +6,7 @@ pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(1500)]
 
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
-SCREEN = 1.5
+SCREEN = 2.0
 """Where drawing the panel alone takes longer, as in software on a busy machine: longest such time, in times of that."""
 
 
@@ -49,7 +49,7 @@ def test_clearing_a_reopened_bake_flattens_the_ground(facts):
 
 def test_blender_answers_while_it_bakes(facts):
     print("longest pauses (s, seconds after the start, progress):", facts["longest pauses"])
-    print("of these, ticks of the bake (s, progress after it):", facts["longest ticks"])
+    print("processor time of the bake's ticks (s, progress):", facts["longest ticks"])
     print("pauses while the screen alone is drawn:", facts["pauses of the screen"])
     assert facts["longest ticks"][0][0] < LONGEST_PAUSE
     assert facts["longest pauses"][0][0] < max(LONGEST_PAUSE, SCREEN * facts["pauses of the screen"][0][0])
