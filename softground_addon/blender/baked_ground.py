@@ -59,8 +59,21 @@ def is_baked(ground: bpy.types.Object) -> bool:
     return ground_mesh.is_baked(carrier_of(ground))
 
 
+def has_remains(ground: bpy.types.Object) -> bool:
+    """Whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
+    return ground_mesh.has_remains(carrier_of(ground)) or trail_detail.hides(ground)
+
+
 def clear(ground: bpy.types.Object) -> None:
-    """Take the bake off the ground: it is what it was before, bit for bit. Without a bake nothing happens."""
+    """Take the bake off the ground: it is what it was before, bit for bit. Without a bake nothing happens.
+
+    Raises
+    ------
+    InputError
+        If the ground or the copy that carries the bake cannot be changed.
+    """
+    for thing in dict.fromkeys((ground, carrier_of(ground))):
+        ground_mesh.check_writable(thing)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
 

@@ -13,7 +13,7 @@ from ..core.solids import mass_properties
 from .properties import SoftGroundCharacter
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
 from .rig_sampling import is_simulated
-from .settings import time_stretch_of
+from .settings import exists, time_stretch_of
 from .solid_extraction import surface_of
 
 _SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
@@ -238,7 +238,7 @@ def is_thing(character: SoftGroundCharacter) -> bool:
 
 def is_set_up(character: SoftGroundCharacter) -> bool:
     """Whether an entry still has what leaves prints: an armature, or an object."""
-    return character.armature is not None or is_thing(character)
+    return exists(character.armature) if character.armature else is_thing(character)
 
 
 def title_of(character: SoftGroundCharacter) -> str:

@@ -82,27 +82,33 @@ def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
     return cast("bpy.types.Mesh", ground.data)
 
 
-def check_usable(ground: bpy.types.Object) -> None:
-    """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
+def check_writable(ground: bpy.types.Object) -> None:
+    """Raise InputError, naming the object and the remedy, if this ground cannot be changed at the moment."""
     name = ground.name
-    mesh = mesh_of(ground)
     if ground.type != "MESH":
         raise InputError(f"Ground '{name}' is no mesh: choose a mesh object, or press Create Ground.")
-    if ground.library or mesh.library or ground.override_library:
+    if ground.library or mesh_of(ground).library or ground.override_library:
         raise InputError(
             f"Ground '{name}' is linked from another file and cannot be changed here: make it local "
             "(Object > Relations > Make Local), or bake in the file that it comes from."
         )
+    if ground.mode == "EDIT":
+        raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
+
+
+def check_usable(ground: bpy.types.Object) -> None:
+    """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
+    check_writable(ground)
+    name = ground.name
+    mesh = mesh_of(ground)
     if mesh.users - mesh.use_fake_user > 1:
         raise InputError(
             f"Ground '{name}' shares its mesh with other objects: make it single-user first "
             "(Object > Relations > Make Single User > Object & Data)."
         )
-    if ground.mode == "EDIT":
-        raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
     if not len(mesh.polygons):
         raise InputError(f"Ground '{name}' has no faces: choose a surface, or press Create Ground.")
-    if mesh.shape_keys and not is_baked(ground):
+    if mesh.shape_keys and not has_remains(ground):
         raise InputError(
             f"Ground '{name}' has shape keys of its own: apply them (Object > Apply > Visual Geometry to Mesh), or "
             "choose a copy without them."
@@ -128,6 +134,11 @@ def _what_moves(ground: bpy.types.Object) -> str:
 def is_baked(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground."""
     return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def has_remains(ground: bpy.types.Object) -> bool:
+    """Whether a bake is on this ground, or at least what a bake would take away again."""
+    return ground.type == "MESH" and REST in mesh_of(ground).attributes
 
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
@@ -275,7 +286,7 @@ def write(
     if shape_keys:
         _write_shape_keys(ground, raw, display)
     else:
-        ground.shape_key_clear()
+        _take_off_shape_keys(ground, display)
     for name, values, default in (
         (COMPRESSION, pressed.compression, 0.0),
         (RIM, pressed.rim, 0.0),
@@ -308,9 +319,36 @@ def _write_shape_keys(ground: bpy.types.Object, raw: NDArray[np.float32], displa
     mesh = mesh_of(ground)
     if not mesh.shape_keys:
         ground.shape_key_add(name="Basis", from_mix=False)
+    if DISPLAY_KEY not in mesh.shape_keys.key_blocks:
         ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
-    mesh.shape_keys.reference_key.points.foreach_set("co", raw.ravel())
+    _move_basis(mesh, raw)
     mesh.shape_keys.key_blocks[DISPLAY_KEY].points.foreach_set("co", display.ravel())
+
+
+def _take_off_shape_keys(ground: bpy.types.Object, basis: NDArray[np.float32]) -> None:
+    """Leave no shape keys but those that the user has made since, on a basis of these positions."""
+    mesh = mesh_of(ground)
+    if not mesh.shape_keys:
+        return
+    if shown := mesh.shape_keys.key_blocks.get(DISPLAY_KEY):
+        ground.shape_key_remove(shown)
+    if mesh.shape_keys and len(mesh.shape_keys.key_blocks) > 1:
+        _move_basis(mesh, basis)
+    else:
+        ground.shape_key_clear()
+
+
+def _move_basis(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
+    """Give the first key other positions; the user's keys keep what they add to it."""
+    first = mesh.shape_keys.reference_key
+    before = np.empty_like(positions)
+    first.points.foreach_get("co", before.ravel())
+    first.points.foreach_set("co", positions.ravel())
+    for key in mesh.shape_keys.key_blocks:
+        if key.name not in (first.name, DISPLAY_KEY):
+            added = np.empty_like(positions)
+            key.points.foreach_get("co", added.ravel())
+            key.points.foreach_set("co", (added + (positions - before)).ravel())
 
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
@@ -331,13 +369,16 @@ def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
 
 
 def restore(ground: bpy.types.Object) -> None:
-    """Take the bake off the ground: its mesh is what it was before, bit for bit. Without a bake nothing happens."""
-    if not is_baked(ground):
+    """Take the bake off the ground: its mesh is what it was before, bit for bit. Without a bake nothing happens.
+
+    Shape keys that the user has made on the baked ground stay.
+    """
+    if not has_remains(ground):
         return
     playback.remove(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    ground.shape_key_clear()
+    _take_off_shape_keys(ground, rest)
     for name in (REST, *SHADING_ATTRIBUTES, SOLE):
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
@@ -365,6 +406,8 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 
 def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
+    if not len(positions):
+        return
     mesh.attributes["position"].data.foreach_set("vector", positions.ravel())
     first = mesh.vertices[0]
     first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1

@@ -46,6 +46,7 @@ class LiveMode:
     """
 
     def __init__(self, scene: bpy.types.Scene) -> None:
+        settings.forget_deleted_ground(scene)
         options = scene.softground
         known = analysis.read(scene)
         if options.ground is None:

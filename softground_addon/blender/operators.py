@@ -126,7 +126,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        if (ground is None or not baked_ground.is_baked(ground)) and not response_job.has_layers(scene):
+        if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene):
             cls.poll_message_set("There is no bake on the ground")
             return False
         return True
@@ -135,7 +135,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        if ground is not None and baked_ground.is_baked(ground):
+        if ground is not None and baked_ground.has_remains(ground):
             baked_ground.clear(ground)
         response_job.remove_layers(scene)
         return {"FINISHED"}

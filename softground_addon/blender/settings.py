@@ -22,6 +22,17 @@ def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     return cast("bpy.types.Scene", context.scene)
 
 
+def exists(thing: bpy.types.Object | None) -> bool:
+    """Whether an object that the settings name is there: those deleted in the viewport live on in the settings only."""
+    return thing is not None and bool(thing.users_collection)
+
+
+def forget_deleted_ground(scene: bpy.types.Scene) -> None:
+    """Take a ground that was deleted out of the settings."""
+    if scene.softground.ground is not None and not exists(scene.softground.ground):
+        scene.softground.ground = None
+
+
 def typed(value: float) -> float:
     """The number that the user typed, from the single precision that Blender keeps it in: 0.01, not 0.00999999978."""
     return float(f"{value:.7g}")

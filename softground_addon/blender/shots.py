@@ -115,6 +115,7 @@ def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
 
 def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
     """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
+    settings.forget_deleted_ground(scene)
     options = scene.softground
     for character in options.characters:
         if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):

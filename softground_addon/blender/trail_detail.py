@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 DETAIL_OF = "softground_detail_of"
 """Property of the copy: the ground that it stands in for."""
 WAS_HIDDEN = "softground_was_hidden"
-"""Property of the copy: whether the ground was hidden in viewports and renders before."""
+"""Property of the ground while it is hidden: whether it was in viewports and renders before."""
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
@@ -35,6 +35,11 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
         if candidate.get(DETAIL_OF) == ground and candidate.library == ground.library:
             return candidate
     return None
+
+
+def hides(ground: bpy.types.Object) -> bool:
+    """Whether the ground is hidden in favour of a copy."""
+    return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def region_of(pressed: PressedGround) -> Region:
@@ -92,7 +97,8 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
         _exchange_mesh(detail, ground_mesh.mesh_of(draft))
         return detail
     draft[DETAIL_OF] = ground
-    draft[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
+    if not hides(ground):
+        ground[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
     for collection in ground.users_collection:
         collection.objects.link(draft)
     ground.hide_viewport = ground.hide_render = True
@@ -100,11 +106,13 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
 
 
 def remove(ground: bpy.types.Object) -> None:
-    """Take the copy away and show the ground as it was shown; nothing happens where there is none."""
+    """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
+    if hides(ground):
+        ground.hide_viewport, ground.hide_render = (bool(value) for value in ground[WAS_HIDDEN])
+        del ground[WAS_HIDDEN]
     detail = detail_of(ground)
     if detail is None:
         return
-    ground.hide_viewport, ground.hide_render = (bool(value) for value in detail[WAS_HIDDEN])
     playback.remove(detail)
     mesh: Any = detail.data
     bpy.data.objects.remove(detail)

@@ -1,0 +1,151 @@
+"""What users do to a bake between two clicks: edit, rename and delete its parts, then bake again or clear."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import ground_mesh, trail_detail
+from tests.blender import fingerprints, shots
+from tests.blender.test_bake import plane
+
+
+@pytest.fixture
+def baked(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    bpy.ops.softground.bake()
+    return scene.softground.ground
+
+
+def activate(thing):
+    for other in bpy.context.view_layer.objects:
+        other.select_set(False)
+    bpy.context.view_layer.objects.active = thing
+    thing.select_set(True)
+
+
+def key_positions(key):
+    values = np.empty(len(key.points) * 3, dtype=np.float32)
+    key.points.foreach_get("co", values)
+    return values.reshape(-1, 3)
+
+
+def refusal(operator):
+    with pytest.raises(RuntimeError) as error:
+        operator()
+    assert "Traceback" not in str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("change", ["delete", "rename"])
+def test_a_display_key_that_is_gone_is_made_again(baked, change):
+    shown = baked.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY]
+    if change == "delete":
+        baked.shape_key_remove(shown)
+    else:
+        shown.name = "Mine"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert baked.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY].value == 1.0
+
+
+def test_a_key_that_the_user_sculpted_on_the_bake_stays_on_the_ground_under_it(scene, baked):
+    mesh = baked.data
+    mine = baked.shape_key_add(name="Mine", from_mix=False)
+    sculpted = key_positions(mine)
+    sculpted[7] += (0.0, 0.0, 0.25)
+    mine.points.foreach_set("co", sculpted.ravel())
+
+    def added():
+        keys = mesh.shape_keys
+        return key_positions(keys.key_blocks["Mine"]) - key_positions(keys.reference_key)
+
+    before = added()
+    scene.softground.material.youngs_modulus = 1e5
+    bpy.ops.softground.bake()
+    assert added() == pytest.approx(before, abs=1e-6)
+    bpy.ops.softground.clear_bake()
+    assert [key.name for key in mesh.shape_keys.key_blocks] == ["Basis", "Mine"]
+    assert added() == pytest.approx(before, abs=1e-6)
+    assert np.ptp(key_positions(mesh.shape_keys.reference_key)[:, 2]) == 0.0
+
+
+def test_clearing_in_edit_mode_is_refused_and_changes_nothing(baked):
+    activate(baked)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Edit Mode" in refusal(bpy.ops.softground.clear_bake)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert ground_mesh.is_baked(baked)
+
+
+def test_a_baked_mesh_whose_vertices_were_all_deleted_can_be_cleared(baked):
+    activate(baked)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.delete(type="VERT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert not baked.modifiers
+    assert "no faces" in refusal(bpy.ops.softground.bake)
+
+
+def test_what_is_left_of_a_bake_without_its_record_can_be_cleared(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    field = scene.softground.ground = plane(scene)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    del field.data[ground_mesh.RECORD]
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert fingerprints.of_file() == before
+
+
+def test_a_bake_on_a_linked_ground_is_not_cleared(scene, baked, tmp_path):
+    path = tmp_path / "set.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = ["SoftGround"]
+    ground = wanted.objects[0]
+    bpy.context.scene.collection.objects.link(ground)
+    bpy.context.scene.softground.ground = ground
+    assert "linked" in refusal(bpy.ops.softground.clear_bake)
+    assert ground_mesh.is_baked(ground)
+    assert ground.modifiers
+
+
+def test_the_ground_is_shown_again_where_its_fine_copy_was_deleted(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    field = scene.softground.ground = plane(scene, vertices=2)
+    field.hide_render = True
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    bpy.data.objects.remove(trail_detail.detail_of(field))
+    bpy.ops.softground.bake()
+    bpy.data.objects.remove(trail_detail.detail_of(field))
+    assert (field.hide_viewport, field.hide_render) == (True, True)
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert (field.hide_viewport, field.hide_render) == (False, True)
+    assert fingerprints.of_file()["objects"]["Field"] == before["objects"]["Field"]
+
+
+def test_a_ground_that_was_deleted_in_the_viewport_is_not_baked_on(scene, baked):
+    activate(baked)
+    bpy.ops.object.delete()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    fresh = scene.softground.ground
+    assert fresh != baked
+    assert fresh.name in scene.objects
+
+
+def test_a_character_that_was_deleted_in_the_viewport_prints_no_more(scene, baked):
+    activate(scene.softground.characters[0].armature)
+    bpy.ops.object.delete()
+    assert "No character" in refusal(bpy.ops.softground.create_ground)
+    other = shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.bake()
+    assert [other.name] == [one.armature.name for one in scene.softground.characters if one.armature.users_collection]
