@@ -18,7 +18,7 @@ from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
 from .character_setup import characters_of
-from .shots import Shot, estimate_shot, read_shot
+from .shots import Shot, estimate_shot, ground_of, read_shot
 
 TRIALS = 4
 """Bakes that a match may compute: two are enough unless feet slide."""
@@ -135,14 +135,8 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
 
 
 def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial) -> float:
-    results = simulate(
-        analysis.loads,
-        analysis.shot.terrain,
-        material,
-        settings.cell_size_of(scene),
-        pressure=scene.softground.pressure,
-        variation=analysis.shot.variation,
-    )
+    ground = replace(ground_of(scene, analysis.shot), material=material)
+    results = simulate(analysis.loads, ground, settings.cell_size_of(scene))
     return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
 
 

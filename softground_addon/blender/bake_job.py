@@ -39,7 +39,7 @@ from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detai
 from .character_setup import characters_of, movers_of
 from .jobs import Job, Progress, aside
 from .materials import drafted
-from .shots import Shot, estimate_shot, read_shot
+from .shots import Shot, estimate_shot, ground_of, read_shot
 
 Array = NDArray[np.float64]
 
@@ -260,15 +260,7 @@ def _simulate(
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(motion.frames) for motion in shot.motions)
-    results = simulate(
-        loads,
-        shot.terrain,
-        settings.material_of(scene),
-        settings.cell_size_of(scene),
-        pressure=scene.softground.pressure,
-        variation=shot.variation,
-    )
-    for result in results:
+    for result in simulate(loads, ground_of(scene, shot), settings.cell_size_of(scene)):
         footprints += result.footprints
         frames.append(result.frame)
         forces.append(result.forces)

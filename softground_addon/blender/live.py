@@ -20,13 +20,13 @@ from ..core.playhead import Playhead
 from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
-from ..core.soft_ground import SoftGround
 from . import analysis, baked_ground, ground_mesh, jobs, session, settings, trail_detail
 from .bake_checks import expected_coverage, wants_detail
 from .character_setup import characters_of
 from .created_ground import create_ground, reach_for
 from .live_ground import LiveGround
 from .operators import reports_errors
+from .shots import ground_of
 from .translation import rpt_
 
 Array = NDArray[np.float64]
@@ -60,9 +60,7 @@ class LiveMode:
 
     def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
         self._analysis = known
-        shot = known.shot
-        ground = SoftGround(shot.terrain, settings.material_of(scene), scene.softground.pressure, shot.variation)
-        self._playhead = Playhead(known.loads, ground, settings.cell_size_of(scene))
+        self._playhead = Playhead(known.loads, ground_of(scene, known.shot), settings.cell_size_of(scene))
         self._frame_rate = known.shot.motions[0].frame_rate
 
     def follow(self, scene: bpy.types.Scene) -> bool:

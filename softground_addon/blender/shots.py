@@ -15,6 +15,7 @@ from ..core.ground_plan import GroundPlan, plan_ground
 from ..core.heightfield import Terrain
 from ..core.motion import CharacterMotion
 from ..core.simulation import CharacterLoads, estimate_loads
+from ..core.soft_ground import SoftGround
 from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
 from . import ground_mesh, painted_ground, settings
@@ -77,6 +78,11 @@ def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
     yield Progress("sample", 1.0)
     terrain = yield from aside("sample", 1.0, surface.terrain, np.stack([plan.lower, plan.upper]))
     return Shot(tuple(motions), plan, surface, terrain)
+
+
+def ground_of(scene: bpy.types.Scene, shot: Shot) -> SoftGround:
+    """The ground of a shot, with the material and the spread of pressure that the scene has now."""
+    return SoftGround(shot.terrain, settings.material_of(scene), scene.softground.pressure, shot.variation)
 
 
 def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads]]:

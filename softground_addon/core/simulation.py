@@ -22,13 +22,11 @@ from .free_bodies import free_loads
 from .heightfield import HeightField, Terrain, Window
 from .motion import CharacterMotion, SoleMotion, steps_per_frame
 from .pressing import Press
-from .pressure import Pressure
 from .soft_ground import SoftGround
 from .sole_points import sole_points
 from .sole_stance import SoleStance
 from .solid_stance import SolidStance
 from .stance import Stance, Steps
-from .variation import Variation
 
 Array = NDArray[np.float64]
 
@@ -117,15 +115,7 @@ class FrameResult:
     forces: tuple[Array, ...]
 
 
-def simulate(
-    loads: Sequence[CharacterLoads],
-    terrain: Terrain,
-    material: GroundMaterial,
-    cell_size: float,
-    *,
-    pressure: Pressure = "UNIFORM",
-    variation: Variation | None = None,
-) -> Iterator[FrameResult]:
+def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> Iterator[FrameResult]:
     """Press footprints into the ground, frame by frame.
 
     Each step of the loads presses over the time that ends at it; their first is the undisturbed ground.
@@ -134,8 +124,7 @@ def simulate(
     ----------
     loads : sequence of CharacterLoads
         Characters that share the ground, on time grids of the same step.
-    terrain, material, pressure, variation
-        See `SoftGround`.
+    ground : SoftGround
     cell_size : float
         Side of a cell [m].
 
@@ -150,7 +139,6 @@ def simulate(
     InputError
         If the cell size is not positive, or the characters do not share a time grid.
     """
-    ground = SoftGround(terrain, material, pressure, variation)
     yield from Simulation(ground, HeightField(cell_size)).run(loads)
 
 

@@ -11,6 +11,7 @@ from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.key_reduction import kept_samples
 from softground_addon.core.response import GroundingOptions, TiltOptions, at_scene_frames, gaps, respond
 from softground_addon.core.simulation import estimate_loads, simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.test_grounding import walk
 
 SNOW = GroundMaterial(youngs_modulus=375e3, poisson_ratio=0.05, characteristic_time=0.2)
@@ -23,7 +24,7 @@ def test_a_thousand_frames_respond_within_a_second():
     terrain = FlatTerrain(0.0)
     loads = estimate_loads(motion, terrain, force_model="WHOLE_BODY", material=SNOW)
     started = time.thread_time()
-    footprints = [f for result in simulate([loads], terrain, SNOW, 0.01) for f in result.footprints]
+    footprints = [f for result in simulate([loads], SoftGround(terrain, SNOW), 0.01) for f in result.footprints]
     simulated = time.thread_time() - started
     started = time.thread_time()
     touching = at_scene_frames(loads.contacts.touching, loads.motion.frames, motion)

@@ -9,6 +9,7 @@ from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.footprints import recompose
 from softground_addon.core.ramps import TOLERANCE
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.blender.test_playback import bake_onto, evaluated, recorded, world_positions
 from tests.core.walkers import walk
 
@@ -70,7 +71,7 @@ def test_simulation_record_and_playback_are_one(seed, walkers, rate):
     ]
     frames = rng.choice(np.arange(2, int(loads[0].motion.frames[-1])), 6, replace=False)
     simulated, footprints = {}, []
-    for result in simulate(loads, terrain, material, 0.01):
+    for result in simulate(loads, SoftGround(terrain, material), 0.01):
         footprints += result.footprints
         if result.frame in frames:
             simulated[int(result.frame)] = state(result.ground)

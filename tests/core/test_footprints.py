@@ -19,6 +19,7 @@ from softground_addon.core.footprints import (
 )
 from softground_addon.core.heightfield import FlatTerrain, Window
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import box_sole, loads_of, pose, pressed, walk
 
 MUD = GroundMaterial(0.3e6, 0.35, 0.15)
@@ -40,7 +41,7 @@ def overlapping_walks():
 def bake():
     """State at every frame and the record of walks that overlap."""
     states, footprints = {}, []
-    for result in simulate(overlapping_walks(), FlatTerrain(), MUD, 0.01):
+    for result in simulate(overlapping_walks(), SoftGround(FlatTerrain(), MUD), 0.01):
         states[result.frame] = result.ground.read(EVERYWHERE)
         footprints += result.footprints
     return states, footprints

@@ -8,6 +8,7 @@ from softground_addon.core.footprints import recompose
 from softground_addon.core.ground_history import GroundHistory
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.simulation import estimate_loads, simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.test_grounding import walk
 
 SAND = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.4, characteristic_time=0.1)
@@ -17,7 +18,7 @@ SAND = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.4, characteristic_time
 def footprints():
     motion, _ = walk(60)
     loads = estimate_loads(motion, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SAND)
-    return [f for result in simulate([loads], FlatTerrain(0.0), SAND, 0.01) for f in result.footprints]
+    return [f for result in simulate([loads], SoftGround(FlatTerrain(0.0), SAND), 0.01) for f in result.footprints]
 
 
 @pytest.mark.parametrize("frame", [0.0, 1.0, 7.0, 23.0, 60.0, 500.0])

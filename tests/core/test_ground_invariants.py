@@ -13,6 +13,7 @@ from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.footprints import QUANTUM, recompose
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import box_sole, foot_sole, loads_of, pose, walk
 
 PAPER = {
@@ -39,7 +40,7 @@ def check_every_frame(loads, terrain, material, cell_size):
     """Follow a simulation and assert what must hold at each frame; the record at its end."""
     footprints, volumes, previous = [], (0.0, 0.0), {}
     unplaced = 0.0
-    for result in simulate(loads, terrain, material, cell_size):
+    for result in simulate(loads, SoftGround(terrain, material), cell_size):
         footprints += result.footprints
         for window in result.ground.tile_windows():
             state = result.ground.read(window)

@@ -281,7 +281,7 @@ ALL = replace(SAND, **OPTIONS)
 def check_every_frame(loads, terrain, material, cell_size, pressure):
     """What must hold at each frame whatever is on; the ground and the record."""
     footprints, previous = [], {}
-    for result in simulate(loads, terrain, material, cell_size, pressure=pressure):
+    for result in simulate(loads, SoftGround(terrain, material, pressure=pressure), cell_size):
         footprints += result.footprints
         for window in result.ground.tile_windows():
             state = result.ground.read(window)

@@ -29,7 +29,7 @@ def state(ground):
 def baked(loads, frames):
     """State of a bake at each of the frames."""
     states = {}
-    for result in simulate([loads], FlatTerrain(), SNOW, CELL):
+    for result in simulate([loads], SoftGround(FlatTerrain(), SNOW), CELL):
         if result.frame in frames:
             states[result.frame] = state(result.ground)
     return states
@@ -74,7 +74,11 @@ def test_a_new_material_acts_on_what_follows_only(loads):
     playhead.go_to(loads.motion.frames[-1])
     softer = [f.max_depth_m for f in playhead.footprints() if f.start_frame > middle + 1]
     before_change = [f.max_depth_m for f in playhead.footprints() if f.end_frame < middle]
-    stiff = {f.start_frame: f.max_depth_m for r in simulate([loads], FlatTerrain(), SNOW, CELL) for f in r.footprints}
+    stiff = {
+        f.start_frame: f.max_depth_m
+        for r in simulate([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+        for f in r.footprints
+    }
     assert softer
     assert before_change
     whole = [depth for start, depth in stiff.items() if start > middle + 1]

@@ -9,6 +9,7 @@ from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.prediction import deepest, stance_loads
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.solid_bodies import solid_sole, sphere
 from tests.core.test_solid_prints import resting
 from tests.core.walkers import walk
@@ -36,7 +37,7 @@ class Stripes:
 
 
 def pressed(loads, material, pressure, variation=None):
-    results = simulate([loads], FlatTerrain(), material, CELL, pressure=pressure, variation=variation)
+    results = simulate([loads], SoftGround(FlatTerrain(), material, pressure, variation), CELL)
     return max((print_.max_depth_m for result in results for print_ in result.footprints), default=0.0)
 
 

@@ -14,6 +14,7 @@ from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.prediction import deepest, matching_modulus, stance_loads
 from softground_addon.core.pressure import KERN, pressure_field
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import box_sole, foot_sole, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
@@ -165,7 +166,7 @@ def rolling(loads):
 
 def pressed(loads, cell=0.01, material=SNOW):
     footprints = []
-    for result in simulate([loads], FlatTerrain(), material, cell, pressure="CENTRE_OF_PRESSURE"):
+    for result in simulate([loads], SoftGround(FlatTerrain(), material, pressure="CENTRE_OF_PRESSURE"), cell):
         footprints += result.footprints
     return result.ground, footprints
 
@@ -188,7 +189,7 @@ def test_a_push_off_leaves_a_deeper_toe_than_an_even_pressure():
     ground, _ = pressed(rolling(walk(steps=1)))
     middle, toes = ground.sample(np.array([0.13, 0.24]), np.full(2, 0.09))[0]
     assert toes > 1.3 * middle
-    even = list(simulate([rolling(walk(steps=1))], FlatTerrain(), SNOW, 0.01))[-1].ground
+    even = list(simulate([rolling(walk(steps=1))], SoftGround(FlatTerrain(), SNOW), 0.01))[-1].ground
     middle, toes = even.sample(np.array([0.13, 0.24]), np.full(2, 0.09))[0]
     assert toes == pytest.approx(middle, rel=0.05)
 

@@ -159,7 +159,7 @@ def test_the_footprint_reports_its_load():
 def test_rolling_over_the_foot_presses_the_heel_before_the_toes():
     loads = walk(steps=1, frame_rate=120.0)
     first = {}
-    for result in simulate([loads], FlatTerrain(), SAND, 0.01):
+    for result in simulate([loads], SoftGround(FlatTerrain(), SAND), 0.01):
         depths = result.ground.sample(np.array([0.02, 0.12, 0.23]), np.full(3, 0.09))[0]
         for name, depth in zip(("heel", "middle", "toes"), depths, strict=True):
             if depth > 0:
@@ -216,7 +216,7 @@ def test_soles_that_press_the_same_ground_at_once_take_turns_step_by_step(frame_
 def test_a_character_that_appears_later_prints_at_its_own_frames():
     early, late = walk(steps=1), walk(steps=1, origin=(0, 3, 0), name="late")
     late = replace(late, motion=replace(late.motion, frames=late.motion.frames + 10))
-    results = list(simulate([early, late], FlatTerrain(), SNOW, 0.01))
+    results = list(simulate([early, late], SoftGround(FlatTerrain(), SNOW), 0.01))
     assert [result.frame for result in results] == list(np.arange(early.motion.frames[0], late.motion.frames[-1] + 1))
     starts = {footprint.character: footprint.start_frame for r in results for footprint in reversed(r.footprints)}
     assert starts["late"] == starts["walker"] + 10
@@ -226,7 +226,7 @@ def test_a_character_that_appears_later_prints_at_its_own_frames():
 
 def test_each_frame_reports_where_the_ground_changed():
     previous = {}
-    for result in simulate([walk(steps=2)], FlatTerrain(), MUD, 0.01):
+    for result in simulate([walk(steps=2)], SoftGround(FlatTerrain(), MUD), 0.01):
         for window in result.ground.tile_windows():
             state = result.ground.read(window)
             rows, columns = np.nonzero((state != previous.get(window, 0.0)).any(axis=0))
@@ -333,19 +333,19 @@ def test_a_mouse_on_coarse_cells_presses_its_volume():
 
 def test_characters_on_different_time_grids_are_refused_with_a_remedy():
     with pytest.raises(InputError, match=r"'other'.*sample all characters"):
-        next(simulate([walk(), walk(frame_rate=25.0, name="other")], FlatTerrain(), SNOW, 0.01))
+        next(simulate([walk(), walk(frame_rate=25.0, name="other")], SoftGround(FlatTerrain(), SNOW), 0.01))
 
 
 def test_nobody_and_no_cell_size_are_refused_with_a_remedy():
     with pytest.raises(InputError, match="add one"):
-        next(simulate([], FlatTerrain(), SNOW, 0.01))
+        next(simulate([], SoftGround(FlatTerrain(), SNOW), 0.01))
     with pytest.raises(InputError, match="cell size"):
-        next(simulate([walk()], FlatTerrain(), SNOW, -inf))
+        next(simulate([walk()], SoftGround(FlatTerrain(), SNOW), -inf))
 
 
 def test_a_motion_of_one_frame_gives_one_undisturbed_result():
     loads = standing(box_sole(0.25, 0.09), [[0, 0, 0]], 500.0, seconds=0)
-    (result,) = simulate([loads], FlatTerrain(), SNOW, 0.01)
+    (result,) = simulate([loads], SoftGround(FlatTerrain(), SNOW), 0.01)
     assert not result.ground.tiles
 
 

@@ -9,6 +9,7 @@ from softground_addon.core.deformation import GroundMaterial, equilibrium_depth
 from softground_addon.core.footprints import QUANTUM, recompose
 from softground_addon.core.heightfield import FlatTerrain, Window
 from softground_addon.core.simulation import simulate
+from softground_addon.core.soft_ground import SoftGround
 from softground_addon.core.terrain import MeshTerrain
 from softground_addon.core.variation import SOFTEST, PaintedSurface, VariationTiles
 from tests.core.test_ground_invariants import random_loads
@@ -29,7 +30,7 @@ class Bands:
 
 def pressed(loads, variation, material=MUD, cell=0.01, **options):
     footprints = []
-    for result in simulate([loads], FlatTerrain(), material, cell, variation=variation, **options):
+    for result in simulate([loads], SoftGround(FlatTerrain(), material, variation=variation, **options), cell):
         footprints += result.footprints
     return result.ground, footprints
 

@@ -11,6 +11,7 @@ from softground_addon.core.forces import ContactForces
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
 from softground_addon.core.simulation import CharacterLoads, simulate
+from softground_addon.core.soft_ground import SoftGround
 
 MASS = 77.5
 GRAVITY = 9.81
@@ -174,7 +175,7 @@ def pressed(loads, material, cell_size=0.01, terrain=None):
     """The ground at the end and the record of a whole simulation."""
     loads = loads if isinstance(loads, list) else [loads]
     footprints = []
-    for result in simulate(loads, terrain or FlatTerrain(), material, cell_size):
+    for result in simulate(loads, SoftGround(terrain or FlatTerrain(), material), cell_size):
         footprints += result.footprints
     return result.ground, footprints
 
