@@ -5,7 +5,7 @@ import shutil
 import bpy
 import pytest
 
-from tests.blender import shots
+from tests.blender import rigs, shots
 
 
 @pytest.fixture
@@ -20,6 +20,14 @@ def saved_walker(addon, tmp_path_factory):
     shots.walker(bpy.context.scene, frames=40)
     path = tmp_path_factory.mktemp("shot") / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture(scope="session")
+def rigify_file(addon, tmp_path_factory):
+    """Rigify's human and its metarig."""
+    path = tmp_path_factory.mktemp("rigify") / "human.blend"
+    rigs.make_rigify_file(path)
     return path
 
 

@@ -397,17 +397,6 @@ def test_a_climb_gets_a_created_ground_that_climbs(walk):
     assert not result.report["warnings"]
 
 
-@pytest.mark.parametrize("model", ["IMPULSE", "WHOLE_BODY"])
-@pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))
-def test_every_reference_motion_bakes_with_the_automatic_set_up(scene, name, model):
-    shots.import_motion(name)
-    bpy.ops.softground.add_character()
-    scene.softground.characters[0].force_model = model
-    report = bake(scene).report
-    assert report["steps"]
-    assert 500 < report["totals"]["peak_force_n"] < 6 * 77.5 * 9.81
-
-
 def test_a_plane_of_four_vertices_gets_detail_along_the_trail_and_comes_back(walk):
     ground = walk.softground.ground = plane(walk, vertices=2)
     bpy.context.view_layer.update()

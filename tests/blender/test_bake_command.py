@@ -27,8 +27,8 @@ def run(command):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("name", ["shot", 'it\'s "$HOME" `x` %s\n❄'])
-def test_the_copied_command_bakes_what_the_button_bakes(scene, tmp_path, name):
+def test_the_copied_command_bakes_what_the_button_bakes_whatever_the_names(scene, tmp_path):
+    name = 'it\'s "$HOME" `x` %s\n❄'
     shots.walker(scene, frames=40)
     bpy.ops.softground.add_character()
     bpy.ops.softground.load_preset(name="Mud")

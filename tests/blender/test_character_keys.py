@@ -24,37 +24,38 @@ def flat(scene):
     return FlatTerrain(ground.matrix_world.translation.z)
 
 
-def puppet(scene):
-    return responders.with_ik()
-
-
-def rigify(scene, path):
-    rigs.make_rigify_file(path / "human.blend")
-    armature = rigs.open_rigify(path / "human.blend", "Generated")
+def rigify(path):
+    armature = rigs.open_rigify(path, "Generated")
     responders.key_steps(armature, "torso", ["foot_ik.L", "foot_ik.R"])
     bpy.data.objects.remove(bpy.data.objects["Metarig"])
     return armature
 
 
 MAKE = {
-    "walker": lambda scene, path: shots.walker(scene),
-    "mixamo": lambda scene, path: responders.as_mixamo(shots.walker(scene)),
-    "scale of 0.01": lambda scene, path: responders.in_centimetres(shots.walker(scene)),
-    "animated object": lambda scene, path: responders.moved_by_its_object(shots.walker(scene)),
-    "ik": lambda scene, path: puppet(scene),
-    "rigify": rigify,
-    "auto-rig pro": lambda scene, path: auto_rig_pro.walking(),
+    "walker": shots.walker,
+    "mixamo": lambda scene: responders.as_mixamo(shots.walker(scene)),
+    "scale of 0.01": lambda scene: responders.in_centimetres(shots.walker(scene)),
+    "animated object": lambda scene: responders.moved_by_its_object(shots.walker(scene)),
+    "ik": lambda scene: responders.with_ik(),
+    "auto-rig pro": lambda scene: auto_rig_pro.walking(),
 }
 
-
 QUICK_AND_SLOW = [
-    rig if rig in ("walker", "ik", "auto-rig pro") else pytest.param(rig, marks=pytest.mark.slow) for rig in MAKE
+    rig if rig in ("walker", "ik", "auto-rig pro") else pytest.param(rig, marks=pytest.mark.slow)
+    for rig in (*MAKE, "rigify")
 ]
 
 
-@pytest.mark.parametrize("rig", QUICK_AND_SLOW)
-def test_soles_stand_on_the_ground_that_they_pressed(scene, tmp_path, rig):
-    armature = MAKE[rig](scene, tmp_path)
+@pytest.fixture
+def armature(scene, request):
+    """A rig that walks."""
+    if request.param == "rigify":
+        return rigify(request.getfixturevalue("rigify_file"))
+    return MAKE[request.param](scene)
+
+
+@pytest.mark.parametrize("armature", QUICK_AND_SLOW, indirect=True)
+def test_soles_stand_on_the_ground_that_they_pressed(armature):
     scene = bpy.context.scene
     set_up(armature)
     before = responders.knee_angles(scene)
@@ -87,9 +88,8 @@ def test_auto_rig_pro_is_keyed_on_what_its_animators_key_in_ik_and_in_fk(scene):
     assert not [bone for bone in by_fk.bones if "_ik" in bone]
 
 
-@pytest.mark.parametrize("rig", ["walker", "ik", "rigify"])
-def test_the_users_keys_pose_and_constraints_are_the_same_bytes_after_clearing(scene, tmp_path, rig):
-    armature = MAKE[rig](scene, tmp_path)
+@pytest.mark.parametrize("armature", ["walker", "ik", "rigify"], indirect=True)
+def test_the_users_keys_pose_and_constraints_are_the_same_bytes_after_clearing(armature):
     scene = bpy.context.scene
     set_up(armature)
     armature["custom"] = 3.5

@@ -17,6 +17,9 @@ from tests.blender import shots
 STEPS = {"walk": 6, "run": 15, "jumping": 6, "jumping_jacks": 14}
 """Contacts counted in the motion: heel and toe markers for walk and run, by eye for the others."""
 
+FORCES = (500.0, 6 * 77.5 * 9.81)
+"""Between which the highest force is: two thirds of the weight, and what sprinters reach [N]."""
+
 ALTERNATING = ("walk", "run")
 
 UNDER_THE_FOOT = 0.01
@@ -61,6 +64,22 @@ def test_the_steps_are_those_that_one_counts_in_the_motion(baked):
         assert len(contacts) == STEPS[name]
     if name in ALTERNATING:
         assert all(a != b for a, b in pairwise(contacts))
+
+
+@every_file
+def test_the_force_is_that_of_somebody_who_walks_runs_or_jumps(baked):
+    _, result, _ = baked
+    assert FORCES[0] < result.report["totals"]["peak_force_n"] < FORCES[1]
+
+
+@pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))
+def test_every_file_bakes_with_the_impulse_model_too(scene, name):
+    shots.import_motion(name)
+    bpy.ops.softground.add_character()
+    scene.softground.characters[0].force_model = "IMPULSE"
+    report = jobs.run(bake_job.bake(scene, write=False)).report
+    assert report["steps"]
+    assert FORCES[0] < report["totals"]["peak_force_n"] < FORCES[1]
 
 
 def undersides(sole, first, last):
