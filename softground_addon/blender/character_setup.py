@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import ceil, floor, log10
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,7 +13,7 @@ from ..core.errors import InputError
 from ..core.solids import mass_properties
 from .properties import SoftGroundCharacter
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
-from .rig_sampling import is_simulated
+from .rig_sampling import is_animated, is_simulated
 from .settings import exists, time_stretch_of
 from .solid_extraction import surface_of
 
@@ -143,6 +144,8 @@ def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
     """Bake the frames of the first character; widen the range for further ones."""
     if not frames:
+        if len(scene.softground.characters) == 1:
+            scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
         return
     settings, stretch = scene.softground, time_stretch_of(scene)
     start, end = floor(frames[0] / stretch), ceil(frames[1] / stretch)
@@ -277,11 +280,15 @@ def mapping_of(character: SoftGroundCharacter) -> RigMapping:
     return RigMapping(joints, soles, "settings")
 
 
-def animated_frames(armature: bpy.types.Object) -> tuple[int, int] | None:
-    """First and last frame of the object's action and NLA strips, and of those that it is parented to."""
+def animated_frames(
+    armature: bpy.types.Object, followers: frozenset[bpy.types.Object] = frozenset()
+) -> tuple[int, int] | None:
+    """First and last frame of the object's action and NLA strips, and of those that it is parented to.
+
+    Where there are none, of what its constraints follow; `followers` are those that are asked about already.
+    """
     ranges: list[tuple[float, float]] = []
-    node: bpy.types.Object | None = armature
-    while node:
+    for node in (armature, *ancestors(armature)):
         animation = node.animation_data
         if animation:
             strips = [
@@ -291,10 +298,20 @@ def animated_frames(armature: bpy.types.Object) -> tuple[int, int] | None:
             if animation.action:
                 frames = animation.action.frame_range
                 ranges.append((frames[0], frames[1]))
-        node = node.parent
+    if not ranges:
+        followers |= {armature}
+        ranges += [found for leader in _leaders(armature) - followers if (found := animated_frames(leader, followers))]
     if not ranges:
         return None
     return floor(min(start for start, _ in ranges)), ceil(max(end for _, end in ranges))
+
+
+def _leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+    """Objects that the constraints of an object and of its bones follow."""
+    bones = thing.pose.bones if thing.pose else ()
+    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints]
+    targets = [getattr(constraint, "target", None) for constraint in constraints if not constraint.mute]
+    return {target for target in targets if target is not None} - {thing}
 
 
 def set_up_automatically(scene: bpy.types.Scene) -> None:
@@ -319,13 +336,14 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
             "with Add Character in the SoftGround panel."
         )
-    if len(armatures) > 1:
+    moving = [armature for armature in armatures if is_animated(armature)]
+    if len(armatures) > 1 and len(moving) != 1:
         names = ", ".join(f"'{armature.name}'" for armature in armatures)
         raise InputError(
             f"Scene '{scene.name}' has several armatures ({names}): add those that walk with Add Character in the "
             "SoftGround panel and save the file."
         )
-    add_character(scene, armatures[0])
+    add_character(scene, (moving or armatures)[0])
 
 
 def _instances_armature(thing: bpy.types.Object) -> bool:

@@ -7,6 +7,7 @@ import argparse
 import contextlib
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -21,6 +22,7 @@ from ..core.errors import BakeError, InputError, SoftGroundError
 from ..core.manifest import BatchShot, frame_range
 from . import bake_job, batch, export_formats, jobs, settings
 from .character_setup import set_up_automatically
+from .preset_menu import user_folder
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 
@@ -52,7 +54,7 @@ def run_standalone(arguments: Sequence[str]) -> int:
 def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     previous = {number: signal.signal(number, _interrupt) for number in _INTERRUPTS}
     try:
-        options = parser.parse_args(list(arguments))
+        options = parser.parse_args(_with_frames_joined(arguments))
         if options.command == "batch":
             return _batch_code(batch.bake_batch(options))
         if options.command == "export":
@@ -76,6 +78,17 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         for number, handler in previous.items():
             signal.signal(number, handler or signal.SIG_DFL)  # none: Blender's own, which Python cannot name
     return EXIT_DONE
+
+
+def _with_frames_joined(arguments: Sequence[str]) -> list[str]:
+    """The arguments with negative frames given as `--frames=-20-5`: alone, they would be taken for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] == "--frames" and re.fullmatch(r"-\d+--?\d+", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 def _interrupt(_number: int, _frame: object) -> None:
@@ -285,7 +298,11 @@ def _scene(name: str | None) -> bpy.types.Scene:
 
 def _preset(name_or_path: str) -> presets.Preset:
     path = Path(name_or_path)
-    return presets.load(path) if path.suffix.lower() == ".json" else presets.find(name_or_path)
+    return (
+        presets.load(path)
+        if path.suffix.lower() == ".json"
+        else presets.find(name_or_path, (presets.FOLDER, user_folder()))
+    )
 
 
 def _save_target(options: argparse.Namespace) -> Path | None:

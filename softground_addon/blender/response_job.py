@@ -258,7 +258,7 @@ def gaps_left(
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
         table[motion.name] = _statistics(gaps(motion, touching, terrain, footprints))
-    return {"before": table}
+    return {"before": table, "after": table}
 
 
 def floating_mm(gaps_mm: Mapping[str, Any]) -> float:

@@ -25,6 +25,9 @@ _LOW = 0.2
 _ANKLE_LEVEL = 0.3
 """The foot starts below this part of the hip's height (the ankle of a human is at 0.08, the knee at 0.54)."""
 
+_WIDEST = 40
+"""So many tips of bones, the farthest to the sides, are looked at for arms: fingers, in most rigs."""
+
 _NO_DIRECTION = 0.01
 """Feet that point less far than this part of the rig's height do not tell where it faces."""
 
@@ -43,6 +46,16 @@ class _Skeleton:
     def height(self) -> float:
         points = np.concatenate([self.heads, self.tails])
         return float(np.ptp(points[:, 2])) or 1.0
+
+    @property
+    def leaves(self) -> list[int]:
+        """Bones that nothing hangs from."""
+        return sorted(set(range(len(self.names))) - set(self.parents))
+
+    def lengths(self, chain: Sequence[int]) -> list[float]:
+        """From the head of each bone of a chain to that of the next; of the last, to its tail."""
+        points = np.array([*self.heads[list(chain)], self.tails[chain[-1]]])
+        return [float(length) for length in np.linalg.norm(np.diff(points, axis=0), axis=1)]
 
     def chain(self, bone: int) -> list[int]:
         """From the root down to a bone."""
@@ -68,7 +81,7 @@ def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
     feet: Feet = []
     for index, pair in enumerate(pairs):
         limb = ("hip", "knee", "ankle", "ball", "toe") if index == 0 else ("shoulder", "elbow", "wrist", "", "")
-        stem = "foot" if index == 0 else "forefoot"
+        stem = "foot" if index == 0 else "forefoot" if index == len(pairs) - 1 else f"midfoot{index}"
         sides = sorted(pair, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left))
         for leg, side in zip(sides, "LR", strict=True):
             thigh, shin, foot, toe = _segments(skeleton, leg)
@@ -81,7 +94,57 @@ def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
     hips = skeleton.parents[pairs[0][0][0]]
     if hips >= 0:
         joints["hips"] = (skeleton.names[hips], "head")
+        if len(pairs) == 1:
+            joints |= _upper_body(skeleton, hips, left)
     return joints, feet
+
+
+def _upper_body(skeleton: _Skeleton, hips: int, left: Array) -> Joints:
+    """Spine, neck, head and arms of a figure on two legs: the mirrored limbs that part highest, and what is above."""
+    leaves = [
+        leaf
+        for leaf in skeleton.leaves
+        if hips in (chain := skeleton.chain(leaf))
+        and leaf != hips
+        and skeleton.heads[chain, 2].max() > skeleton.heads[hips, 2] + _LOW * skeleton.height
+    ]
+    leaves.sort(key=lambda leaf: -abs(float((skeleton.heads[leaf] - skeleton.heads[hips]) @ left)))
+    chains = [skeleton.chain(leaf) for leaf in leaves[:_WIDEST]]
+    arms: list[tuple[float, int, _Pair]] = []
+    for i, first in enumerate(chains):
+        for second in chains[i + 1 :]:
+            fork = _shared_length(first, second)
+            pair = first[fork:], second[fork:]
+            if fork and len(pair[0]) == len(pair[1]) >= 2 and _are_mirrored(skeleton, *pair):
+                arms.append((float(sum(skeleton.lengths(pair[0]))), fork, pair))
+    if not arms:
+        return {}
+    _, fork, pair = max(arms)
+    joints: Joints = {}
+    chest = skeleton.chain(pair[0][0])[:-1]
+    for arm, side in zip(sorted(pair, key=lambda arm: -float(skeleton.heads[arm[-1]] @ left)), "lr", strict=True):
+        lengths = skeleton.lengths(arm)
+        upper = max(range(len(arm) - 1), key=lambda place: min(lengths[place], lengths[place + 1]))
+        joints[f"shoulder_{side}"] = (skeleton.names[arm[upper]], "head")
+        joints[f"elbow_{side}"] = (skeleton.names[arm[upper + 1]], "head")
+        wrist = (arm[upper + 2], "head") if upper + 2 < len(arm) else (arm[upper + 1], "tail")
+        joints[f"wrist_{side}"] = (skeleton.names[wrist[0]], wrist[1])
+    above = [
+        leaf
+        for leaf in skeleton.leaves
+        if chest[-1] in skeleton.chain(leaf) and not {leaf, *skeleton.chain(leaf)} & {*pair[0], *pair[1]}
+    ]
+    if above:
+        top = skeleton.chain(max(above, key=lambda leaf: max(skeleton.heads[leaf, 2], skeleton.tails[leaf, 2])))
+        neck = top[len(chest) :]
+        joints["neck"] = (skeleton.names[neck[0]], "head")
+        if len(neck) > 1:
+            lengths = skeleton.lengths(neck)
+            head = max(range(1, len(neck)), key=lambda place: lengths[place])
+            joints["head"] = (skeleton.names[neck[head]], "head")
+    if hips in chest and chest[-1] != hips:
+        joints["spine"] = (skeleton.names[chest[chest.index(hips) + 1]], "head")
+    return joints
 
 
 def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:

@@ -105,7 +105,7 @@ _HIPS_OF_SOME = ("root", "cog", "spine")
 
 _DECORATION = frozenset(
     (
-        "def", "org", "mixamorig", "bip", "valvebiped", "j", "bn", "jnt", "joint", "jt", "bone", "bind", "bnd",
+        "def", "org", "mixamorig", "bip", "biped", "valve", "j", "bn", "jnt", "joint", "jt", "bone", "bind", "bnd",
         "deform", "skin", "sk", "cc", "base", "rig", "armature", "skel",
     )
 )  # fmt: skip
@@ -161,17 +161,45 @@ def map_rig(armature: bpy.types.Object) -> RigMapping:
     require_armature(armature)
     bones = armature.data.bones
     mapping = _map_by_names(bones)
-    if mapping is None:
+    if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
         shape = map_by_rest_pose(armature)
         if shape is not None:
             joints, feet = shape
-            mapping = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
+            by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
+            mapping = by_shape if mapping is None else _completed(mapping, by_shape)
     if mapping is None:
         raise InputError(
             f"No feet found in armature '{armature.name}': neither by bone names nor as mirrored lowest chains of the "
             "rest pose. Choose the foot bones by hand in the character's list of soles."
         )
     return mapping
+
+
+_LEG, _ARM = ("hip", "knee", "ankle", "ball", "toe"), ("shoulder", "elbow", "wrist")
+
+_WHOLE_BODY = frozenset(("hips", "neck", "head", *(f"{joint}_{side}" for joint in (*_LEG[:3], *_ARM) for side in "lr")))
+"""Joints without which the rest pose is asked."""
+
+
+def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
+    """What the names say, with the limbs that they name in part read from the rest pose, where the two do not differ
+    about where a limb ends."""
+    joints, soles = dict(named.joints), list(named.soles)
+    for side in "lr":
+        leg, arm = ({joint: f"{joint}_{side}" for joint in limb} for limb in (_LEG, _ARM))
+        found = shaped.joints
+        ends = {found[leg[joint]] for joint in ("ankle", "ball") if leg[joint] in found}
+        if not all(leg[joint] in joints for joint in _LEG[:3]) and joints.get(leg["ankle"]) in ends:
+            joints = {joint: place for joint, place in joints.items() if joint not in leg.values()}
+            joints |= {joint: found[joint] for joint in leg.values() if joint in found}
+            for place, sole in enumerate(soles):
+                if sole.side.lower() == side:
+                    soles[place] = next(other for other in shaped.soles if other.name == sole.name)
+        missing = [joint for joint in arm.values() if joint not in joints]
+        if missing and joints.get(arm["shoulder"], found.get(arm["shoulder"])) == found.get(arm["shoulder"]):
+            joints |= {joint: found[joint] for joint in missing if joint in found}
+    joints |= {joint: place for joint, place in shaped.joints.items() if joint[-2] != "_" and joint not in joints}
+    return RigMapping(joints, tuple(soles), named.method)
 
 
 def require_armature(armature: bpy.types.Object | None) -> None:

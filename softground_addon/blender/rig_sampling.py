@@ -304,11 +304,11 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
         raise InputError(f"Armature '{name}' is in edit mode and stands still: leave edit mode.")
     if armature.data.pose_position == "REST":
         raise InputError(f"Armature '{name}' shows its rest position: set it to Pose Position in its data properties.")
-    if not _is_animated(armature):
+    if not is_animated(armature):
         raise InputError(f"Armature '{name}' has no animation: give it an action, or choose the armature that has one.")
 
 
-def _is_animated(armature: bpy.types.Object) -> bool:
+def is_animated(armature: bpy.types.Object) -> bool:
     """Whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
     thing: bpy.types.Object | None = armature
     while thing is not None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -129,6 +131,11 @@ def dump(preset: Preset) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
+def _bare(name: str) -> str:
+    """A name as it is compared: letters and digits, whatever their case and what stands between them."""
+    return re.sub(r"[\W_]+", "_", name.casefold()).strip("_")
+
+
 def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
     """The preset of that file stem or display name, the first found in `folders`.
 
@@ -137,10 +144,14 @@ def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
     InputError
         If there is none, listing those that there are.
     """
-    wanted = name.strip().casefold().replace(" ", "_").replace("-", "_")
+    wanted = _bare(name)
     paths = [path for folder in folders for path in sorted(folder.glob("*.json"))]
     for path in paths:
-        if path.stem.casefold().replace(" ", "_").replace("-", "_") == wanted:
+        if _bare(path.stem) == wanted:
             return load(path)
+    for path in paths:
+        with suppress(InputError):  # another preset's file may be broken
+            if _bare((preset := load(path)).name) == wanted:
+                return preset
     known = ", ".join(path.stem for path in paths)
     raise InputError(f"There is no preset '{name}'. There are: {known}; or give the path of a .json file.")

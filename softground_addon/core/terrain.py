@@ -63,7 +63,8 @@ class MeshTerrain:
         vertices : (V, 3) float array
             World positions [m], Z up.
         triangles : (T, 3) int array
-            Corners of each triangle, counter-clockwise from outside.
+            Corners of each triangle, counter-clockwise from outside. Where none faces upward, as on a plane whose
+            normals are flipped, they are taken from their other side.
         bounds : (2, 2) float array, optional
             Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
         values : (V, C) float array, optional
@@ -72,7 +73,7 @@ class MeshTerrain:
         Raises
         ------
         InputError
-            If no triangle faces upward within the bounds.
+            If within the bounds there is none, or nothing but walls.
         """
         if bounds is not None and len(triangles):
             place = vertices[:, :2]
@@ -81,12 +82,15 @@ class MeshTerrain:
         corners = vertices[triangles].astype(np.float64)
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
-        upward = normal[:, 2] > UPWARD * np.maximum(length, 1e-300)
+        steep = UPWARD * np.maximum(length, 1e-300)
+        upward = normal[:, 2] > steep
+        if not upward.any():
+            upward = normal[:, 2] < -steep
+            corners, triangles = corners[:, ::-1], triangles[:, ::-1]
         corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(
-                "The ground has no face that looks upward under the character's path: move it under the feet, or "
-                "recalculate its normals to point outside."
+                "The ground has no face under the character's path that could be stood on: move it under the feet."
             )
         low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
         origin = low.min(axis=0)

@@ -10,6 +10,7 @@ import bpy
 import pytest
 
 from softground_addon.blender import cli, ground_mesh
+from softground_addon.blender.compat import action_curves, slot_of
 from tests.blender import command_line, shots
 
 
@@ -63,6 +64,31 @@ def test_options_reach_the_bake(shot, tmp_path):
     assert content["forces"]["frames"] == list(range(5, 31))
     forces = content["forces"]["characters"]["Walker"]
     assert all(len(force) == 26 for force in forces.values())
+
+
+@pytest.mark.parametrize("form", [("--frames", "-30--5"), ("--frames=-30--5",)])
+def test_frames_may_be_negative(scene, tmp_path, form):
+    armature = shots.walker(scene, frames=40)
+    for curve in action_curves(armature.animation_data.action, slot_of(armature.animation_data)):
+        for key in curve.keyframe_points:
+            key.co_ui[0] -= 40
+    shot, report = tmp_path / "shot.blend", tmp_path / "report.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    assert run(shot, *form, "--report", report, "--cell-size", "0.02") == 0
+    content = json.loads(report.read_text(encoding="utf-8"))
+    assert content["inputs"]["frames"] == [-30, -5]
+    assert set(content["gaps_mm"]) == {"before", "after"}
+
+
+def test_an_armature_that_stands_still_is_passed_over(scene, tmp_path):
+    walker = shots.walker(scene, frames=30)
+    still = shots.walker(scene, frames=30)
+    still.animation_data_clear()
+    path, report = tmp_path / "shot.blend", tmp_path / "report.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    name = walker.name
+    assert run(path, "--report", report, "--cell-size", "0.02") == 0
+    assert [c["armature"] for c in json.loads(report.read_text(encoding="utf-8"))["inputs"]["characters"]] == [name]
 
 
 def test_in_place_replaces_the_opened_file_and_keeps_its_compression(shot):

@@ -85,6 +85,53 @@ def test_a_rig_without_names_is_read_from_its_rest_pose(scene, turn, swap):
         assert mapping.joints[joint] == (numbers[part], "head")
 
 
+@pytest.mark.parametrize("turn", [0.0, np.pi / 2, -0.7])
+def test_without_names_the_upper_body_is_read_from_the_rest_pose_too(scene, turn):
+    armature, numbers = nameless(turn)
+    mapping = map_rig(armature)
+    expected = {part: numbers[part] for part in ("spine", "neck", "head")}
+    for side, letter in enumerate("lr"):
+        expected |= {f"{joint}_{letter}": numbers[f"{segment}{side}"] for joint, segment in SEGMENT_OF_JOINT.items()}
+    assert {joint: mapping.joints[joint][0] for joint in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("thigh", "shin", "foot", "toe", "arm", "forearm", "hand"),
+    [
+        ("leg1_{s}", "leg2_{s}", "foot_{s}", "toe_{s}", "arm1_{s}", "arm2_{s}", "hand_{s}"),
+        ("leg_{s}0_0", "leg_{s}0_1", "leg_{s}0_2", "foot_{s}0_0", "arm_{s}0_0", "arm_{s}0_1", "arm_{s}0_2"),
+        ("Bein1.{s}", "Bein2.{s}", "foot.{s}", "toe.{s}", "Oberarm.{s}", "Unterarm.{s}", "hand.{s}"),
+    ],
+)
+def test_limbs_that_are_named_in_part_are_completed_from_the_rest_pose(
+    scene, thigh, shin, foot, toe, arm, forearm, hand
+):
+    limbs = dict(zip(rigs.LIMBS, ("collar_{s}", arm, forearm, hand, thigh, shin, foot, toe), strict=True))
+    family = rigs.Family(("root", "body1", "body2", "neck", "head"), limbs, sides=("L", "R"))
+    mapping = map_rig(rigs.human(family))
+    for side, letter in enumerate("lr"):
+        for joint, segment in SEGMENT_OF_JOINT.items():
+            assert mapping.joints[f"{joint}_{letter}"] == (family.name(segment, side), "head")
+    assert [(s.bone, s.toe_bone) for s in mapping.soles] == [
+        (family.name("foot", side), family.name("toe", side)) for side in (0, 1)
+    ]
+
+
+def test_an_insect_without_names_has_six_soles_of_different_names(scene):
+    bones = {"b0": ((0, 0.6, 0.7), (0, 0, 0.75)), "b1": ((0, 0, 0.75), (0, -0.6, 0.7))}
+    parents = {"b1": "b0"}
+    for y, parent in ((0.6, "b0"), (0.0, "b1"), (-0.5, "b1")):
+        for x in (0.15, -0.15):
+            previous = parent
+            for high, low in itertools.pairwise((0.65, 0.35, 0.08, 0.0)):
+                name = f"b{len(bones)}"
+                bones[name] = ((x, y, high), (x, y - (0.05 if low == 0 else 0), low))
+                parents[name] = previous
+                previous = name
+    mapping = map_rig(rigs.build("Ant", bones, parents))
+    assert len({sole.name for sole in mapping.soles}) == len({sole.bone for sole in mapping.soles}) == 6
+
+
 def test_a_mirrored_armature_keeps_its_sides(scene):
     armature, numbers = nameless()
     armature.scale = (-1.0, 1.0, 1.0)

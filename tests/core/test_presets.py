@@ -1,5 +1,6 @@
 """Presets: JSON in, validated materials out, and nothing else."""
 
+import dataclasses
 import json
 from dataclasses import fields
 
@@ -98,6 +99,17 @@ def test_a_broken_preset_is_refused_with_what_is_wrong(change, says):
 def test_no_text_makes_anything_but_a_preset_or_a_clear_error(text):
     with pytest.raises(InputError, match="fuzz"):
         presets.parse(text, "fuzz")
+
+
+@pytest.mark.parametrize("name", ["Fresh Snow (field)", "fresh_snow", "FRESH-SNOW", " fresh snow field "])
+def test_a_preset_is_found_by_its_file_and_by_the_name_that_users_see(name):
+    assert presets.find(name).name == "Fresh Snow (field)"
+
+
+def test_a_name_is_found_beside_a_broken_file(tmp_path):
+    (tmp_path / "a.json").write_text("{")
+    (tmp_path / "b.json").write_text(presets.dump(dataclasses.replace(presets.find("mud"), name="Bog")))
+    assert presets.find("bog", (tmp_path,)).surface == "mud"
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -61,10 +61,18 @@ def test_only_triangles_within_the_bounds_are_kept():
     assert len(terrain.corners) == 2
 
 
-def test_a_ground_that_faces_down_is_refused_with_the_remedy():
+def test_a_ground_whose_normals_are_flipped_is_the_same_ground():
     vertices, triangles = slab(0.0)
-    with pytest.raises(InputError, match="recalculate its normals"):
-        MeshTerrain.from_mesh(vertices, triangles[:2, ::-1])
+    flipped = MeshTerrain.from_mesh(vertices, triangles[:2, ::-1])
+    upright = MeshTerrain.from_mesh(vertices, triangles[:2])
+    x, y = np.random.default_rng(1).uniform(-0.5, 1.5, (2, 50))
+    np.testing.assert_array_equal(flipped.heights(x, y), upright.heights(x, y))
+
+
+def test_a_ground_of_walls_alone_is_refused_with_the_remedy():
+    vertices, triangles = slab(0.0)
+    with pytest.raises(InputError, match="move it under the feet"):
+        MeshTerrain.from_mesh(vertices[:, [2, 0, 1]], triangles[:2])
 
 
 def test_values_of_vertices_are_interpolated_as_scipy_does():
