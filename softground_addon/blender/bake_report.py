@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.footprints import Footprint
 from ..core.missed_steps import advice, missed_steps
 from ..core.simulation import CharacterLoads
+from ..core.sliding import treadmill_speed
 from . import properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, movers_of, title_of
 from .jobs import STAGES
@@ -41,6 +42,13 @@ def warnings(
         missed = missed_steps(character.motion, character.contacts)
         if missed:
             found.append(advice(character.motion.name, missed, f"'{ground}'"))
+        belt = treadmill_speed(character.motion, character.contacts)
+        if belt > 0:
+            found.append(
+                f"'{character.motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while they stand, and "
+                "print over each other. Let the armature move ahead by as much, or use the animation with its root "
+                "motion."
+            )
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         found.append(

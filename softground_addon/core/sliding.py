@@ -1,0 +1,45 @@
+"""Feet that slide while they stand, as in a walk on the spot."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .contacts import REST_SPEED, Contacts
+from .motion import CharacterMotion
+
+
+def treadmill_speed(motion: CharacterMotion, contacts: Contacts) -> float:
+    """Speed of the belt that a character walks on [m/s]; 0 where its feet stand still or take it along.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    contacts : Contacts
+        At the motion's samples.
+
+    Returns
+    -------
+    float
+        Horizontal: of the soles while they touch, the median, relative to the body's way from the first sample to the
+        last. Feet that slide no faster than a standing one may (`contacts.REST_SPEED`) stand still, and on skates and
+        skis the body goes with them.
+    """
+    if motion.centre is not None or len(motion.frames) < 2:
+        return 0.0
+    slides, ways = [np.zeros((0, 2))], []
+    for number, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        path = points[..., :2].mean(axis=1)
+        slides.append(np.gradient(path, motion.time_step, axis=0)[contacts.touching[:, number]])
+        ways.append(path[-1] - path[0])
+    standing = np.concatenate(slides)
+    if not len(standing):
+        return 0.0
+    belt = np.median(standing, axis=0)
+    body = np.mean(ways, axis=0) / (motion.time_step * (len(motion.frames) - 1))
+    if "hips" in motion.joints:
+        hips = motion.joints["hips"][:, :2]
+        body = (hips[-1] - hips[0]) / (motion.time_step * (len(motion.frames) - 1))
+    speed = float(np.linalg.norm(belt))
+    slow = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
+    return speed if speed > slow and np.linalg.norm(belt - body) > speed / 2 else 0.0
