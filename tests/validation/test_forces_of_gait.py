@@ -130,6 +130,25 @@ def test_millimetres_of_noise_are_borne(name, noise):
 
 
 @pytest.mark.parametrize("name", [WALK, RUN])
+def test_markers_that_are_lost_for_a_tenth_of_a_second_are_borne(name, tmp_path):
+    lines = (DATA / f"{name}.csv").read_text().splitlines()
+    random = np.random.default_rng(0)
+    rows = [line.split(",") for line in lines]
+    lost = round(0.1 * read(name).rate)
+    for marker in ("knee_l", "ankle_r", "heel_l", "shoulder_r", "mid_hip"):
+        columns = [rows[0].index(f"{marker}_{axis}") for axis in "xyz"]
+        first = int(random.integers(2, len(rows) - lost - 1))
+        for row in rows[first : first + lost]:
+            for column in columns:
+                row[column] = ""
+    (tmp_path / f"{name}.csv").write_text("\n".join(map(",".join, rows)))
+    (tmp_path / f"{name}.json").write_text((DATA / f"{name}.json").read_text())
+    result = scored(read_trial(tmp_path / f"{name}.csv"))
+    assert max(result.rms_bw_left, result.rms_bw_right) < 0.08
+    assert max(result.heel_strike_ms, result.toe_off_ms) < 20
+
+
+@pytest.mark.parametrize("name", [WALK, RUN])
 @pytest.mark.parametrize("marker", ["heel", "ball", "toe"])
 @pytest.mark.parametrize("offset", [(0.0, 0.0, -0.02), (0.0, 0.0, 0.04), (0.02, 0.0, 0.0), (-0.02, 0.0, 0.0)])
 def test_markers_may_sit_elsewhere_on_the_foot(name, marker, offset):

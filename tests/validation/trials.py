@@ -47,7 +47,7 @@ class Trial:
 
 
 def read_trial(csv: Path) -> Trial:
-    """The trial whose three files share the name of `csv`."""
+    """The trial whose three files share the name of `csv`; gaps of the markers are bridged, lost forces are none."""
     about = json.loads(csv.with_suffix(".json").read_text())
     table = np.genfromtxt(csv, delimiter=",", names=True)
 
@@ -59,10 +59,19 @@ def read_trial(csv: Path) -> Trial:
         csv.stem,
         about["mass_kg"],
         about["rate_hz"],
-        {name: vectors(name) for name in names if not name.startswith("grf_")},
-        np.stack([vectors(f"grf_{side}") for side in SIDES], axis=1),
+        {name: _bridged(vectors(name)) for name in names if not name.startswith("grf_")},
+        np.nan_to_num(np.stack([vectors(f"grf_{side}") for side in SIDES], axis=1)),
         csv.with_suffix(".bvh"),
     )
+
+
+def _bridged(path: Array) -> Array:
+    """A path (F, 3) with straight lines where the marker was lost."""
+    seen = np.isfinite(path).all(axis=1)
+    if seen.all() or not seen.any():
+        return path
+    index = np.arange(len(path))
+    return np.stack([np.interp(index, index[seen], column[seen]) for column in path.T], axis=1)
 
 
 def motion_of_trial(trial: Trial) -> CharacterMotion:
