@@ -12,6 +12,8 @@ module                  motion                                         of
 `showpieces`            `kick(body)`, `dance(body)`                    `body.Body`
 `cartwheel`             `cartwheel(body)`                              `body.Body`, on feet and hands
 `four_legged`           `go_on_four_legs(dog, WALK)`, `... TROT)`      `dog.Dog`, over any `course.Course`
+`cane`                  `with_cane(body, walk(...))`                   `body.Body` and `cane.create_cane`
+`fall`                  `fall_back(body, ...)`                         `body.Body`, on feet, back and arms
 `rolling_things`        `roll_along(wheel, ...)`, `drop(ball, ...)`    plain objects
 ======================  =============================================  ============================================
 

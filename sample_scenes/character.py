@@ -31,15 +31,25 @@ _LOOKS = {
 """Base colour (linear) and roughness of each part."""
 
 
-def create_character(name: str, body: Body | Dog, collection: bpy.types.Collection) -> bpy.types.Object:
+def create_character(
+    name: str, body: Body | Dog, collection: bpy.types.Collection, coarseness: float = 1.0
+) -> bpy.types.Object:
     """A person or a dog in rest pose at the origin, facing -Y.
+
+    Parameters
+    ----------
+    name : str
+    body : Body or Dog
+    collection : bpy.types.Collection
+    coarseness : float
+        How many times further apart the vertices of a person are than in the finest figure.
 
     Returns
     -------
     The armature object; its mesh child is named `name` + " Figure".
     """
     armature = create_armature(name, body, collection)
-    figure = hound(body) if isinstance(body, Dog) else hiker(body)
+    figure = hound(body) if isinstance(body, Dog) else hiker(body, coarseness)
     mesh = bpy.data.meshes.new(f"{name} Figure")
     faces = [quad[:3] if quad[2] == quad[3] else quad for quad in figure.quads.tolist()]
     mesh.from_pydata((figure.vertices @ TO_BLENDER.T).tolist(), [], faces)

@@ -37,7 +37,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     """The second walker crosses the first one's way at an angle, a step behind."""
     body = Body()
     walk_of = walk(body, Gait(), FRAMES, scene.render.fps)
-    first = create_character("East", body, scene.collection)
+    first = create_character("East", body, scene.collection, production.COARSENESS)
     write_action(first, walk_of, "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     second = copy_character(first, "West", scene.collection)
@@ -105,10 +105,10 @@ def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
     scene.frame_set(scene.frame_end)
     stage.add_sun(scene, radians(-30), radians(16))
     scene.view_settings.exposure = -0.4
-    camera = stage.add_camera(scene, "Crossing", lens=40.0)
+    camera = stage.add_camera(scene, "Crossing", lens=36.0)
     bake = built.bakes["Snow"]
     middle = np.mean([step.position for step in bake.footprints], axis=0)
-    stage.aim(camera, middle + np.array((2.2, 3.9, 2.5)), middle + np.array((-0.15, -0.35, 0.25)))
+    stage.aim(camera, middle + np.array((2.6, 5.0, 3.0)), middle + np.array((-0.35, -0.9, 0.45)))
     low, _ = stage.bounds([bake.carrier])
     stage.add_floor(low[2] - 0.02, scene.collection)
     path = folder / "crossing.jpg"

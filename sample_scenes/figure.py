@@ -48,10 +48,10 @@ Piece = tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]
 
 
 @cache
-def hiker(body: Body) -> Figure:
-    """A dressed figure of the given proportions."""
+def hiker(body: Body, coarseness: float = 1.0) -> Figure:
+    """A dressed figure of the given proportions; its vertices are so many times further apart, but for the shoes'."""
     garments = [_head(body), _cap(body), _jacket(body), _trousers(body), *(_hand(body, side) for side in SIDES)]
-    size = body.stature / 1.78
+    size = coarseness * body.stature / 1.78
     pieces = [
         surface(body, part, solid, low, high, spacing * size, bones)
         for part, solid, low, high, spacing, bones in garments

@@ -40,7 +40,7 @@ class ForceArrows:
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> ForceArrows:
     """A walk over soil."""
     body = Body()
-    walker = create_character("Hiker", body, scene.collection)
+    walker = create_character("Hiker", body, scene.collection, production.COARSENESS)
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     options = {"shape_keys": "false"} | dict(options or {})

@@ -32,8 +32,8 @@ SUN_ELEVATION = radians(22)
 _LOOKS: dict[str, Options] = {
     "Snow": {"pressure": "UNIFORM"},
     "Dry Sand": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.6", "material.repose_angle": "0.5585"},
-    "Mud": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.3"},
-    "Soil": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.3"},
+    "Mud": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.4"},
+    "Soil": {"pressure": "CENTRE_OF_PRESSURE", "material.rim_bias": "0.6"},
 }
 """What is switched on beside the preset."""
 
@@ -49,7 +49,7 @@ class FourGrounds:
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> FourGrounds:
     """The same short walk on each preset."""
     body = Body()
-    first = create_character("Hiker", body, scene.collection)
+    first = create_character("Hiker", body, scene.collection, production.COARSENESS)
     write_action(first, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     bakes, walkers = {}, []
@@ -74,23 +74,38 @@ def claims(built: FourGrounds) -> list[Claim]:
         preset: sum(step.rim_m3 for step in bake.footprints) / sum(step.compressed_m3 for step in bake.footprints)
         for preset, bake in built.bakes.items()
     }
-    sand = close_up_of(built.bakes["Dry Sand"].footprints)
     return [
         Claim("Snow's prints over mud's, in mean depth", depth["Snow"] / depth["Mud"], 1.05, 2.5),
         Claim("Mud's prints over soil's, in mean depth", depth["Mud"] / depth["Soil"], 1.3, 2.5),
         Claim("Soil's prints over sand's, in mean depth", depth["Soil"] / depth["Dry Sand"], 1.3, 2.5),
         Claim("Part of the pressed snow that stands up as a rim", raised["Snow"], 0.099, 0.101),
         Claim("Part of the pressed sand that stands up as a rim", raised["Dry Sand"], 0.99, 1.01),
-        Claim("Rim ahead of the toes in sand over that behind the heel", rim_ahead(sand), 1.2, 4.0),
+        Claim("Height of snow's rim over the depth of its print", _rim_height("Snow", built), 0.0, 0.1),
+        *(claim for preset in PRESETS[1:] for claim in _rim_ahead(preset, built)),
     ]
 
 
-def rim_ahead(step: Footprint) -> float:
-    """Volume of the rim beyond the toes of a print over that behind its heel, with a centimetre of the print each."""
+def _rim_height(preset: str, built: FourGrounds) -> float:
+    """Highest point of the rim of the print that is shown, over the depth of the print."""
+    step = close_up_of(built.bakes[preset].footprints)
+    return float(step.tile(step.rim).max()) / step.max_depth_m
+
+
+def _rim_ahead(preset: str, built: FourGrounds) -> list[Claim]:
+    """Where the rim of the print that is shown is highest along the foot, and how much more of it is ahead."""
+    step = close_up_of(built.bakes[preset].footprints)
     x, y = np.meshgrid(*step.window.centres(step.cell_size))
     along = (x - step.position[0]) * cos(step.heading) + (y - step.position[1]) * sin(step.heading)
-    of_print, rim = along.ravel()[step.contact_cells], step.tile(step.rim)
-    return float(rim[along > of_print.max() - 0.01].sum() / rim[along < of_print.min() + 0.01].sum())
+    of_print, risen = along.ravel()[step.contact_cells], step.tile(step.rim) - step.tile(step.compression)
+    heel, toes = of_print.min(), of_print.max()
+    highest = (along.ravel()[risen.argmax()] - heel) / (toes - heel)
+    ahead, behind = risen[along > toes].max(), risen[along < heel].max()
+    return [
+        Claim(f"Highest point of the rim in {preset.lower()}, from 0 at the heel to 1 at the toes", highest, 0.75, 1.2),
+        Claim(
+            f"Height of the rim ahead of the toes in {preset.lower()} over that behind the heel", ahead / behind, 1.2, 6
+        ),
+    ]
 
 
 def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:

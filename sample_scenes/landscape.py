@@ -94,7 +94,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     scene.frame_start, scene.frame_end = 1, FRAMES
     walkers, bodies = {}, {}
     for name, (body, motion) in motions(scene.render.fps).items():
-        walkers[name] = create_character(name.title(), body, scene.collection)
+        walkers[name] = create_character(name.title(), body, scene.collection, production.COARSENESS)
         walkers[name].location = (LANES[name], STARTS[name], 0.0)
         write_action(walkers[name], motion, name.title())
         bodies[name] = body

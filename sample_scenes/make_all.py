@@ -20,6 +20,7 @@ SCENES = (
     "four_legs",
     "bicycle",
     "stunts",
+    "things",
 )
 """Modules of this package that `production.run` knows how to run, in the order of the paper's figures."""
 

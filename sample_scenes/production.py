@@ -31,6 +31,9 @@ from softground_addon.core.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")
 
+COARSENESS = 1.7
+"""Of the figures in the scenes, see `character.create_character`: files stay small."""
+
 Options = Mapping[str, str]
 """Settings below `scene.softground` by their path, as `--set` takes them."""
 
@@ -76,6 +79,8 @@ class Walker:
         Further mesh objects that are one thing with the first, such as the other wheel.
     more : sequence of str
         Bones that print beside the feet, such as hands and forepaws.
+    held : sequence of bpy.types.Object
+        Mesh objects that print beside the feet, such as a cane.
     """
 
     armature: bpy.types.Object
@@ -83,6 +88,7 @@ class Walker:
     shoes: Mapping[str, bpy.types.Object] = field(default_factory=dict)
     with_things: Sequence[bpy.types.Object] = ()
     more: Sequence[str] = ()
+    held: Sequence[bpy.types.Object] = ()
 
 
 @dataclass(frozen=True)
@@ -160,6 +166,8 @@ def bake(
                 sole.object = shoe
         if walker.more:
             character_setup.add_bone_contacts(shot.characters[-1], walker.more)
+        if walker.held:
+            character_setup.add_object_contacts(scene, shot.characters[-1], walker.held)
     bpy.ops.softground.load_preset(name=preset)
     for path, value in (options or {}).items():
         settings.assign(shot, path, value)
@@ -230,6 +238,7 @@ def run(module: ModuleType, arguments: Sequence[str] | None = None) -> int:
         if not options.no_pictures:
             stage.set_up_rendering(bpy.context.scene)
             pictures = module.shoot(built, folder.resolve(), options.samples)
+            stage.put_back()
         blend = folder / f"{name}.blend"
         bpy.context.preferences.filepaths.save_version = 0  # no backup beside it
         bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()), compress=True)

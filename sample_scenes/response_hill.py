@@ -19,6 +19,7 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 CELL_SIZE = 0.015  # m
 FRAMES = 96  # 4 s
 APART = 3.2  # m between the two hills
+HALF_WIDTH, LENGTH = 0.7, (-6.2, 1.4)  # m; of a hill across the way and along it
 SHOWN = (14, 36, 58, 82)
 PICTURE = (960, 300)
 
@@ -41,15 +42,15 @@ def hill(x: terrain.Array, y: terrain.Array) -> terrain.Array:
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> ResponseHill:
     """The same walk over two equal hills."""
     body = Body()
-    first = create_character("Without", body, scene.collection)
+    first = create_character("Without", body, scene.collection, production.COARSENESS)
     write_action(first, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     walkers = {"without": first, "with": copy_character(first, "With", scene.collection)}
     walkers["with"].location.x = APART
     bakes = {}
     for (name, walker), answer in zip(walkers.items(), ({}, _RESPONSE), strict=True):
-        x = terrain.spaced(walker.location.x - 1.3, walker.location.x + 1.3, cell_size)
-        y = terrain.spaced(-6.2, 1.4, cell_size)
+        x = terrain.spaced(walker.location.x - HALF_WIDTH, walker.location.x + HALF_WIDTH, cell_size)
+        y = terrain.spaced(*LENGTH, cell_size)
         ground = terrain.add_terrain(f"Hill {name}", x, y, hill, "soil", scene.collection)
         chosen = {"shape_keys": "false", "material.youngs_modulus": "4e5"} | dict(options or {}) | answer
         bakes[name] = production.bake(
@@ -100,18 +101,36 @@ def shoot(built: ResponseHill, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     copies = {name: stage.freeze(walker, SHOWN, scene.collection) for name, walker in built.walkers.items()}
     stage.add_sun(scene, radians(-150), radians(30))
+    sides = {
+        name: _add_side(walker.location.x + HALF_WIDTH, scene.collection) for name, walker in built.walkers.items()
+    }
+    stage.add_floor(-0.24, scene.collection)
     camera = stage.add_camera(scene, "Side", lens=60.0)
     pictures = []
     for name, bake in built.bakes.items():
         for other in built.bakes:
-            for thing in (*copies[other], built.bakes[other].carrier):
+            for thing in (*copies[other], sides[other], built.bakes[other].carrier):
                 thing.hide_render = other != name
         middle = np.array((built.walkers[name].location.x, -2.35, 1.22))
-        stage.aim(camera, middle + np.array((12.0, 0.0, 1.6)), middle)
+        stage.aim(camera, middle + np.array((11.8, 0.0, 2.4)), middle)
         pictures.append(folder / f"response_hill_{name}.png")
         stage.render(scene, camera, pictures[-1], PICTURE, samples)
         bake.carrier.hide_render = False
     return [*pictures, stage.contact_sheet(pictures, 1, folder / "response_hill.jpg")]
+
+
+def _add_side(x: float, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A cut through the hill at x, down to below level ground: what would be hollow under a mesh."""
+    y = terrain.spaced(*LENGTH, 0.05)
+    top = np.column_stack([np.full(len(y), x), y, hill(x, y) - 0.002])
+    mesh = bpy.data.meshes.new("Side")
+    count = len(y)
+    quads = [(i, i + 1, count + i + 1, count + i) for i in range(count - 1)]
+    mesh.from_pydata(np.concatenate([top, top * (1, 1, 0) + (0, 0, -0.25)]).tolist(), [], quads)
+    mesh.materials.append(stage.plain_material("SoftGround Sample cut", (0.075, 0.045, 0.028), 0.9))
+    side = bpy.data.objects.new("Side", mesh)
+    collection.objects.link(side)
+    return side
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ def roll_along(
 ) -> bpy.types.Action:
     """Roll a wheel along a course without slipping: it turns by distance over radius, leans into bends."""
     poses = rolling(course, radius, speed, np.arange(frame_count) / frame_rate)
-    return _write_poses(wheel, *poses, first_frame)
+    return write_poses(wheel, *poses, first_frame)
 
 
 def rolling(course: Course, radius: float, speed: float, times: Array) -> tuple[Array, Array]:
@@ -171,7 +171,7 @@ def _mesh_object(
     return thing
 
 
-def _write_poses(thing: bpy.types.Object, places: Array, turns: Array, first_frame: int) -> bpy.types.Action:
+def write_poses(thing: bpy.types.Object, places: Array, turns: Array, first_frame: int) -> bpy.types.Action:
     """Key location and rotation from the body's frame; where the thing was placed before is the origin."""
     frames = first_frame + np.arange(len(places), dtype=float)
     base = thing.matrix_world.copy()

@@ -26,6 +26,9 @@ _SKIES = ("NISHITA", "MULTIPLE_SCATTERING", "SINGLE_SCATTERING", "HOSEK_WILKIE")
 
 _FRAMING_MARGIN = 1.05  # how much larger than what it shows a picture is
 
+_STILL, _HIDDEN = "softground_sample_still", "softground_sample_hidden"
+"""Custom properties of what is in pictures only, and of what is left out of them."""
+
 SCALE_LENGTH = 0.20
 """Length of the scale beside a print, in fields of a centimetre [m]."""
 
@@ -175,7 +178,7 @@ def freeze(armature: bpy.types.Object, frames: Iterable[int], collection: bpy.ty
         for figure in (child for child in armature.children if child.type == "MESH"):
             mesh = bpy.data.meshes.new_from_object(figure.evaluated_get(graph), depsgraph=graph)
             copy = bpy.data.objects.new(f"{figure.name} {frame}", mesh)
-            copy.matrix_world = figure.matrix_world
+            copy.matrix_world, copy[_STILL] = figure.matrix_world, True
             collection.objects.link(copy)
             copies.append(copy)
     hide(armature)
@@ -185,7 +188,30 @@ def freeze(armature: bpy.types.Object, frames: Iterable[int], collection: bpy.ty
 def hide(armature: bpy.types.Object) -> None:
     """Leave a character's figure out of pictures: its long shadow would fall on the prints."""
     for figure in armature.children:
-        figure.hide_render = True
+        figure.hide_render = figure[_HIDDEN] = True
+
+
+def show_raised(thing: bpy.types.Object, height: float, collection: bpy.types.Collection) -> None:
+    """A copy of a thing by a height [m] above where it is; the thing itself is left out of pictures."""
+    copy = thing.copy()
+    copy.animation_data_clear()
+    copy.location.z = thing.location.z + height
+    copy[_STILL] = True
+    collection.objects.link(copy)
+    thing.hide_render = thing[_HIDDEN] = True
+
+
+def put_back() -> None:
+    """Everything as it was before the pictures: figures are seen again, their frozen copies are gone."""
+    for thing in list(bpy.data.objects):
+        if _STILL in thing:
+            mesh = thing.data
+            bpy.data.objects.remove(thing)
+            if not mesh.users:
+                bpy.data.meshes.remove(mesh)
+        elif _HIDDEN in thing:
+            thing.hide_render = False
+            del thing[_HIDDEN]
 
 
 def add_camera(scene: bpy.types.Scene, name: str, lens: float) -> bpy.types.Object:

@@ -12,7 +12,7 @@ import numpy as np
 from sample_scenes import production, stage
 from sample_scenes.body import Body
 from sample_scenes.cartwheel import cartwheel
-from sample_scenes.character import create_character
+from sample_scenes.character import copy_character, create_character
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.showpieces import dance, kick
@@ -47,9 +47,12 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
         "kick": kick(body, 60, rate),
         "cartwheel": cartwheel(body, None, rate),
     }
-    performers = {}
+    performers: dict[str, bpy.types.Object] = {}
     for name, motion in motions.items():
-        performers[name] = create_character(name.title(), body, scene.collection)
+        if performers:
+            performers[name] = copy_character(performers["dance"], name.title(), scene.collection)
+        else:
+            performers[name] = create_character(name.title(), body, scene.collection, production.COARSENESS)
         performers[name].location.xy = PLACES[name]
         write_action(performers[name], motion, name.title())
     walkers = [
@@ -114,7 +117,7 @@ def shoot(built: Stunts, folder: Path, samples: int) -> list[Path]:
     stage.add_floor(-0.1, scene.collection)
     stage.add_tray(built.bakes["sand"].carrier, scene.collection)
     camera = stage.add_camera(scene, "Stunts", lens=38.0)
-    stage.aim(camera, (0.9, -5.6, 2.2), (0.0, 0.1, 0.55))
+    stage.aim(camera, (3.0, -5.2, 2.4), (0.0, 0.15, 0.55))
     path = folder / "stunts.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

@@ -40,7 +40,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     """A brisk walk, keyed at 60 Hz."""
     body = Body()
     scene.render.fps = RATE
-    walker = create_character("Hiker", body, scene.collection)
+    walker = create_character("Hiker", body, scene.collection, production.COARSENESS)
     write_action(walker, walk(body, Gait(speed=SPEED), FRAMES, RATE), "Brisk Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     options = {"shape_keys": "false"} | dict(options or {})

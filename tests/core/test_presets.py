@@ -23,8 +23,8 @@ PAPER_RANGES = {
 }
 
 
-def test_eight_presets_are_shipped():
-    assert len(SHIPPED) == 8
+def test_nine_presets_are_shipped():
+    assert len(SHIPPED) == 9
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -55,6 +55,11 @@ def test_what_goes_beyond_the_paper_is_off_where_a_preset_does_not_say_so():
 
 def test_every_field_of_a_material_has_a_range():
     assert set(presets.MATERIAL_RANGES) == {field.name for field in fields(GroundMaterial)}
+
+
+def test_wet_sand_is_as_stiff_under_a_plate_as_it_was_measured():
+    material = presets.find("wet_sand").material
+    assert 10e6 <= material.youngs_modulus / material.layer_depth <= 15e6
 
 
 def test_loose_dry_sand_keeps_slopes_of_32_degrees():

@@ -12,6 +12,7 @@ from softground_addon.core.footprints import recompose
 from softground_addon.core.heightfield import FlatTerrain, HeightField, Window
 from softground_addon.core.simulation import Simulation, simulate
 from softground_addon.core.soft_ground import SoftGround
+from softground_addon.core.sole_points import TOLERANCE
 from tests.core.walkers import (
     GRAVITY,
     MASS,
@@ -406,3 +407,23 @@ def test_a_loaded_sole_beside_the_ground_leaves_no_footprint():
     ground, footprints = pressed(loads, SNOW, 0.01, HalfPlane(np.nan))
     assert not ground.tiles
     assert not footprints
+
+
+@pytest.mark.parametrize("pitch", [20.0, 40.0, 60.0])
+@pytest.mark.parametrize("cell_size", [0.005, 0.01])
+def test_the_contact_of_a_sole_on_its_toe_tip_grows_as_it_sinks(pitch, cell_size):
+    """All that is posed within the sinkage s of the tip touches, (s + tolerance)/tan(pitch) of the sole along the way:
+    s·width·(s + tolerance)/tan(pitch) = F·L0/E."""
+    length, width, force = 0.5, 0.1, 760.0
+    sole = box_sole(length, width)
+    angle = np.radians(pitch)
+    count = 241
+    middle = length / 2 * np.array([np.cos(angle), 0.0, np.sin(angle)])
+    transforms = np.tile(pose(middle * (-1, 1, 1), 0.0, -angle), (count, 1, 1, 1))
+    loads = loads_of([sole], [transforms], np.full((count, 1), force), np.ones((count, 1), bool), 30.0)
+    _, (step,) = pressed(loads, SNOW, cell_size)
+    tolerance = TOLERANCE * length
+    pressed_volume = force * SNOW.layer_depth / SNOW.youngs_modulus
+    expected = -tolerance / 2 + np.sqrt(tolerance**2 / 4 + pressed_volume * np.tan(angle) / width)
+    assert step.max_depth_m == pytest.approx(expected, rel=0.03)
+    assert step.area_m2 * step.max_depth_m == pytest.approx(pressed_volume, rel=0.03)
