@@ -208,11 +208,8 @@ def _velocities(points: Array, step: float) -> Array:
 
 
 def _body_velocity(motion: CharacterMotion) -> Array:
-    """Horizontal velocity of the body, (N, 3) [m/s]: of the hips, else of the middle of the soles."""
-    if "hips" in motion.joints:
-        path = motion.joints["hips"]
-    else:
-        path = np.mean([sole.landmark_positions().mean(axis=1) for sole in motion.soles], axis=0)
+    """Horizontal velocity of the body, (N, 3) [m/s]: that of its hips."""
+    path = motion.hips
     if len(path) < 2:
         return np.zeros_like(path)
     return np.gradient(path, motion.time_step, axis=0) * (1.0, 1.0, 0.0)

@@ -253,7 +253,7 @@ def _hips_moved(
     if crouch is not None:
         raised[:, 2] -= crouch
     turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(len(lean))], axis=-1))
-    pivot = hips_of(motion) - (0.0, 0.0, motion.leg_length)
+    pivot = motion.hips - (0.0, 0.0, motion.leg_length)
     return displacement(turn, pivot, pivot), raised
 
 
@@ -268,17 +268,6 @@ def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:
 def reach_of(leg: Leg) -> Array:
     """How far an ankle may be from its hip, (F,) [m]."""
     return leg.length * np.maximum(leg.extension, COMFORTABLE_REACH)
-
-
-def hips_of(motion: CharacterMotion) -> Array:
-    """Path of the hips (F, 3) [m]; the middle of the hip joints, or above the soles, where they are not mapped."""
-    joints = motion.joints
-    if "hips" in joints:
-        return joints["hips"]
-    if "hip_l" in joints and "hip_r" in joints:
-        return (joints["hip_l"] + joints["hip_r"]) / 2
-    middle = np.mean([sole.landmark_positions().mean(axis=1) for sole in motion.soles], axis=0)
-    return middle + np.array((0.0, 0.0, motion.leg_length))
 
 
 def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:

@@ -188,6 +188,17 @@ class CharacterMotion:
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
 
     @property
+    def hips(self) -> Array:
+        """Path of the hips (F, 3) [m]; the middle of the hip joints, or above the soles, where they are not mapped."""
+        joints = self.joints
+        if "hips" in joints:
+            return joints["hips"]
+        if "hip_l" in joints and "hip_r" in joints:
+            return (joints["hip_l"] + joints["hip_r"]) / 2
+        middle = np.mean([sole.landmark_positions().mean(axis=1) for sole in self.soles], axis=0)
+        return np.asarray(middle + np.array((0.0, 0.0, self.leg_length)))
+
+    @property
     def pendulum_time(self) -> float:
         """sqrt(leg length/gravity) [s], 0.3 s for an adult: times in this unit suit a mouse and a giant."""
         return float(np.sqrt(self.leg_length / self.gravity))

@@ -12,7 +12,7 @@ from .contacts import detect_contacts
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
 from .footprints import Footprint
 from .ground_history import GroundHistory
-from .grounding import Response, heel_rises, hips_of, leg_soles, responding, settle, time_scale
+from .grounding import Response, heel_rises, leg_soles, responding, settle, time_scale
 from .heightfield import FlatTerrain, Terrain
 from .motion import CharacterMotion
 from .performance import (
@@ -186,7 +186,7 @@ def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt:
 
 def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) -> Array:
     """Slope of the ground that carries the body (F, 2) [rad], at each frame as it stood one frame before."""
-    ring = ring_around(hips_of(motion)[:, :2], motion.leg_length)
+    ring = ring_around(motion.hips[:, :2], motion.leg_length)
     soles = [posed_points(sole)[..., :2] for sole in motion.soles]
     places = np.concatenate([*soles, ring], axis=1)
     weights = [np.broadcast_to(touching[:, i, None], part.shape[:2]) / part.shape[1] for i, part in enumerate(soles)]
@@ -199,7 +199,7 @@ def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) 
 def _heading(motion: CharacterMotion) -> Array:
     """Level direction in which the body walks (F, 2), where its feet point while it stands."""
     width = HEADING_TIME * motion.frame_rate * time_scale(motion)
-    path = smoothed(hips_of(motion)[:, :2], width)
+    path = smoothed(motion.hips[:, :2], width)
     velocity = np.gradient(path, axis=0) * motion.frame_rate if len(path) > 1 else np.zeros_like(path)
     feet = np.mean([sole.transforms[:, 0, :2, 0] for sole in motion.soles], axis=0)
     slow = 0.05 * motion.froude_speed

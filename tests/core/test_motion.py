@@ -47,3 +47,13 @@ def test_resampled_poses_are_rigid_and_on_the_true_path():
 )
 def test_a_step_is_at_most_a_120th_of_a_second(rate, steps):
     assert motion.steps_per_frame(rate) == steps
+
+
+def test_the_hips_are_between_the_hip_joints_where_they_are_not_mapped():
+    path = np.array([(0.0, 0.0, 0.9), (1.0, 0.0, 0.9)])
+    aside = np.array((0.0, 0.1, 0.0))
+    joints = {"hips": path + 5, "hip_l": path + aside, "hip_r": path - aside}
+    body = motion.CharacterMotion("body", 70.0, 0.9, np.arange(2.0), 24.0, (), joints)
+    np.testing.assert_allclose(body.hips, path + 5)
+    del joints["hips"]
+    np.testing.assert_allclose(body.hips, path)
