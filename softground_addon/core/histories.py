@@ -46,10 +46,6 @@ class Visits:
     end: Array
     pressure: Array
 
-    def rank(self) -> Indices:
-        """Number of each visit among those of its place, (N,), from 0."""
-        return np.arange(len(self.point)) - np.searchsorted(self.point, self.point)
-
 
 @dataclass(frozen=True)
 class Histories:

@@ -63,10 +63,6 @@ class Ramps:
         kept = self.change != 0
         return Ramps(self.point[kept], self.start[kept], self.end[kept], self.change[kept])
 
-    def rank(self) -> Indices:
-        """Number of each ramp among those of its point, (R,), from 0."""
-        return np.arange(len(self.point)) - np.searchsorted(self.point, self.point)
-
 
 @dataclass(frozen=True)
 class Fit:
