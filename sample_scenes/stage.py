@@ -203,6 +203,7 @@ def show_raised(thing: bpy.types.Object, height: float, collection: bpy.types.Co
 
 def put_back() -> None:
     """Everything as it was before the pictures: figures are seen again, their frozen copies are gone."""
+    bpy.context.scene.render.filepath = "//"
     for thing in list(bpy.data.objects):
         if _STILL in thing:
             mesh = thing.data
