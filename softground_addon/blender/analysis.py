@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
+from ..core.cell_limits import pressed_area
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
 from ..core.prediction import SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
@@ -39,6 +40,8 @@ class Analysis:
     shot : Shot
     loads : list of CharacterLoads
     stances : list of StanceLoad or SolidLoad
+    area : float
+        That the soles cover on the ground, with each step counted [m²].
     """
 
     source: Hashable
@@ -46,6 +49,7 @@ class Analysis:
     shot: Shot
     loads: list[CharacterLoads]
     stances: list[StanceLoad | SolidLoad]
+    area: float
 
 
 _known: dict[int, Analysis] = {}
@@ -143,7 +147,7 @@ def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: Groun
 def _estimated(scene: bpy.types.Scene, shot: Shot) -> Analysis:
     loads = jobs.run(estimate_shot(scene, shot))
     stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene), shot.variation)
-    return Analysis(_source(scene), _terms(scene), shot, loads, stances)
+    return Analysis(_source(scene), _terms(scene), shot, loads, stances, pressed_area(loads))
 
 
 def _keep(scene: bpy.types.Scene, analysis: Analysis) -> None:

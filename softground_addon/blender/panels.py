@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..core.cell_limits import BYTES_PER_CELL
 from ..core.motion import JOINTS
 from . import analysis, bake_report, baked_ground, ground_mesh, response_job, session, settings
 from .character_editing import active_character, active_sole
@@ -13,9 +14,6 @@ from .character_setup import is_set_up, is_thing
 from .translation import iface_
 
 CATEGORY = "SoftGround"
-
-BYTES_PER_CELL = 16 + 64
-"""Memory of one touched cell: its state, and a mesh vertex with rest position, keys and shading."""
 
 
 class _Panel:
@@ -186,9 +184,9 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
         column.prop(options, "shape_keys")
-        estimate = _estimate(options)
-        if estimate:
-            _note(layout, estimate)
+        known = analysis.known(settings.scene_of(context))
+        if known:
+            _note(layout, _estimate(known.area, settings.cell_size_of(settings.scene_of(context))))
 
 
 class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
@@ -351,15 +349,16 @@ def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:
     row.label(text=text, icon=icon, translate=False)
 
 
-def _estimate(options: Any) -> str:
-    """Cells and memory of the ground, from its bounding box."""
-    ground = options.ground
-    if ground is None or ground.type != "MESH" or options.cell_size <= 0:
-        return ""
-    metre = options.id_data.unit_settings.scale_length
-    cells = ground.dimensions.x * ground.dimensions.y * metre**2 / options.cell_size**2
-    text = iface_("{cells} cells, up to {megabytes} MB")
-    return text.format(cells=f"{cells:,.0f}", megabytes=f"{cells * BYTES_PER_CELL / 1e6:,.0f}")
+def _estimate(area: float, cell_size: float) -> str:
+    """Cells that soles cover an area [m²] with, and the memory that a bake takes for them."""
+    cells = area / cell_size**2
+    text = iface_("About {cells} cells printed, {megabytes} MB")
+    return text.format(cells=f"{rounded(cells):,.0f}", megabytes=f"{rounded(cells * BYTES_PER_CELL / 1e6):,.0f}")
+
+
+def rounded(value: float) -> float:
+    """A positive number to two digits, at least 1, as estimates are told."""
+    return max(1.0, float(f"{value:.2g}"))
 
 
 CLASSES = (

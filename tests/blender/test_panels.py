@@ -5,7 +5,7 @@ import json
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, panels, preset_menu, registration
+from softground_addon.blender import analysis, bake_job, jobs, panels, preset_menu, registration
 from softground_addon.core import presets
 from tests.blender.shots import import_motion, walker
 
@@ -61,6 +61,15 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
     expected = analysis.expected_depth(shot)
     bpy.ops.softground.bake()
     assert shot.softground.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(expected, rel=0.02)
+
+
+def test_the_cells_to_expect_are_those_that_a_bake_prints(shot):
+    known = analysis.read(shot)
+    footprints = jobs.run(bake_job.bake(shot, write=False)).footprints
+    printed = sum(len(footprint.contact_cells) for footprint in footprints)
+    assert known.area / shot.softground.cell_size**2 == pytest.approx(printed, rel=0.3)
+    assert panels._estimate(0.4, 0.01) == "About 4,000 cells printed, 4 MB"
+    assert panels._estimate(0.123, 0.002) == "About 31,000 cells printed, 31 MB"
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):

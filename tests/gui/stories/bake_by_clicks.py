@@ -26,6 +26,9 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.press_button("softground.add_character")
     facts["characters"] = [character.name for character in scene().softground.characters]
     facts["soles"] = [sole.name for sole in scene().softground.characters[0].soles]
+    yield from hand.move(*hand.middle())  # the panels move to their places as events come
+    hand.region().tag_redraw()
+    yield 0.7
     yield from hand.picture("panel_character", of="UI")
 
     button = yield from hand.find_button("softground.bake")
