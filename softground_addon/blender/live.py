@@ -6,6 +6,7 @@ working. While live mode is on, the ground carries what a bake would leave on it
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -69,10 +70,14 @@ class LiveMode:
         if ground is None:
             return False
         self._playhead.material = settings.material_of(scene)
+        before = self._playhead.frame
         windows = self._playhead.go_to(float(scene.frame_current))
-        if windows:
-            self._ground.show(ground, self._playhead.ground, windows, self._playhead.material.blur_sigma)
+        if self._playhead.frame != before:
+            self._show(ground, windows)
         return True
+
+    def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
+        self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._frame_rate)
 
     def show_anew(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
@@ -81,8 +86,7 @@ class LiveMode:
             return False
         self._ground.take_from(ground)
         self._playhead.go_to(float(scene.frame_current))
-        windows = self._playhead.ground.tile_windows()
-        self._ground.show(ground, self._playhead.ground, windows, self._playhead.material.blur_sigma)
+        self._show(ground, self._playhead.ground.tile_windows())
         return True
 
     def read_anew(self, scene: bpy.types.Scene) -> bool:

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import record
+from ..core.footprints import NEVER
 from ..core.heightfield import TILE, HeightField, Window
+from ..core.playhead import Playhead
 from ..core.pressed_ground import GroundSample
 from ..core.smoothing import blurred_window, gaussian_kernel
 from . import ground_mesh
@@ -35,12 +37,15 @@ class _TileVertices:
         Vertices of the mesh.
     corner : (N, 2) int array
         Column and row of the cell before each of them, in the tile with a margin of one cell.
+    cell : (N, 2) int array
+        Column and row of the cell that each of them lies in, in the tile.
     u, v : (N,) float arrays
         How far they are from its centre to the next one's, 0 to 1.
     """
 
     index: Indices
     corner: Indices
+    cell: Indices
     u: Array
     v: Array
 
@@ -57,7 +62,7 @@ class _TileVertices:
 
 
 class LiveGround:
-    """Writes a height field to the ground of a scene, where it changed.
+    """Writes a height field and the age of its contacts to the ground of a scene, where it changed.
 
     While it is at work the mesh is one with a bake on it, so that `ground_mesh.restore` takes everything away again,
     in this session or after a crash.
@@ -97,6 +102,7 @@ class LiveGround:
         self._rest = ground_mesh.rest_positions(mesh)
         self._display = self._rest.copy()
         self._shading = np.zeros((2, len(self._rest)), dtype=np.float32)
+        self._contact = np.full(len(self._rest), -np.inf, dtype=np.float32)
 
     def object(self) -> bpy.types.Object | None:
         """The ground, whatever its name has become; None if it is gone or no longer what live mode made of it."""
@@ -110,24 +116,31 @@ class LiveGround:
         intact = ground_mesh.is_baked(found) and len(mesh.vertices) == len(self._rest)
         return found if intact else None
 
-    def show(self, ground: bpy.types.Object, field: HeightField, windows: Sequence[Window], sigma: float) -> None:
-        """Bring the mesh to a height field's state in some windows.
+    def show(
+        self, ground: bpy.types.Object, playhead: Playhead, windows: Sequence[Window], sigma: float, frame_rate: float
+    ) -> None:
+        """Bring the mesh to the state of a playhead's ground in some windows.
 
         Parameters
         ----------
         ground : bpy.types.Object
-        field : HeightField
+        playhead : Playhead
         windows : sequence of Window
-            Where it may have changed.
+            Where its ground may have changed.
         sigma : float
             Standard deviation of the display blur [m].
+        frame_rate : float
+            Scene frames per second [Hz].
         """
+        field = playhead.ground
         margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
         for tile in _tiles_of(windows, margin):
             vertices = self._vertices_of(tile, field.cell_size)
             if len(vertices.index):
                 self._update(field, tile, vertices, sigma)
-        self._write(ground)
+                place = field.cell_size * (np.array(tile) * TILE + vertices.cell + 0.5)
+                self._contact[vertices.index] = playhead.contact.nearest(*place.T)[0]
+        self._write(ground, playhead.frame, frame_rate)
 
     def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
         """The vertices over a tile, looked up once."""
@@ -139,7 +152,8 @@ class LiveGround:
             if np.abs(at - np.rint(at)).max(initial=0.0) < ON_CENTRE:
                 at = np.rint(at)
             corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
-            self._known[tile] = _TileVertices(self._vertices[inside], corner, *(at - corner).T)
+            cell = np.floor(self._place[inside] / cell_size).astype(np.intp) - np.array(tile) * TILE
+            self._known[tile] = _TileVertices(self._vertices[inside], corner, cell, *(at - corner).T)
         return self._known[tile]
 
     def _update(self, field: HeightField, tile: Tile, vertices: _TileVertices, sigma: float) -> None:
@@ -150,9 +164,12 @@ class LiveGround:
         self._display[index] = self._rest[index] + (rim - compression)[:, None] * self._up
         self._shading[:, index] = compression, rim
 
-    def _write(self, ground: bpy.types.Object) -> None:
+    def _write(self, ground: bpy.types.Object, frame: float, frame_rate: float) -> None:
         mesh = ground_mesh.mesh_of(ground)
-        for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
+        age = np.full(len(self._contact), NEVER, dtype=np.float32)
+        touched = np.flatnonzero(self._contact > -np.inf)
+        age[touched] = (frame - self._contact[touched]) / frame_rate
+        for name, values in zip(ground_mesh.SHADING_ATTRIBUTES, (*self._shading, age), strict=True):
             attribute: Any = mesh.attributes[name]
             attribute.data.foreach_set("value", values)
         ground_mesh.write_positions(mesh, self._display)

@@ -14,7 +14,7 @@ import bpy
 from ..core.errors import InputError, SoftGroundError
 from ..core.manifest import BatchShot
 from ..core.shell import command_line
-from . import analysis, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, settings, shots
+from . import analysis, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, session, settings, shots
 from .created_ground import create_ground
 from .translation import rpt_
 
@@ -128,6 +128,9 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         ground = scene.softground.ground
         if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene):
             cls.poll_message_set("There is no bake on the ground")
+            return False
+        if session.current().is_live:
+            cls.poll_message_set("Live mode is on: stop it with Discard or Keep")
             return False
         return True
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .deformation import GroundMaterial
 from .footprints import Footprint
-from .heightfield import HeightField, Window
+from .heightfield import HeightField, SparseGrid, Window
 from .simulation import CharacterLoads, FrameResult, Simulation
 from .soft_ground import SoftGround
 
@@ -31,6 +31,10 @@ class _Change:
     windows : tuple of Window
     before, after : tuple of (2, rows, columns) float arrays
         State of each window [m], with the windows taken one after the other.
+    contact : tuple of (Window, (rows, columns) bool array)
+        Cells that were in contact.
+    earlier : tuple of (1, rows, columns) float arrays
+        Last contact of their windows before it [scene frames], taken one after the other.
     """
 
     frame: float
@@ -38,6 +42,8 @@ class _Change:
     windows: tuple[Window, ...] = ()
     before: tuple[Array, ...] = ()
     after: tuple[Array, ...] = ()
+    contact: tuple[tuple[Window, NDArray[np.bool_]], ...] = ()
+    earlier: tuple[Array, ...] = ()
 
 
 class Playhead:
@@ -60,11 +66,14 @@ class Playhead:
         What frames are pressed with from now on.
     ground : HeightField
         At the frame that is shown; only to be read.
+    contact : SparseGrid
+        Scene frame at which each cell was last in contact by then, -inf where it never was; only to be read.
     """
 
     def __init__(self, loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> None:
         self.material = ground.material
         self.ground = HeightField(cell_size)
+        self.contact = SparseGrid(cell_size, channels=1, fill=-np.inf)
         self._loads, self._pressed = tuple(loads), ground
         self._changes: list[_Change] = []
         self._results = self._press(self._loads)
@@ -83,6 +92,8 @@ class Playhead:
             change = self._changes[self._shown]
             for window, state in zip(reversed(change.windows), reversed(change.before), strict=True):
                 self.ground.write(window, state)
+            for (window, _), state in zip(reversed(change.contact), reversed(change.earlier), strict=True):
+                self.contact.write(window, state)
             self._shown -= 1
             windows += change.windows
         while self.frame + 1.0 <= frame and self._advance():
@@ -115,6 +126,7 @@ class Playhead:
         if ahead:
             for window, state in zip(ahead[0].windows, ahead[0].after, strict=True):
                 self.ground.write(window, state)
+            self._touch(ahead[0].contact, ahead[0].frame)
         else:
             result = next(self._results, None)
             if result is None:
@@ -130,7 +142,18 @@ class Playhead:
             before.append(self.ground.read(window))
             after.append(result.ground.read(window))
             self.ground.write(window, after[-1])
-        return _Change(result.frame, self.material, result.changed, tuple(before), tuple(after))
+        earlier = self._touch(result.contact, result.frame)
+        return _Change(
+            result.frame, self.material, result.changed, tuple(before), tuple(after), result.contact, earlier
+        )
+
+    def _touch(self, contact: Sequence[tuple[Window, NDArray[np.bool_]]], frame: float) -> tuple[Array, ...]:
+        """Note a contact of cells at a frame; when they were in contact before."""
+        earlier = []
+        for window, cells in contact:
+            earlier.append(self.contact.read(window))
+            self.contact.write(window, np.where(cells, frame, earlier[-1]))
+        return tuple(earlier)
 
     def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press from the first frame on: frames that are known with the material they had, new ones with the newest."""

@@ -19,6 +19,7 @@ from .soft_ground import SoftGround
 from .stance import Stance
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class Press:
@@ -33,6 +34,8 @@ class Press:
 
     def __init__(self, ground: SoftGround, state: HeightField) -> None:
         self.state = state
+        self.contact: list[tuple[Window, Mask]] = []
+        """Cells that were in contact in the steps pressed last."""
         self.bed = Bed(ground, state.cell_size)
 
     @property
@@ -60,6 +63,7 @@ class Press:
             Where the ground may have changed.
         """
         parts = []
+        self.contact = []
         for stance in stances:
             first, last = max(start, stance.first), min(end, stance.end)
             if first < last:
@@ -143,6 +147,7 @@ class Press:
         touched = np.zeros(whole.shape[1:], bool)
         touched[inside] = imprints.contact[steps].any(axis=0)
         stance.recorder.add(frame, window, quantised(whole) - before, touched)
+        self.contact.append((window, touched))
         return [window] if surface else []
 
     def _found(self, stance: Stance, window: Window, state: Array) -> Array:

@@ -99,6 +99,8 @@ class FrameResult:
         Its state at this frame; the simulation goes on working on it.
     changed : tuple of Window
         Where it changed since the frame before.
+    contact : tuple of (Window, (rows, columns) bool array)
+        Cells that were in contact since then.
     footprints : tuple of Footprint
         Those whose contact ended since the frame before; at the last frame, all that were still open.
     touching : tuple of (S,) bool arrays
@@ -110,6 +112,7 @@ class FrameResult:
     frame: float
     ground: HeightField
     changed: tuple[Window, ...]
+    contact: tuple[tuple[Window, NDArray[np.bool_]], ...]
     footprints: tuple[Footprint, ...]
     touching: tuple[NDArray[np.bool_], ...]
     forces: tuple[Array, ...]
@@ -201,6 +204,7 @@ class Simulation:
                 frame,
                 self._press.state,
                 changed,
+                tuple(self._press.contact),
                 tuple(stance.footprint() for stance in ended if stance.printed),
                 *_state_at(loads, grid.offsets, int(end) - 1),
             )

@@ -37,6 +37,28 @@ def heights(scene):
     return positions.reshape(-1, 3)[:, 2].copy()
 
 
+def ages(scene):
+    mesh = baked_ground.carrier_of(scene.softground.ground).data
+    age = np.empty(len(mesh.vertices), dtype=np.float32)
+    mesh.attributes[ground_mesh.AGE].data.foreach_get("value", age)
+    return age
+
+
+def test_the_age_of_prints_is_that_of_a_bake_at_every_frame(live_shot):
+    shown = {}
+    for frame in (30, 48, 21, 1):
+        live_shot.frame_set(frame)
+        shown[frame] = ages(live_shot)
+    bpy.ops.softground.live()
+    assert (shown[1] == -1).all()
+    for frame in (48, 30, 21):
+        live_shot.softground.frame_end = frame
+        bpy.ops.softground.bake()
+        assert shown[frame] == pytest.approx(ages(live_shot), abs=1e-4)
+        bpy.ops.softground.clear_bake()
+        assert (shown[frame] >= 0).sum() > 300
+
+
 @pytest.mark.parametrize("preset", ["Snow", "Mud", "Fresh Snow"])
 def test_scrubbing_back_and_forth_shows_every_frame_as_it_was(live_shot, preset):
     bpy.ops.softground.load_preset(name=preset)
@@ -251,6 +273,13 @@ def test_a_coarse_ground_deleted_in_live_mode_leaves_no_prints_behind(coarse_sho
     coarse_shot.frame_set(41)
     live.discard()
     assert not live.is_on()
+
+
+def test_live_prints_are_kept_or_discarded_but_not_cleared(live_shot):
+    live_shot.frame_set(30)
+    assert not bpy.ops.softground.clear_bake.poll()
+    bpy.ops.softground.live(keep=True)
+    assert bpy.ops.softground.clear_bake.poll()
 
 
 def test_live_mode_waits_until_a_bake_is_cleared(shot):

@@ -27,6 +27,9 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.wait_for(lambda: session().is_baking, 10)
     yield from hand.wait_for(lambda: not session().is_baking, 120)
     yield 0.5
+    for _ in range(20):  # it is compared once the edits have settled
+        if session().stale:
+            yield 0.25
     facts["left"] = floating()
     facts["grounding"] = scene().softground.grounding.use
     facts["tracks"] = [track.name for track in armature.animation_data.nla_tracks]
