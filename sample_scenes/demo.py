@@ -124,14 +124,17 @@ def import_motion(path: Path, scale: float, up: str | None) -> bpy.types.Object:
     forward = {"Y": "-Z", "Z": "Y"}
 
     def read(axis: str) -> bpy.types.Object:
-        bpy.ops.import_anim.bvh(
-            filepath=str(path.resolve()),
-            global_scale=scale,
-            axis_forward=forward[axis],
-            axis_up=axis,
-            update_scene_fps=True,
-            update_scene_duration=True,
-        )
+        try:
+            bpy.ops.import_anim.bvh(
+                filepath=str(path.resolve()),
+                global_scale=scale,
+                axis_forward=forward[axis],
+                axis_up=axis,
+                update_scene_fps=True,
+                update_scene_duration=True,
+            )
+        except RuntimeError:  # Blender's importer ends with a traceback
+            raise RuntimeError(f"'{path}' cannot be read as BVH: it is cut short, or of another kind.") from None
         return bpy.context.active_object
 
     rig = read(up or "Y")

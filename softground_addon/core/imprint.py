@@ -12,7 +12,7 @@ from .deformation import touching_fraction
 from .heightfield import Surface
 from .motion import Sole, SolePatch
 from .patch_maps import Nodes, Single, covered_fraction
-from .sole_points import FAR, LEAST_FACING
+from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps
 
 Array = NDArray[np.float64]
 
@@ -59,6 +59,8 @@ def cell_coverage(
     x, y = fine.centres(ground.cell_size)
     indices = np.arange(fine.cells).reshape(fine.rows, fine.columns)
     coverage = np.zeros((len(transforms), fine.cells), np.float32)
+    inside = WALL / TOLERANCE * tolerance  # cells that are so far above the lowest point are those of walls
+    walled = has_steps(ground, inside)
     for number, patch in enumerate(sole.patches):
         pose = transforms[:, number]
         columns, rows = _columns_and_rows(patch, pose, x, y)
@@ -67,6 +69,8 @@ def cell_coverage(
         underside -= base[cells]
         covered *= touching_fraction(underside, sinkage[:, None].astype(np.float32), tolerance)
         covered[pose[:, 2, 2] < LEAST_FACING] = 0.0
+        if walled:
+            covered[underside < -inside] = 0.0
         coverage[:, cells] = np.maximum(coverage[:, cells], covered) if number else covered
     coverage = coverage.reshape(-1, fine.rows, fine.columns)
     if not ground.bears.all():

@@ -16,6 +16,7 @@ from .motion import Sole, SolePatch
 from .patch_maps import Nodes, covered_fraction
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.04
 """What counts as touching, in sole lengths: 1 cm for an adult, the give of a shoe and the error of a pose."""
@@ -25,6 +26,9 @@ POINTS_PER_PATCH = 400
 """A patch is measured at about this many points: its area to 0.1 %."""
 LEAST_FACING = 0.2
 """Cosine of the tilt beyond which a patch stands on its edge and has no underside to print with (78°)."""
+WALL = 0.1
+"""A jump of the ground under a sole that no slope makes between neighbouring points, in sole lengths: 3 cm for an
+adult."""
 FAR = 1e9
 """Clearance of what is not over the ground [m]."""
 
@@ -145,11 +149,11 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
     Returns
     -------
     PointContact
-        Points off the ground, over a wall or turned away from the ground have no area.
+        Points off the ground, over a wall or inside of one, or turned away from the ground have no area.
     """
     window, heights, bears = ground.window, ground.heights, ground.bears
     level = bool(bears.all()) and np.ptp(heights) == 0
-    clearances, areas = [], []
+    clearances, areas, levels = [], [], []
     for number, patch in enumerate(points.patches):
         rotation, place = transforms[:, number, :3, :3], transforms[:, number, :3, 3]
         height = rotation[:, 2] @ patch.positions.T + place[:, 2:]
@@ -167,12 +171,53 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
             on_ground = bears[j, i]
             height -= np.where(on_ground, heights[j, i] + rise * ground.cell_size, 0.0)
             area *= on_ground
+            levels.append(heights[j, i])
         height[area == 0] = FAR
         clearances.append(height)
         areas.append(area)
-    clearance = np.concatenate(clearances, axis=1)
+    clearance, area = np.concatenate(clearances, axis=1), np.concatenate(areas, axis=1)
+    if has_steps(ground, WALL * points.length):
+        inside = _inside_walls(clearance, np.concatenate(levels, axis=1), WALL * points.length)
+        clearance[inside], area[inside] = FAR, 0.0
     lowest = clearance.min(axis=1)
-    return PointContact(clearance - lowest[:, None], np.concatenate(areas, axis=1), lowest)
+    return PointContact(clearance - lowest[:, None], area, lowest)
+
+
+def has_steps(ground: Surface, jump: float) -> bool:
+    """Whether neighbouring cells of the ground differ in height by more than a jump [m]."""
+    heights = np.where(ground.bears, ground.heights, np.nan)
+    with np.errstate(invalid="ignore"):
+        return (
+            any(bool((np.abs(np.diff(heights, axis=axis)) > jump).any()) for axis in (0, 1)) or not ground.bears.all()
+        )
+
+
+def _inside_walls(clearance: Array, level: Array, jump: float) -> Mask:
+    """Points (N, Q) that an animated foot pushes into a riser, a curb or a wall while it stands beside it.
+
+    Where the ground under the sole falls into an upper and a lower part, the sole stands on the one that it is nearer
+    to; in the upper one it would stick.
+
+    Parameters
+    ----------
+    clearance : (N, Q) float array
+        Height above the ground, `FAR` where there is none [m].
+    level : (N, Q) float array
+        Height of the ground [m].
+    jump : float
+        Least difference between the parts [m].
+    """
+    there = clearance < FAR
+    level = np.where(there, level, np.inf)
+    ordered = np.sort(level, axis=1)
+    with np.errstate(invalid="ignore"):
+        rise = np.diff(ordered, axis=1)
+    rise[~np.isfinite(rise)] = 0.0
+    edge = np.take_along_axis(ordered, rise.argmax(axis=1)[:, None], axis=1)
+    upper, lower = there & (level > edge), there & (level <= edge)
+    on_upper, on_lower = (np.where(part, clearance, np.inf).min(axis=1) for part in (upper, lower))
+    sticks = (rise.max(axis=1) > jump) & (on_upper < 0) & (-on_upper > np.abs(on_lower))
+    return np.asarray(upper & sticks[:, None])
 
 
 def centroid(points: SolePoints, transforms: Array, pressing: Array) -> Array:

@@ -173,3 +173,27 @@ def test_what_counts_as_touching_grows_with_the_sole(scale):
     reference = lay(sole, flat(sole, pitch=0.3), 0.005)[2]
     coverage = lay(small, flat(small, pitch=0.3), 0.005 * scale)[2]
     assert coverage == pytest.approx(reference, abs=1e-5)
+
+
+@pytest.mark.parametrize("rise", [0.15, 1.0])
+@pytest.mark.parametrize("clipped", [0.01, 0.03])
+def test_a_sole_that_is_stuck_into_a_curb_or_wall_stands_beside_it(rise, clipped):
+    """Animated feet graze risers and walls: what is inside them bears nothing."""
+    sole = box_sole(LENGTH, WIDTH)
+    edge = LENGTH / 2 - clipped
+    step = Ground(lambda x, y: np.where(x > edge, rise, 0.0))
+    _, contact, coverage, window = lay(sole, flat(sole), 0.01, terrain=step)
+    x, _ = window.centres(0.01)
+    assert contact.lowest == pytest.approx(0.0, abs=1e-6)
+    assert coverage[0, :, x > edge].max() == 0.0
+    assert coverage.sum() * 1e-4 == pytest.approx((LENGTH - clipped) * WIDTH, rel=0.12)  # the steep cells bear nothing
+
+
+def test_toes_on_a_step_stand_on_the_step():
+    sole = box_sole(LENGTH, WIDTH)
+    step = Ground(lambda x, y: np.where(x > 0.05, 0.15, 0.0))
+    _, contact, coverage, window = lay(sole, flat(sole, (0, 0, 0.15)), 0.01, terrain=step)
+    x, _ = window.centres(0.01)
+    assert contact.lowest == pytest.approx(0.0, abs=1e-6)
+    assert coverage[0, :, x < 0.05].max() == 0.0
+    assert coverage[0, :, x > 0.07].max() == 1.0
