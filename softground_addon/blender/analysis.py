@@ -14,7 +14,7 @@ import bpy
 from ..core.cell_limits import pressed_area
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
-from ..core.prediction import SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
+from ..core.prediction import TAKES_NO_PRINT, SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
 from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
 from . import jobs, settings
@@ -128,10 +128,7 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
         )
         reached = _simulated_depth(scene, analysis, material)
         if not reached > 0:
-            raise InputError(
-                "No stiffness gives a print: the ground takes none under the feet. Look at what is painted on it, and "
-                "at the crust of its material."
-            )
+            raise InputError(TAKES_NO_PRINT)
         if abs(reached - depth) <= CLOSE_ENOUGH * depth:
             break
         aim *= depth / reached  # sliding feet print less deep than predicted

@@ -36,6 +36,10 @@ POSES = 12
 """Steps of a body's contact that are looked at, and the one that presses hardest."""
 SOFTEST, STIFFEST = 1e3, 1e10
 """Range in which a modulus is searched [Pa]."""
+TAKES_NO_PRINT = (
+    "No stiffness gives a print: the ground takes none under the feet. Look at what is painted on it, and at the crust "
+    "of its material."
+)
 
 
 @dataclass(frozen=True)
@@ -269,7 +273,8 @@ def matching_modulus(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and the layer's, "
             f"{material.layer_depth * 100:.3g} cm."
         )
-    modulus = low
+    if not deepest(stances, replace(material, youngs_modulus=low), pressure) > 0:
+        raise InputError(TAKES_NO_PRINT)
     for _ in range(MOST_TRIALS):
         modulus = float(np.sqrt(low * high))
         reached = deepest(stances, replace(material, youngs_modulus=modulus), pressure)
