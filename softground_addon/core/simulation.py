@@ -146,7 +146,7 @@ def simulate(loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: flo
 
 
 class Simulation:
-    """A ground that characters press, in one go or piece by piece as a timeline plays.
+    """A ground that characters press.
 
     Parameters
     ----------
@@ -157,7 +157,6 @@ class Simulation:
 
     def __init__(self, ground: SoftGround, state: HeightField) -> None:
         self._press = Press(ground, state)
-        self._open: dict[tuple[int, int], Stance] = {}
         self._active: list[Stance] = []
         self._step = 1
 
@@ -173,18 +172,10 @@ class Simulation:
             for stance in self._active:
                 stance.lay_out_anew(self._step)
 
-    def run(self, loads: Sequence[CharacterLoads], *, more_follows: bool = False) -> Iterator[FrameResult]:
-        """Press a piece of the motion; see `simulate`.
-
-        Parameters
-        ----------
-        loads : sequence of CharacterLoads
-            The next piece of the same characters, its first step the last of the piece before.
-        more_follows : bool
-            Whether stances that last to the end go on in the next piece, instead of ending here.
-        """
+    def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
+        """Press a motion; see `simulate`."""
         grid = _time_grid(loads)
-        waiting, ended = self._stances(loads, grid)
+        waiting = _stances(loads, grid)
         active = self._active = []
         start = 1
         for end in grid.shown + 1:
@@ -193,63 +184,52 @@ class Simulation:
             frame = float(grid.frames[end - 1])
             changed = self._press.advance(active, start, int(end), frame, grid.timing)
             last = end == grid.shown[-1] + 1
-            for stance in [stance for stance in active if stance.end <= end or last]:
-                active.remove(stance)
-                if not (more_follows and stance in self._open.values()):
-                    ended.append(stance)
+            ended = [stance for stance in active if stance.end <= end or last]
             for stance in ended:
+                active.remove(stance)
                 changed += self._press.settle(stance, frame)
-            self._step = int(end)
+            self._step = start = int(end)
             yield FrameResult(
                 frame,
                 self._press.state,
                 changed,
                 tuple(self._press.contact),
                 tuple(stance.footprint() for stance in ended if stance.printed),
-                *_state_at(loads, grid.offsets, int(end) - 1),
+                *_state_at(loads, grid.offsets, start - 1),
             )
-            start, ended = int(end), []
 
-    def _stances(self, loads: Sequence[CharacterLoads], grid: _TimeGrid) -> tuple[list[Stance], list[Stance]]:
-        """The stances of a piece by their first step, and those of the piece before that do not go on.
 
-        Those that last to the end of the piece are left in `_open`.
-        """
-        before, self._open = self._open, {}
-        stances = []
-        for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True)):
-            for index, motion in enumerate(character.motion.soles):
-                points = None
-                stance: Stance | None = None
-                for first, end in _tracks(motion, character.contacts.touching[:, index]):
-                    earlier = stance if stance and stance.end == first + offset else None
-                    begin = max(int(first), 1 - offset)  # the first step of the grid is a state, it presses nothing
-                    if begin == end:
-                        continue
-                    stance = before.pop((number, index), None) if first + offset == 0 else None
-                    if stance is None and motion.sole.solid:
-                        stance = SolidStance(character.motion.name, motion.sole)
-                        stance.earlier = earlier
-                    elif stance is None:
-                        points = points or sole_points(motion.sole, motion.transforms)
-                        stance = SoleStance(character.motion.name, motion.sole, points)
-                    steps = slice(begin, end)
-                    stance.extend(
-                        Steps(
-                            begin + offset,
-                            grid.frames[begin + offset : end + offset],
-                            motion.transforms[steps],
-                            motion.transforms[max(0, begin - 2) : begin],
-                            character.forces.forces[steps, index],
-                            character.contacts.normal[steps, index],
-                            character.forces.centre_of_pressure[steps, index],
-                        )
-                    )
-                    if end == len(character.motion.frames):
-                        self._open[number, index] = stance
-                    stances.append(stance)
-        stances.sort(key=lambda stance: stance.first)  # stable: in the order of the scene where they start together
-        return stances, list(before.values())
+def _stances(loads: Sequence[CharacterLoads], grid: _TimeGrid) -> list[Stance]:
+    """The stances of all characters by their first step, in the order of the scene where they start together."""
+    stances = []
+    for character, offset in zip(loads, grid.offsets, strict=True):
+        for index, motion in enumerate(character.motion.soles):
+            tracks = list(_tracks(motion, character.contacts.touching[:, index]))
+            points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.solid else None
+            earlier: Stance | None = None
+            for first, end in tracks:
+                begin = max(first, 1 - offset)  # the first step of the grid is a state, it presses nothing
+                if begin == end:
+                    continue
+                during = slice(begin, end)
+                steps = Steps(
+                    begin + offset,
+                    grid.frames[begin + offset : end + offset],
+                    motion.transforms[during],
+                    motion.transforms[max(0, begin - 2) : begin],
+                    character.forces.forces[during, index],
+                    character.contacts.normal[during, index],
+                    character.forces.centre_of_pressure[during, index],
+                )
+                stance: Stance
+                if points is None:
+                    stance = SolidStance(character.motion.name, motion.sole, steps)
+                    stance.earlier = earlier if earlier and earlier.end == first + offset else None
+                else:
+                    stance = SoleStance(character.motion.name, motion.sole, steps, points)
+                earlier = stance
+                stances.append(stance)
+    return sorted(stances, key=lambda stance: stance.first)
 
 
 def _tracks(motion: SoleMotion, touching: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -13,7 +13,7 @@ from .motion import Sole
 from .pressure import pressure_field
 from .rim import in_contact, rim_weights
 from .sole_points import SolePoints, centroid, contact_window, places, point_contact, under_points
-from .stance import Stance
+from .stance import Stance, Steps
 
 Array = NDArray[np.float64]
 
@@ -25,13 +25,15 @@ class SoleStance(Stance):
     ----------
     character : str
     sole : Sole
+    steps : Steps
+        All of the stance.
     points : SolePoints
         Of that sole.
     """
 
-    def __init__(self, character: str, sole: Sole, points: SolePoints) -> None:
-        super().__init__(character, sole)
+    def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints) -> None:
         self.points = points
+        super().__init__(character, sole, steps)
 
     def _window(self, start: int, end: int, bed: Bed) -> Window:
         window = contact_window(self.points, self._steps.poses[start - self.first : end - self.first], bed.cell_size)

@@ -40,17 +40,15 @@ class SolidStance(Stance):
     character : str
     sole : Sole
         With a solid.
+    steps : Steps
+        All of the stance.
     """
 
-    def __init__(self, character: str, sole: Sole) -> None:
-        super().__init__(character, sole)
+    def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
         assert sole.solid is not None, sole.name
         self.solid: Solid = sole.solid
         self._deepest = 0.0
-
-    def extend(self, steps: Steps) -> None:
-        """Go on with the next steps of the stance."""
-        super().extend(steps)
+        super().__init__(character, sole, steps)
         poses, outer = steps.poses[:, 0], self.solid.probes.T
         reach = np.zeros((2, len(poses), 2))
         for k, pose in enumerate(poses):

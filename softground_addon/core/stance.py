@@ -60,6 +60,8 @@ class Stance(ABC):
     ----------
     character : str
     sole : Sole
+    steps : Steps
+        All of the stance.
 
     Attributes
     ----------
@@ -68,41 +70,25 @@ class Stance(ABC):
     pressed : SparseGrid or None
         What it compressed itself, kept where the ground hardens.
     lean : (N, 2) float array
-        Which way the rim leans at each of the present steps; see `rim.leaning`.
+        Which way the rim leans at each step; see `rim.leaning`.
     """
 
-    def __init__(self, character: str, sole: Sole) -> None:
+    def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
         self.character, self.sole = character, sole
-        self.first = self.end = 0
+        self.first, self.end = steps.first, steps.first + len(steps.frames)
         self.compressed = self.raised = self.unplaced = 0.0
         self.recorder: FootprintRecorder | None = None
         self.pressed: SparseGrid | None = None
-        self.lean: Array = np.zeros((0, 2))
         self.earlier: Stance | None = None
-        self._frames: list[Array] = []
-        self._forces: list[Array] = []
-        self._peak = self._heading = self._area = self._sinkage = self._load = self._descent = 0.0
-        self._moment = np.zeros(3)
-        self._imprints: Imprints | None = None
-
-    def extend(self, steps: Steps) -> None:
-        """Go on with the next steps of the stance."""
-        approach = steps.approach if len(steps.approach) else steps.poses[:1]
-        path, here = self._middles(np.concatenate([approach, steps.poses])), len(approach)
-        if not self._frames:
-            self._descent = descent(self.sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
-            self.lean = lean_of_landing(path[here - 1 : here + 1], self._length)[None]
-        self.lean = leaning(path[here - 1 :], self._length, self.lean[-1])
-        self.first, self.end = steps.first, steps.first + len(steps.frames)
         self._steps = steps
         self._force = np.maximum(np.einsum("ni,ni->n", steps.forces, steps.normals), 0.0)
-        self._frames.append(steps.frames)
-        self._forces.append(self._force)
-        self._imprints = None
-        hardest = int(self._force.argmax())
-        if self._force[hardest] > self._peak:
-            self._peak = float(self._force[hardest])
-            self._heading = float(np.arctan2(*self._toward(hardest)[::-1]))
+        self._descent = descent(sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
+        approach = steps.approach if len(steps.approach) else steps.poses[:1]
+        path = self._middles(np.concatenate([approach[-1:], steps.poses]))
+        self.lean = leaning(path, self._length, lean_of_landing(path[:2], self._length))
+        self._area = self._sinkage = self._load = 0.0
+        self._moment = np.zeros(3)
+        self._imprints: Imprints | None = None
 
     def imprints(self, start: int, end: int, bed: Bed, timing: Timing) -> Imprints:
         """The imprints of these steps, laid out together with as many later ones as pays."""
@@ -133,21 +119,21 @@ class Stance(ABC):
         """The record of what was pressed so far."""
         if self.recorder is None:
             raise ValueError("a stance that pressed nothing leaves no footprint")
-        frames = np.concatenate(self._frames)
+        frames, hardest = self._steps.frames, int(self._force.argmax())
         return self.recorder.footprint(
             character=self.character,
             sole=self.sole.name,
             start_frame=float(frames[0]),
             end_frame=float(frames[-1]),
             position=self._moment / self._load,
-            heading=self._heading,
+            heading=float(np.arctan2(*self._toward(hardest)[::-1])),
             area_m2=self._area,
-            peak_force_n=self._peak,
+            peak_force_n=float(self._force[hardest]),
             compressed_m3=self.compressed,
             rim_m3=self.raised,
             unplaced_rim_m3=self.unplaced,
             load_frames=frames,
-            load_n=np.concatenate(self._forces),
+            load_n=self._force,
         )
 
     @abstractmethod

@@ -16,13 +16,12 @@ from softground_addon.core.deformation import (
     target_compression,
 )
 from softground_addon.core.footprints import QUANTUM, recompose
-from softground_addon.core.heightfield import FlatTerrain, HeightField
+from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.rim import LEANING_DISTANCE, in_contact, lean_of_landing, leaning, rim_weights
-from softground_addon.core.simulation import Simulation, simulate
+from softground_addon.core.simulation import simulate
 from softground_addon.core.soft_ground import SoftGround
 from tests.core.test_ground_invariants import Hills, random_loads
 from tests.core.test_pressure import rolling
-from tests.core.test_simulation import piece
 from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, loads_of, pose, pressed, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
@@ -344,19 +343,3 @@ def test_without_load_no_bit_changes(pressure):
     ground, footprints = check_every_frame([loads], Hills(0.2, 0.0), ALL, 0.01, pressure)
     assert not ground.tiles
     assert not footprints
-
-
-@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
-def test_frame_by_frame_the_same_prints_arise_as_in_one_go(pressure):
-    loads = rolling(walk(steps=3))
-    whole, _ = check_every_frame([loads], FlatTerrain(), ALL, 0.01, pressure)
-    simulation = Simulation(SoftGround(FlatTerrain(), ALL, pressure), HeightField(0.01))
-    last = int(loads.motion.frames[-1])
-    for frame in range(1, last):
-        part = piece(loads, frame, frame + 1)
-        steps = slice(*np.searchsorted(loads.motion.frames, [frame - 1e-6, frame + 1 + 1e-6]))
-        forces = replace(part.forces, centre_of_pressure=loads.forces.centre_of_pressure[steps])
-        for result in simulation.run([replace(part, forces=forces)], more_follows=frame + 1 < last):
-            ground = result.ground
-    for window in whole.tile_windows():
-        assert ground.read(window) == pytest.approx(whole.read(window), abs=1e-6)

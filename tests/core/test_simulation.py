@@ -9,7 +9,7 @@ import pytest
 from softground_addon.core.deformation import GroundMaterial, equilibrium_depth
 from softground_addon.core.errors import InputError
 from softground_addon.core.footprints import recompose
-from softground_addon.core.heightfield import FlatTerrain, HeightField, Window
+from softground_addon.core.heightfield import FlatTerrain, Window
 from softground_addon.core.simulation import Simulation, simulate
 from softground_addon.core.soft_ground import SoftGround
 from softground_addon.core.sole_points import TOLERANCE
@@ -348,38 +348,6 @@ def test_a_motion_of_one_frame_gives_one_undisturbed_result():
     loads = standing(box_sole(0.25, 0.09), [[0, 0, 0]], 500.0, seconds=0)
     (result,) = simulate([loads], SoftGround(FlatTerrain(), SNOW), 0.01)
     assert not result.ground.tiles
-
-
-def piece(loads, start, end):
-    """The part of loads between two scene frames, both included."""
-    steps = slice(*(np.searchsorted(loads.motion.frames, [start - 1e-6, end + 1e-6])))
-    soles = tuple(replace(sole, transforms=sole.transforms[steps]) for sole in loads.motion.soles)
-    return replace(
-        loads,
-        motion=replace(loads.motion, frames=loads.motion.frames[steps], soles=soles),
-        contacts=replace(loads.contacts, touching=loads.contacts.touching[steps], normal=loads.contacts.normal[steps]),
-        forces=replace(loads.forces, forces=loads.forces.forces[steps]),
-    )
-
-
-def test_frame_by_frame_the_same_prints_arise_as_in_one_go():
-    loads = [walk(steps=4), walk(steps=4, heading=0.5, origin=(0.1, -0.2, 0), name="other")]
-    whole, footprints = pressed(loads, MUD)
-    simulation = Simulation(SoftGround(FlatTerrain(), MUD), HeightField(0.01))
-    last = int(loads[0].motion.frames[-1])
-    found = []
-    for frame in range(1, last):
-        parts = [piece(character, frame, frame + 1) for character in loads]
-        for result in simulation.run(parts, more_follows=frame + 1 < last):
-            found += result.footprints
-    for window in whole.tile_windows():
-        assert np.abs(result.ground.read(window) - whole.read(window)).max() < 1e-6
-    key = lambda footprint: (footprint.character, footprint.start_frame)  # noqa: E731
-    for one, other in zip(sorted(found, key=key), sorted(footprints, key=key), strict=True):
-        assert (one.sole, one.end_frame) == (other.sole, other.end_frame)
-        assert one.position == pytest.approx(other.position, abs=1e-6)
-        assert one.compressed_m3 == pytest.approx(other.compressed_m3, rel=1e-5)
-        assert one.load_n == pytest.approx(other.load_n)
 
 
 def test_a_simulation_goes_on_from_a_recomposed_ground():
