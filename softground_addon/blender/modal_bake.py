@@ -77,8 +77,7 @@ class _Bake(bpy.types.Operator):
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
-        state = session.current()
-        state.is_baking, state.cancel_requested, state.progress, state.status = True, False, 0.0, ""
+        session.show_bake(0.0, "")
         manager.progress_begin(0.0, 1.0)
         manager.modal_handler_add(self)
         _running.append(self)
@@ -106,8 +105,7 @@ class _Bake(bpy.types.Operator):
             self._started += waited
             if now - self._shown > SHOWN_FOR:
                 self._shown = now
-                session.current().status = iface_("Waiting for the render")
-                self._show_status()
+                self._show_status(session.current().progress, iface_("Waiting for the render"))
             return {"PASS_THROUGH"}
         if self._progress and now - self._shown > SHOWN_FOR:  # a tick works or draws: both take their time
             self._shown = now
@@ -134,21 +132,17 @@ class _Bake(bpy.types.Operator):
         return {"PASS_THROUGH"}
 
     def _show_progress(self, progress: jobs.Progress) -> None:
-        state = session.current()
-        state.progress = max(state.progress, progress.overall)
+        done = max(session.current().progress, progress.overall)
         passed = time.perf_counter() - self._started
-        left = passed * (1.0 - state.progress) / max(state.progress, 1e-3)
-        state.status = iface_("{stage}: {seconds} s left").format(
-            stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))
-        )
-        bpy.context.window_manager.progress_update(state.progress)
-        self._show_status()
+        left = passed * (1.0 - done) / max(done, 1e-3)
+        bpy.context.window_manager.progress_update(done)
+        status = iface_("{stage}: {seconds} s left")
+        self._show_status(done, status.format(stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))))
 
-    def _show_status(self) -> None:
-        state = session.current()
+    def _show_status(self, progress: float, status: str) -> None:
         label, way_out = iface_("Bake Footprints"), iface_("Cancel")
-        self._write_status_bar(f"{label} {state.progress:.0%}  |  {state.status}  |  [Esc] {way_out}")
-        session.redraw()
+        self._write_status_bar(f"{label} {progress:.0%}  |  {status}  |  [Esc] {way_out}")
+        session.show_bake(progress, status)
 
     def _write_status_bar(self, text: str | None) -> None:
         workspace = bpy.data.workspaces.get(self._workspace)
@@ -165,9 +159,8 @@ class _Bake(bpy.types.Operator):
         manager.event_timer_remove(self._timer)
         manager.progress_end()
         self._write_status_bar(None)
-        state = session.current()
-        state.is_baking, state.cancel_requested, state.progress, state.status = False, False, 0.0, ""
-        session.redraw()
+        session.current().cancel_requested = False
+        session.show_no_bake()
 
     def _show(self, result: bake_job.BakeResult) -> None:
         raise NotImplementedError

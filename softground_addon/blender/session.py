@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -11,13 +12,42 @@ PANEL_AREAS = ("VIEW_3D",)
 """Editors that show the add-on's panels and overlay."""
 
 
+@dataclass
+class _Shown:
+    """What the panel shows of a bake. Writing a property has Blender draw the whole window anew, scene and all, which
+    takes longer than many a step of a bake; this does not."""
+
+    is_baking: bool = False
+    progress: float = 0.0
+    status: str = ""
+
+
+_shown = _Shown()
+
+
+def _is_baking(_session: SoftGroundSession) -> bool:
+    return _shown.is_baking
+
+
+def _progress_of(_session: SoftGroundSession) -> float:
+    return _shown.progress
+
+
+def _status_of(_session: SoftGroundSession) -> str:
+    return _shown.status
+
+
 class SoftGroundSession(bpy.types.PropertyGroup):
     """Progress of the bake, and whether live mode is on."""
 
-    is_baking: BoolProperty(name="Baking", description="A bake is under way")
+    is_baking: BoolProperty(name="Baking", description="A bake is under way", get=_is_baking)
     cancel_requested: BoolProperty(name="Cancel Requested", description="The bake is to end at its next step")
-    progress: FloatProperty(name="Progress", description="Finished part of the bake", min=0.0, max=1.0)
-    status: StringProperty(name="Status", description="What the bake is doing, and the time it still needs")
+    progress: FloatProperty(
+        name="Progress", description="Finished part of the bake", min=0.0, max=1.0, get=_progress_of
+    )
+    status: StringProperty(
+        name="Status", description="What the bake is doing, and the time it still needs", get=_status_of
+    )
     stale: StringProperty(name="Outdated", description="What has changed since the bake on the ground, line by line")
     show_overlay: BoolProperty(name="Overlay", description="Show what the add-on knows in the viewport")
     show_footfalls: BoolProperty(
@@ -44,6 +74,18 @@ CLASSES = (SoftGroundSession,)
 def current() -> Any:
     """The session's state."""
     return bpy.context.window_manager.softground
+
+
+def show_bake(progress: float, status: str) -> None:
+    """Let the panel say how far the bake is, 0 to 1, and what it is doing; nothing else is drawn."""
+    _shown.is_baking, _shown.progress, _shown.status = True, progress, status
+    redraw()
+
+
+def show_no_bake() -> None:
+    """Let the panel show that no bake runs."""
+    _shown.is_baking, _shown.progress, _shown.status = False, 0.0, ""
+    redraw()
 
 
 def is_rendering() -> bool:

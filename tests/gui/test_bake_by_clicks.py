@@ -5,7 +5,7 @@ import pytest
 pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(1500)]
 
 LONGEST_PAUSE = 0.1
-"""Longest time between two handled events while a bake of 250 frames runs [s]."""
+"""Longest time between two handled events while a bake of 250 frames runs, beside that of drawing the window [s]."""
 
 
 @pytest.fixture
@@ -51,12 +51,11 @@ def test_no_tick_of_a_bake_takes_long(facts):
 
 
 def test_blender_answers_while_it_bakes(facts):
-    screen = facts["pauses of the screen"][0][0]
+    """Between two events Blender may draw its window, which takes long where no graphics card does it."""
+    drawing = facts["pauses of the screen"][0][0]
     print("longest pauses (s, seconds after the start, progress):", facts["longest pauses"])
-    print("pauses while the screen alone is drawn:", facts["pauses of the screen"])
-    if screen > LONGEST_PAUSE:
-        pytest.skip(f"drawing the panel alone takes {screen:.2f} s here: the machine is busy")
-    assert facts["longest pauses"][0][0] < LONGEST_PAUSE
+    print("pauses while the window alone is drawn:", facts["pauses of the screen"])
+    assert facts["longest pauses"][0][0] < LONGEST_PAUSE + drawing
 
 
 def test_nothing_goes_wrong_on_the_console(facts):
