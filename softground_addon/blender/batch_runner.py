@@ -38,6 +38,10 @@ EXIT_MEANINGS = {0: "done", 2: "refused", 3: "failed"}
 PATIENCE = 10.0
 """Time that a worker has to end by itself, as is asked of it when the batch is interrupted or was killed [s]."""
 
+ALGEBRA_THREADS = "OPENBLAS_NUM_THREADS"
+"""What tells numpy's linear algebra how many threads to use. One in each worker is as fast, leaves the other processors
+to other shots, and gives the same bits however many jobs there are."""
+
 POLL = 0.25
 """Longest time between two looks at signals and deadlines [s]."""
 
@@ -215,6 +219,7 @@ class _Batch:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C comes to us alone, and we pass it on
+                env={ALGEBRA_THREADS: "1", **os.environ},
                 **inherited,  # type: ignore[call-overload]
             )
         except OSError as error:

@@ -125,6 +125,16 @@ def test_a_crash_is_tried_once_more_and_a_refusal_is_not(batch):
     assert "softground: No foot" in (batch.folder / "state" / "refused.log").read_text()
 
 
+@pytest.mark.parametrize("wanted", ["", "7"])
+def test_workers_compute_in_one_thread_unless_the_user_has_said_otherwise(batch, monkeypatch, wanted):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if wanted:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", wanted)
+    told = batch.folder / "threads"
+    batch.run(batch.shot("a", f"open({str(told)!r}, 'w').write(os.environ['OPENBLAS_NUM_THREADS'])"), jobs=1)
+    assert told.read_text() == (wanted or "1")
+
+
 def test_a_crash_after_the_work_was_done_is_done(batch, monkeypatch):
     monkeypatch.setenv("AFTER", "os.kill(os.getpid(), signal.SIGSEGV)")
     shot = batch.shot("a")
