@@ -9,10 +9,8 @@ import pytest
 from scipy.spatial import KDTree
 
 from softground_addon.blender import bake_job, jobs
-from softground_addon.blender.character_setup import mapping_of
-from softground_addon.blender.jobs import run
-from softground_addon.blender.rig_sampling import sample_character
 from tests.blender import shots
+from tests.blender.responders import source_motion
 
 STEPS = {"walk": 6, "run": 15, "jumping": 6, "jumping_jacks": 14}
 """Contacts counted in the motion: heel and toe markers for walk and run, by eye for the others."""
@@ -33,19 +31,7 @@ def bake_of(name):
     scene = bpy.context.scene
     bpy.ops.softground.add_character()
     result = jobs.run(bake_job.bake(scene))
-    options = scene.softground
-    character = options.characters[0]
-    motion = run(
-        sample_character(
-            scene,
-            character.armature,
-            mapping_of(character),
-            mass=character.mass,
-            frame_start=options.frame_start,
-            frame_end=options.frame_end,
-        )
-    )
-    return name, result, motion
+    return name, result, source_motion(scene)
 
 
 @pytest.fixture
