@@ -1,6 +1,16 @@
 """What tests of several folders need."""
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# What decides about an example is what is asserted of it, not how long a busy machine takes for it.
+settings.register_profile(
+    "any machine",
+    settings.get_profile(settings.get_current_profile_name()),  # with CI=true: the same examples each time
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("any machine")
 
 
 @pytest.fixture(scope="session")

@@ -29,7 +29,7 @@ def counts(whole):
 def each(strategy, count, check):
     """Check so many inputs."""
 
-    @settings(max_examples=count, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=count, database=None, suppress_health_check=list(HealthCheck))
     @given(strategy)
     def all_of_them(value):
         check(value)

@@ -2,7 +2,7 @@
 
 import bpy
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.deformation import GroundMaterial
@@ -49,7 +49,7 @@ def state(ground):
     return {place: tile.copy() for place, tile in ground.tiles.items()}
 
 
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.sampled_from([24.0, 30.0, 60.0]))
 def test_simulation_record_and_playback_are_one(seed, walkers, rate):
     bpy.ops.wm.read_factory_settings(use_empty=True)

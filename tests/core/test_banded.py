@@ -22,7 +22,7 @@ def definite_band(count, reach, seed):
     return band, matrix
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 70), st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_the_solution_solves_the_system_as_well_as_a_dense_one(count, reach, seed):
     band, matrix = definite_band(count, reach, seed)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.contacts import close_short, detect_contacts, hysteresis, runs
@@ -95,7 +95,6 @@ def test_hysteresis_keeps_its_state_between_the_thresholds():
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(1, 6))
-@settings(deadline=None)
 def test_after_closing_no_inner_run_is_short(values, shortest):
     closed = close_short(np.array(values), shortest)
     start, end = runs(closed)

@@ -82,7 +82,7 @@ def test_flight_is_exactly_without_force_and_a_bounce_keeps_the_momentum():
         assert impulse_beyond_weight(found) == pytest.approx(50 * 1.5 * speed, rel=0.07), frame_rate
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(height=st.floats(0.3, 5.0), mass=st.floats(0.1, 1e4), frame_rate=st.sampled_from([24, 30, 60]))
 def test_a_landing_keeps_the_momentum_of_any_fall(height, mass, frame_rate):
     found = loads(dropped(frame_rate, height=height, mass=mass, seconds=2.5))

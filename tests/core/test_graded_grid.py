@@ -39,7 +39,7 @@ def layouts(draw):
     return blocks(*fine), level, lower, upper, coarsest
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(layouts())
 def test_the_faces_fill_the_rectangle_without_cracks(layout):
     fine, level, lower, upper, coarsest = layout
@@ -63,7 +63,7 @@ def test_the_faces_fill_the_rectangle_without_cracks(layout):
     assert len(np.unique(grid.vertices, axis=0)) == len(grid.vertices)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(layouts())
 def test_it_is_fine_where_it_is_wanted_and_sizes_change_by_two_at_most(layout):
     fine, level, lower, upper, coarsest = layout

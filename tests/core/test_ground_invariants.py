@@ -107,7 +107,7 @@ def random_loads(seed):
     return loads_of(soles, transforms, np.stack(forces, 1), touching, frame_rate)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.integers(0, 2**32 - 1),
     materials,

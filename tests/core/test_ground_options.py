@@ -299,7 +299,7 @@ def check_every_frame(loads, terrain, material, cell_size, pressure):
     return result.ground, footprints
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @example(77, replace(SAND, rim_bias=0.5, repose_angle=0.8, crust_stress=1e5, hardening=1.0), 0.05, "UNIFORM", 0.16)
 @given(
     st.integers(0, 2**32 - 1),

@@ -57,7 +57,7 @@ def test_the_end_is_exact_to_rounding():
     assert max(height, compression) <= 4 * QUANTUM  # half a quantum for each footprint that reaches a place
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(st.integers(0, 2**16), st.sampled_from([24.0, 30.0, 60.0]))
 def test_crossing_trails_share_the_tolerance(seed, frame_rate):
     rng = np.random.default_rng(seed)

@@ -48,7 +48,7 @@ def flat(sole, position=(0, 0, 0), heading=0.0, pitch=0.0):
     return np.tile(pose(position, heading, pitch), (1, len(sole.patches), 1, 1))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.floats(-1e4, 1e4),
     st.floats(-1e4, 1e4),

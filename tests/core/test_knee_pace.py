@@ -106,7 +106,7 @@ def test_the_correction_is_about_the_same_at_any_frame_rate_that_shows_the_turn(
     assert hips == pytest.approx(np.interp(times, fine_times, fine), abs=0.25 * np.abs(fine).max())
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.lists(st.floats(0.6, 0.86), min_size=3, max_size=12),
     st.lists(st.booleans(), min_size=3, max_size=12),

@@ -42,7 +42,7 @@ def test_four_legs_under_the_centre_bear_a_quarter_each():
 
 
 @given(st.integers(0, 10_000))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_least_squares_agree_with_scipy(seed):
     random = np.random.default_rng(seed)
     count = random.integers(1, 7)

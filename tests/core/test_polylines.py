@@ -40,7 +40,7 @@ def sampled(lines, place, frame):
     return state[after - 1] + share * (state[after] - state[after - 1])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(0, 20))
 def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts):
     rng = np.random.default_rng(seed)

@@ -61,7 +61,7 @@ def test_a_force_off_the_middle_presses_like_a_beam_up_to_a_third_at_the_highest
     assert pressure[np.abs(x[0] - 3.0 + LENGTH / 2) < 0.002] == pytest.approx(1 - 2 * rise, abs=0.06)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @example("rectangle", 0.0, 0.00195)  # hardly off the middle
 @given(st.sampled_from(["rectangle", "ellipse", "triangle", "foot"]), st.floats(-1, 1), st.floats(-1, 1))
 def test_within_the_kern_the_force_acts_where_it_should_and_is_kept(shape, u, v):
@@ -74,7 +74,7 @@ def test_within_the_kern_the_force_acts_where_it_should_and_is_kept(shape, u, v)
     assert [(pressure * x).mean(), (pressure * y).mean()] == pytest.approx(wanted, abs=1e-4)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.sampled_from(["rectangle", "triangle", "foot"]), st.floats(-1, 1), st.floats(-1, 1))
 def test_no_pressure_within_the_limits_is_more_even(shape, u, v):
     """The same least squares solved by scipy."""
@@ -121,7 +121,7 @@ def test_a_contact_on_a_line_or_on_nothing_stays_finite():
         assert field.at(x, 0 * x).mean() == pytest.approx(1.0, rel=2e-3)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1))
 @pytest.mark.filterwarnings("error")
 def test_contacts_of_any_shape_keep_the_force(seed):
@@ -171,7 +171,7 @@ def pressed(loads, cell=0.01, material=SNOW):
     return result.ground, footprints
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(-0.9, 0.9), st.floats(0, 6.3), st.sampled_from([0.005, 0.01, 0.02]))
 def test_the_mean_depth_under_a_standing_foot_is_that_of_its_weight_per_area(shift, heading, cell):
     sole = box_sole(0.25, 0.09)

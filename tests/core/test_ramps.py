@@ -1,7 +1,7 @@
 """Fitting histories of heights with a few ramps per point."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.ramps import QUANTUM, TOLERANCE, Ramps, fit
@@ -25,7 +25,6 @@ def at_rest(history):
     return np.concatenate([[False], still[:-1] & still[1:], [False]])
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(3, 60), st.integers(1, 5), st.sampled_from([5e-5, 2e-4, 1e-3]))
 def test_the_error_stays_within_the_tolerance_at_every_frame(seed, frames, presses, tolerance):
     heights = staged_presses(np.random.default_rng(seed), frames, 40, presses)
@@ -36,7 +35,6 @@ def test_the_error_stays_within_the_tolerance_at_every_frame(seed, frames, press
     assert (error <= result.error + 1e-12).all(), "the reported error is no bound"
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4))
 def test_points_at_rest_are_where_they_were(seed, presses):
     rng = np.random.default_rng(seed)

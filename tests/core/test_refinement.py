@@ -110,7 +110,7 @@ def test_the_result_is_watertight(name):
     assert set(np.unique(np.concatenate(faces)).tolist()) == set(range(len(points))), "a vertex belongs to no face"
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**16), st.floats(-1, 1), st.floats(-1, 1))
 def test_any_terrain_stays_watertight_and_keeps_its_area(seed, x, y):
     surface = scattered(seed)
@@ -206,7 +206,6 @@ def test_the_work_does_not_grow_with_the_size_of_the_ground():
 
 
 @given(st.integers(0, 2**16), st.sampled_from([0.01, 0.3, 7.0]))
-@settings(deadline=None)
 def test_a_region_finds_every_box_that_reaches_into_it(seed, size):
     rng = np.random.default_rng(seed)
     columns, rows = rng.integers(-300, 300, (2, 40))

@@ -50,7 +50,7 @@ def test_a_tower_becomes_a_cone_of_the_angle_of_repose_and_of_the_same_volume(ce
     assert reach[0] == pytest.approx(reach[1], rel=0.15)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     arrays(float, (12, 17), elements=st.floats(-0.05, 0.1)),
     arrays(float, (12, 17), elements=st.floats(0, 0.1)),

@@ -18,7 +18,7 @@ def rough_field(window, seed=0):
     return field
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.integers(-40, 40),
     st.integers(-40, 40),

@@ -53,7 +53,7 @@ def test_an_adult_sole_is_about_200_square_centimetres():
 
 
 @given(length=st.floats(1e-3, 10.0), ball=st.floats(0.4, 0.9))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_sole_has_the_same_shape_at_any_size(length, ball):
     sole = anatomical_sole(length, name="f", side="L", ball=ball * length).sole
     reference = anatomical_sole(1.0, name="f", side="L", ball=ball).sole
@@ -215,7 +215,7 @@ def test_distances_to_a_square_are_exact():
 
 
 @given(radius=st.floats(8.0, 12.0), x=st.floats(-0.5, 0.5), y=st.floats(-0.5, 0.5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_traced_disc_has_the_area_and_sense_of_a_disc(radius, x, y):
     rows, columns = np.indices((30, 30))
     distance = radius - np.hypot(columns - 14.5 - x, rows - 14.5 - y)

@@ -18,7 +18,7 @@ def counter_clockwise(vertices, triangles):
     return triangles
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(4, 300), scale=st.floats(0.01, 1000))
 def test_heights_are_those_of_scipys_linear_interpolation(seed, count, scale):
     random = np.random.default_rng(seed)

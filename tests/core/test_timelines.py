@@ -54,7 +54,7 @@ def random_ramps(rng, count, points):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 60), st.integers(1, 6))
 def test_it_holds_the_sum_of_all_ramps_at_any_time(seed, count, points):
     rng = np.random.default_rng(seed)
@@ -70,7 +70,7 @@ def test_it_holds_the_sum_of_all_ramps_at_any_time(seed, count, points):
     assert (np.diff(table.frame)[np.diff(np.repeat(table.point, np.diff(table.first))) == 0] > 0).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 25))
 def test_it_tells_the_latest_contact_that_has_begun(seed, count):
     rng = np.random.default_rng(seed)

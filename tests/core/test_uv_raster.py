@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 from softground_addon.core.uv_raster import rasterise
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 2**16), st.integers(3, 90), st.integers(3, 70))
 def test_every_pixel_is_where_the_map_puts_it(seed, width, height):
     rng = np.random.default_rng(seed)

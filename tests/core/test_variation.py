@@ -86,7 +86,7 @@ def test_the_depth_on_a_varied_ground_does_not_depend_on_cell_size_or_frame_rate
         assert pressed(walk(steps=3, frame_rate=rate), bands)[0].volumes() == pytest.approx(reference, rel=0.01)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.integers(0, 2**32 - 1),
     st.tuples(*[st.floats(0, 3)] * 3),

@@ -156,7 +156,7 @@ def test_the_poses_do_not_depend_on_the_frame_rate():
         assert fast.turns[bone][::5] == pytest.approx(slow.turns[bone], abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     speed=st.floats(0.7, 1.8),
     stature=st.floats(1.0, 2.5),
