@@ -31,6 +31,9 @@ WORKER = os.environ.get("PYTEST_XDIST_WORKER", "alone")
 STORY_SECONDS = 1200
 """Longest story on a machine that does other things too; a quiet one takes a minute or two."""
 
+WINDOWS = {"pauses": (640, 480)}
+"""Width and height of the window of stories that do not want all of the screen [px]: a small one is drawn sooner."""
+
 PREFERENCES = """
 import bpy
 preferences = bpy.context.preferences
@@ -80,8 +83,9 @@ def told(suite: str, story: str) -> dict:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     teller = str(REPOSITORY / "tests" / "gui" / "teller.py")
+    window = ("--window-geometry", "0", "0", *map(str, WINDOWS[story])) if story in WINDOWS else ()
     arguments = ("--enable-event-simulate", "--python", teller, "--", str(REPOSITORY), story, str(folder))
-    printed = blender(suite, "gui", *arguments, seconds=STORY_SECONDS)
+    printed = blender(suite, "gui", *window, *arguments, seconds=STORY_SECONDS)
     (folder / "printed.txt").write_text(printed, encoding="utf-8")
     facts = folder / "facts.json"
     found = json.loads(facts.read_text(encoding="utf-8")) if facts.is_file() else {}

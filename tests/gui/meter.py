@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 
@@ -11,14 +12,13 @@ import bpy
 
 
 class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
-    """Notes the time of every event during a bake, and how far the bake is, until it is told to stop."""
+    """Notes the time of every event, whether a bake runs, and how far it is, until it is told to stop."""
 
     bl_idname = "test.pauses"
     bl_label = "Measure Pauses"
 
-    events: list[tuple[float, float]] = []  # noqa: RUF012
+    events: list[tuple[float, bool, float]] = []  # noqa: RUF012
     running = False
-    only_bakes = True
 
     def invoke(self, context, _event):
         type(self).events.clear()
@@ -32,21 +32,22 @@ class TEST_OT_pauses(bpy.types.Operator):  # noqa: N801
             context.window_manager.event_timer_remove(self.timer)
             return {"FINISHED"}
         state = context.window_manager.softground
-        if state.is_baking or not type(self).only_bakes:
-            type(self).events.append((time.perf_counter(), state.progress))
+        type(self).events.append((time.perf_counter(), state.is_baking, state.progress))
         return {"PASS_THROUGH"}
 
 
-def longest_pauses(count: int = 8) -> list[tuple[float, float, float]]:
-    """The longest pauses between two events [s], how long after the start they came, and how far the bake was."""
-    events = TEST_OT_pauses.events
-    first = events[0][0]
-    gaps = [(after - before, before - first, progress) for (before, progress), (after, _) in pairwise(events)]
-    return sorted(gaps, reverse=True)[:count]
+def longest_pauses(*, during_bake: bool, count: int = 8) -> list[tuple[float, float]]:
+    """The longest pauses between two events [s] and how far the bake was, the one in which it ends among them."""
+    found = [
+        (after - before, progress)
+        for (before, baking, progress), (after, _, _) in pairwise(TEST_OT_pauses.events)
+        if baking or not during_bake
+    ]
+    return sorted(found, reverse=True)[:count]
 
 
 @contextmanager
-def ticks_timed():
+def ticks_timed() -> Iterator[list[tuple[float, float]]]:
     """What the ticks of a bake take of the processor [s], each with how far it was: the add-on's own in the pauses."""
     module = next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.modal_bake"))
     tick, ticks = module._Bake._tick, []
@@ -63,3 +64,16 @@ def ticks_timed():
         yield ticks
     finally:
         module._Bake._tick = tick
+
+
+@contextmanager
+def drawings_counted() -> Iterator[list[float]]:
+    """When the scene was drawn in a viewport [s], which takes the longest of all that a window shows."""
+    drawings: list[float] = []
+    handle = bpy.types.SpaceView3D.draw_handler_add(
+        lambda: drawings.append(time.perf_counter()), (), "WINDOW", "PRE_VIEW"
+    )
+    try:
+        yield drawings
+    finally:
+        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")

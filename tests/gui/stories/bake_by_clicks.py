@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from tests.blender import fingerprints
-from tests.gui import meter
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
 
@@ -17,7 +16,6 @@ SLOW_CELLS = 0.002
 
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
-    bpy.utils.register_class(meter.TEST_OT_pauses)
     open_walk(FRAMES)
     yield from hand.open_sidebar()
     yield from hand.frame_all()
@@ -47,17 +45,9 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
         facts[f"{way_out}: as before"] = fingerprints.of_file() == before
     scene().softground.cell_size = CELLS
 
-    # The many drawings of a smoothed picture would take all the time where no graphics card draws them.
-    bpy.context.preferences.system.viewport_aa = "OFF"
-    facts["pauses of the screen"] = yield from pauses_of_the_screen(hand)
-    measure_pauses(hand, only_bakes=True)
-    yield 0.5
-    with meter.ticks_timed() as ticks:
-        yield from hand.click(*button)
-        yield from hand.wait_for(lambda: session().is_baking, 5)
-        yield from hand.wait_for(lambda: not session().is_baking, 120)
-    meter.TEST_OT_pauses.running = False
-    facts["longest pauses"], facts["longest ticks"] = meter.longest_pauses(), sorted(ticks, reverse=True)[:8]
+    yield from hand.click(*button)
+    yield from hand.wait_for(lambda: session().is_baking, 5)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
     yield 0.5
     facts["prints"] = summary()
     facts["deepest vertex"] = deepest()
@@ -90,25 +80,6 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.clear_bake")
     facts["cleared: deepest vertex"] = deepest()
-
-
-def measure_pauses(hand: Hand, *, only_bakes: bool) -> None:
-    meter.TEST_OT_pauses.only_bakes = only_bakes
-    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region("WINDOW")):
-        bpy.ops.test.pauses("INVOKE_DEFAULT")
-
-
-def pauses_of_the_screen(hand: Hand) -> Steps:
-    """The longest pauses while nothing happens but that the window is drawn."""
-    measure_pauses(hand, only_bakes=False)
-    yield 0.5
-    for _ in range(10):
-        for area in hand.window.screen.areas:
-            area.tag_redraw()
-        yield 0.3
-    meter.TEST_OT_pauses.running = False
-    yield 0.5
-    return meter.longest_pauses()
 
 
 def scene():

@@ -1,0 +1,56 @@
+"""Blender answers its user while a bake of 250 frames runs.
+
+The same bake is watched a few times: what the add-on makes the user wait for comes back in each, what the machine does
+beside it does not, so that the bake with the shortest of the longest pauses tells what the add-on causes.
+"""
+
+from statistics import median
+
+import pytest
+
+pytestmark = [pytest.mark.alone, pytest.mark.timeout(900)]
+
+LONGEST_PAUSE = 0.1
+"""Longest time between two handled events while a bake of 250 frames runs [s]."""
+
+
+@pytest.fixture
+def facts(tell):
+    return tell("pauses")
+
+
+def longest(facts, what):
+    """The longest of something in each bake [s]; of them the shortest."""
+    found = [bake[f"longest {what}"] for bake in facts["bakes"]]
+    print(f"longest {what} of each bake (s, progress):", *found, sep="\n")
+    return min(first[0][0] for first in found)
+
+
+@pytest.mark.gui
+def test_no_tick_of_a_bake_takes_long(facts):
+    assert longest(facts, "ticks") < LONGEST_PAUSE
+
+
+@pytest.mark.gui
+def test_a_bake_hardly_ever_has_the_scene_drawn(facts):
+    counts = [(bake["drawings"], bake["ticks"]) for bake in facts["bakes"]]
+    print("drawings of the scene and ticks of each bake:", counts)
+    assert min(drawings / ticks for drawings, ticks in counts) < 1 / 6
+
+
+@pytest.mark.gui
+def test_a_bake_lets_its_user_wait_no_longer_than_for_one_drawing_more(facts):
+    """Between two events Blender may draw its window, which takes long where no graphics card does it."""
+    drawing = median(facts["drawing the window"])
+    print("drawing a window of", facts["window"], "takes (s):", drawing)
+    assert longest(facts, "pauses") < LONGEST_PAUSE + drawing
+
+
+@pytest.mark.benchmark
+def test_blender_answers_within_a_tenth_of_a_second_while_it_bakes(facts):
+    assert longest(facts, "pauses") < LONGEST_PAUSE
+
+
+@pytest.mark.gui
+def test_nothing_goes_wrong_on_the_console(facts):
+    assert "softground_addon" not in facts["printed"]  # as in the lines of a traceback
