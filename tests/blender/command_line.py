@@ -15,7 +15,7 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "softground_addon", *map(str, arguments)]
 
 
-def run(*arguments: object, timeout: float = 300, **how: Any) -> subprocess.CompletedProcess[str]:
+def run(*arguments: object, timeout: float = 600, **how: Any) -> subprocess.CompletedProcess[str]:
     """Run it to its end and keep what it prints."""
     return subprocess.run(
         command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False, **how

@@ -362,7 +362,7 @@ os._exit(0)
 def make_rigify_file(path: Path) -> None:
     """A file with Rigify's human, "Metarig" and "Generated"; skips the test where there is no Rigify."""
     made = subprocess.run(
-        [sys.executable, "-c", _MAKE_RIGIFY, str(path)], capture_output=True, timeout=120, check=False
+        [sys.executable, "-c", _MAKE_RIGIFY, str(path)], capture_output=True, timeout=600, check=False
     )
     if made.returncode == 3:
         pytest.skip("this Blender comes without Rigify")

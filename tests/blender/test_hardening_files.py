@@ -15,7 +15,7 @@ import bpy
 import pytest
 
 from softground_addon.blender import cli
-from tests.blender import command_line
+from tests.blender import command_line, shots
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")
 
@@ -125,7 +125,10 @@ def test_a_folder_that_cannot_be_written_is_named(shot, option, capfd):
 @posix
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_a_signal_ends_a_bake_cleanly_at_any_moment(shot, number):
+def test_a_signal_ends_a_bake_cleanly_at_any_moment(scene, tmp_path, number):
+    shots.walker(scene, frames=1500)  # so that it is not done before the signal comes
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
     old = shot.read_bytes()
     options = (shot, "--in-place", "--progress=json")
     process = command_line.begin("bake", *options, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -136,7 +139,7 @@ def test_a_signal_ends_a_bake_cleanly_at_any_moment(shot, number):
     for _ in range(5):  # an impatient user
         process.send_signal(number)
         time.sleep(0.02)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130, errors
     assert "Traceback" not in errors
     assert shot.read_bytes() == old

@@ -24,7 +24,7 @@ def run_in(version, *arguments):
     if not python.exists():
         pytest.skip(f"Blender {version} is not here: make test BPY=... makes {VERSIONS[version]}")
     command = [str(python), "-m", "tests.blender.version_worker", *map(str, arguments)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=400, check=False)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
 
 

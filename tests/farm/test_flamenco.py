@@ -24,7 +24,7 @@ SETTINGS = {
 def compile_job(**settings):
     done = subprocess.run(
         [NODE, HERE / "flamenco_manager.js", SCRIPT],
-        input=json.dumps(settings), capture_output=True, text=True, timeout=60, check=False,
+        input=json.dumps(settings), capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -87,7 +87,7 @@ def test_the_compiled_commands_bake_and_render(shot, blender):
     renders = shot.parent / "renders"
     settings = SETTINGS | {"blendfile": str(shot), "frames": "23-24", "render_output_root": str(renders)}
     for task in compile_job(**settings)["tasks"]:
-        done = subprocess.run(command_line(task, blender), capture_output=True, text=True, timeout=300, check=False)
+        done = subprocess.run(command_line(task, blender), capture_output=True, text=True, timeout=600, check=False)
         assert done.returncode == 0, done.stderr
     assert shot.with_name("shot-baked.blend").is_file()
     assert sorted(path.name for path in (renders / "shot").iterdir()) == ["000023.png", "000024.png"]

@@ -35,7 +35,7 @@ def bundle(path, *options):
 
 def openjd(*arguments):
     return subprocess.run(
-        [OPENJD, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False
+        [OPENJD, *map(str, arguments)], capture_output=True, text=True, timeout=600, check=False
     )  # fmt: skip
 
 

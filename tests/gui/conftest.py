@@ -55,7 +55,7 @@ def home(suite: str) -> Path:
     return OUTPUT / suite / "home" / WORKER
 
 
-def blender(suite: str, verb: str, *arguments: str, seconds: int = 120) -> str:
+def blender(suite: str, verb: str, *arguments: str, seconds: int = 600) -> str:
     """Run the suite's Blender in its own home; returns what it printed."""
     environment = {**os.environ, "REAL_BLENDER_HOME": str(home(suite)), "TMPDIR": str(OUTPUT / suite)}
     command = [str(TOOL), verb, suite, *arguments]

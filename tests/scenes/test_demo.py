@@ -17,7 +17,7 @@ PICTURES = ("overview", "snow", "dry_sand", "mud", "soil")
 FRAMES, RATE = 84, 24
 
 
-def run_demo(output, *options, timeout=240):
+def run_demo(output, *options, timeout=600):
     pytest.importorskip("bpy", reason="the demo needs the bpy module: pip install bpy==4.5.15")
     command = [sys.executable, "-m", "sample_scenes.demo", "--output", str(output), *options]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout, check=False)
@@ -134,7 +134,7 @@ def test_any_motion_file_walks_on_the_four_grounds(tmp_path, file, scale):
 def test_the_pictures_show_four_different_grounds_with_a_print_in_each(tmp_path, scene):
     import bpy
 
-    done = run_demo(tmp_path, "--samples", "2", timeout=600)
+    done = run_demo(tmp_path, "--samples", "2")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Fra:" not in done.stdout
     means = []

@@ -22,7 +22,7 @@ SLOW_CELLS = 0.002
 READING, PRESSING = 0.1, 0.62
 """Progress at which a bake reads the animation, and at which it presses the ground."""
 
-RENDER_SECONDS = 4.0
+RENDER_SECONDS = 10.0
 
 ADD_ON = "bl_ext.user_default.softground"
 
