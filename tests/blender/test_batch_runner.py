@@ -281,6 +281,7 @@ def test_no_shot_is_baked_twice_however_often_the_batch_is_killed(batch):
         "command = lambda file, options: [sys.executable, str(folder / 'worker.py'), str(file), *options]\n"
         "run(shots, Workplace(folder / 'state', 'test', command), jobs=2, show=lambda event: None)\n"
     )
+
     def begun():
         return sum(len(batch.runs(shot)) for shot in shots)
 

@@ -26,7 +26,7 @@ def longest(facts, what):
     return min(first[0][0] for first in found)
 
 
-@pytest.mark.gui
+@pytest.mark.benchmark
 def test_no_tick_of_a_bake_takes_long(facts):
     assert longest(facts, "ticks") < LONGEST_PAUSE
 
@@ -38,7 +38,7 @@ def test_a_bake_hardly_ever_has_the_scene_drawn(facts):
     assert min(drawings / ticks for drawings, ticks in counts) < 1 / 6
 
 
-@pytest.mark.gui
+@pytest.mark.benchmark
 def test_a_bake_lets_its_user_wait_no_longer_than_for_one_drawing_more(facts):
     """Between two events Blender may draw its window, which takes long where no graphics card does it."""
     drawing = median(facts["drawing the window"])
