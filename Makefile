@@ -31,6 +31,9 @@ demo: $(READY)
 scenes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all
 
+# Processes side by side gain nothing from threads that wait for each other's processors.
+test slow marathon: export OPENBLAS_NUM_THREADS := 1
+
 test: $(READY)
 	$(PYTEST) $(SIDE_BY_SIDE) $(TESTS)
 

@@ -39,12 +39,12 @@ def production_character(scene):
 
 def light_character(scene):
     """The same bones under the few thousand vertices of the project's own walker."""
-    shots.walker(scene, frames=FRAMES)
+    shots.walker(scene, frames=FRAMES, coarseness=1.0)
 
 
 def bones_only(scene):
     """The same bones without any mesh."""
-    shots.walker(scene, frames=FRAMES)
+    shots.walker(scene, frames=FRAMES, coarseness=1.0)
     for thing in list(scene.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)

@@ -116,7 +116,7 @@ def lowest(ground):
 
 
 def test_live_mode_costs_no_more_than_dynamic_paint(scene):
-    armature = walker(scene, frames=FRAMES)
+    armature = walker(scene, frames=FRAMES, coarseness=1.0)
     bpy.ops.softground.add_character()
     ground = ground_of(scene)
     feet = feet_of(scene, armature)

@@ -37,7 +37,7 @@ def heavy_walker(scene, frames=FRAMES):
     """The project's walker with a skin as heavy as a production character's."""
     import bmesh  # only there once bpy is
 
-    armature = shots.walker(scene, frames=frames)
+    armature = shots.walker(scene, frames=frames, coarseness=1.0)
     skins = [child for child in armature.children if child.type == "MESH"]
     while sum(len(skin.data.vertices) for skin in skins) < SKIN_VERTICES / 2:
         for skin in skins:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -53,11 +54,19 @@ def import_motion(name: str) -> bpy.types.Object:
     return bpy.context.active_object
 
 
-def walker(scene: bpy.types.Scene, frames: int = 72, rate: int = 24, **gait: float) -> bpy.types.Object:
+COARSE = 4.0
+"""How many times further apart than in pictures the vertices of a test's figure are, but for its shoes."""
+
+_walk = cache(walk)
+
+
+def walker(
+    scene: bpy.types.Scene, frames: int = 72, rate: int = 24, coarseness: float = COARSE, **gait: float
+) -> bpy.types.Object:
     """The project's own character, walking from the origin; it is the active object."""
     scene.render.fps, scene.render.fps_base = rate, 1.0
     body = Body()
-    armature = create_character("Walker", body, scene.collection)
-    write_action(armature, walk(body, Gait(**gait), frames, rate), "Walk")
+    armature = create_character("Walker", body, scene.collection, coarseness)
+    write_action(armature, _walk(body, Gait(**gait), frames, rate), "Walk")
     bpy.context.view_layer.objects.active = armature
     return armature

@@ -66,7 +66,7 @@ def strip(name: str, shape, frames: list[int], **settings: float) -> None:
     """Frames of a walk as it was made (above) and as it responds (below)."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    shots.walker(scene, frames=96)
+    shots.walker(scene, frames=96, coarseness=1.0)
     rows = _baked_and_shown(shape, frames, **settings)
     _save(name, np.concatenate([np.concatenate(row, axis=1) for row in rows[::-1]], axis=0))
 
@@ -95,7 +95,7 @@ def _rigify() -> None:
 
 
 def _mixamo() -> None:
-    responders.as_mixamo(shots.walker(bpy.context.scene))
+    responders.as_mixamo(shots.walker(bpy.context.scene, coarseness=1.0))
 
 
 def _captured() -> None:
