@@ -66,18 +66,20 @@ def bake_batch(options: argparse.Namespace) -> list[Outcome]:
     """
     shots = manifest.chosen(manifest.load(options.manifest), options.shots)
     state = Path(os.path.abspath(options.state or options.manifest.with_suffix(".batch")))
+    # tasks of a farm bake a shot each from one state folder: they must not replace each other's reports
+    path = options.report or (None if options.shots else state / "batch.json")
+    if options.report:
+        files.check_place(options.report.absolute())
     show = _Show(options.progress, len(shots), options.jobs)
     started = time.monotonic()
     outcomes = run(
         shots, Workplace(state, made_by(), worker_command), jobs=options.jobs, timeout=options.timeout, show=show
     )
-    # tasks of a farm bake a shot each from one state folder: they must not replace each other's reports
-    path = options.report or (None if options.shots else state / "batch.json")
-    if path:
-        seconds = time.monotonic() - started
-        files.write_text(path, json.dumps(_report(options.manifest, outcomes, seconds), indent=2) + "\n")
+    seconds = time.monotonic() - started
     if options.progress in ("plain", "openjd"):
         print(table(outcomes), flush=True)
+    if path:
+        files.write_text(path, json.dumps(_report(options.manifest, outcomes, seconds), indent=2) + "\n")
     return outcomes
 
 

@@ -182,6 +182,9 @@ def _bake(options: argparse.Namespace) -> None:
     read = receipts.checksums(_files_read(options)) if options.receipt else {}
     scene = _scene(options.scene)
     target = _save_target(options)
+    for path in (target, options.report, options.receipt):
+        if path:
+            files.check_place(Path(os.path.realpath(path)))
     set_up_automatically(scene)
     if options.preset:
         settings.apply_preset(scene, _preset(options.preset))
@@ -306,13 +309,11 @@ def _preset(name_or_path: str) -> presets.Preset:
 
 
 def _save_target(options: argparse.Namespace) -> Path | None:
-    """Where the shot goes; checked before any work is done."""
+    """Where the shot goes."""
     if options.in_place:
         if not bpy.data.filepath:
             raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
-        return Path(bpy.data.filepath)
-    if options.save and not options.save.resolve().parent.is_dir():
-        raise InputError(f"The folder of '{options.save}' does not exist: create it first.")
+        return Path(os.path.realpath(bpy.data.filepath))
     return options.save.resolve() if options.save else None
 
 

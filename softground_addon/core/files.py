@@ -20,21 +20,35 @@ def replacing(path: Path) -> Iterator[Path]:
     InputError
         If the folder is missing or cannot be written, or the disk is full. `path` is then as it was.
     """
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
-    if path.exists() and not path.is_file():
-        raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
+    partial = _partial(path)
     try:
         yield partial
         with partial.open("r+b") as written:  # Windows syncs only what may be written
             os.fsync(written.fileno())
         partial.replace(path)
     except OSError as error:
-        raise InputError(
-            f"'{path}' could not be written ({error.strerror or error}): choose another place, or free disk space."
-        ) from error
+        raise _not_written(path, error) from error
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def check_place(path: Path) -> None:
+    """Find out by trying, before there is anything to write, whether `replacing` could write a file.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or cannot be written, or something else than a file has that name.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"The folder of '{path}' does not exist: create it first.")
+    partial = _partial(path)
+    try:
+        partial.touch()
+        partial.unlink()
+    except OSError as error:
+        raise _not_written(path, error) from error
 
 
 def remove_leftovers(path: Path) -> None:
@@ -47,3 +61,15 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all (see `replacing`)."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def _partial(path: Path) -> Path:
+    """The name under which a file is written until it is whole."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
+    return path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
+
+
+def _not_written(path: Path, error: OSError) -> InputError:
+    why = error.strerror or error
+    return InputError(f"'{path}' could not be written ({why}): choose another place, or free disk space.")

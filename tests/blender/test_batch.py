@@ -159,6 +159,7 @@ def test_a_changed_library_bakes_the_shot_again(night):
         (None, ("--jobs", "0"), "no number of processes"),
         (None, ("--timeout", "nan"), "no number of seconds"),
         (None, ("--state", "/dev/null/x"), "choose another --state"),
+        (None, ("--report", "/nowhere/at/all.json"), "does not exist"),
     ],
 )
 def test_bad_input_exits_with_2_before_anything_is_baked(night, capfd, text, options, says):

@@ -115,11 +115,24 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_one(shot):
 
 @posix
 @pytest.mark.parametrize("option", ["--save", "--report", "--receipt"])
-def test_a_folder_that_cannot_be_written_is_named(shot, option, capfd):
+def test_a_folder_that_cannot_be_written_is_named_before_anything_is_baked(shot, option, capfd, monkeypatch):
+    monkeypatch.setattr(cli.bake_job, "bake", None)
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     options = [f"{option}=/proc/softground.blend", "--dry-run" if option != "--save" else "--progress=none"]
     assert cli.run_in_blender(["bake", *options]) == 2
     assert "/proc" in capfd.readouterr().err
+
+
+@posix
+def test_a_link_to_the_shot_stays_a_link(shot, tmp_path):
+    """As in folders where `latest.blend` points to the version that counts."""
+    link = tmp_path / "latest.blend"
+    link.symlink_to(shot.name)
+    before = checksum(shot)
+    bpy.ops.wm.open_mainfile(filepath=str(link))
+    assert cli.run_in_blender(["bake", "--progress=none", "--in-place"]) == 0
+    assert link.is_symlink()
+    assert checksum(shot) != before
 
 
 @posix

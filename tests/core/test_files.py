@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.files import remove_leftovers, replacing, write_text
+from softground_addon.core.files import check_place, remove_leftovers, replacing, write_text
 
 
 def write_half(path):
@@ -59,6 +59,24 @@ def test_what_is_no_file_is_not_replaced(tmp_path: Path, kind: str):
     with pytest.raises(InputError, match="not a file"):
         write_text(path, "text")
     assert path.exists()
+
+
+def test_a_place_is_tried_beforehand_and_nothing_is_left_there(tmp_path: Path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    for place in (path, tmp_path / "new.json"):
+        check_place(place)
+    assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("a.json", "old")]
+
+
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [("nowhere/a.json", "does not exist: create it"), (".", "not a file"), ("x" * 250 + ".json", "too long")],
+)
+def test_a_place_that_cannot_be_written_is_named_beforehand(tmp_path: Path, place: str, says: str):
+    with pytest.raises(InputError, match=says):
+        check_place(tmp_path / place)
+    assert not list(tmp_path.iterdir())
 
 
 def test_leftovers_of_a_killed_writer_are_found_by_their_name(tmp_path: Path):
