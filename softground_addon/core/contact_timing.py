@@ -229,6 +229,28 @@ def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
     return found
 
 
+@dataclass(frozen=True)
+class _Windows:
+    """Transitions that are fitted together, and the steps at which each is looked at.
+
+    Attributes
+    ----------
+    found : (T, 2) int array
+        Strike and leave as they were found.
+    feet : (T, 2) int array
+        The trailing and the leading sole.
+    step : (T, W) int array
+        Steps of each window, as many for all.
+    end : (T,) int array
+        Where each window ends: its steps from there on say nothing.
+    """
+
+    found: NDArray[np.intp]
+    feet: NDArray[np.intp]
+    step: NDArray[np.intp]
+    end: NDArray[np.intp]
+
+
 def _fit_overlaps(
     changes: list[Transition], lowest: Array, extent: Array, body: BodyDynamics, unit: float
 ) -> NDArray[np.intp]:
@@ -242,41 +264,36 @@ def _fit_overlaps(
     width = -(-(end - begin) // WINDOW_UNIT) * WINDOW_UNIT
     for steps in np.unique(width):
         some = np.flatnonzero(width == steps)
-        step = begin[some, None] + np.arange(steps)
         feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
-        share, telling = _shares_told(step, end[some], found[some], feet, lowest, extent, body, unit)
-        fitted[some] = _best_ramps(found[some], step, end[some], share, telling, unit)
+        windows = _Windows(found[some], feet, begin[some, None] + np.arange(steps), end[some])
+        share, telling = _shares_told(windows, lowest, extent, body, unit)
+        fitted[some] = _best_ramps(windows, share, telling, unit)
     return fitted
 
 
 def _shares_told(
-    step: NDArray[np.intp],
-    end: NDArray[np.intp],
-    found: NDArray[np.intp],
-    feet: NDArray[np.intp],
-    lowest: Array,
-    extent: Array,
-    body: BodyDynamics,
-    unit: float,
+    windows: _Windows, lowest: Array, extent: Array, body: BodyDynamics, unit: float
 ) -> tuple[Array, Array]:
-    """The leading foot's share at steps (T, W) as the point of action tells it, and how much that says, both (T, W).
+    """The leading foot's share at each step as the point of action tells it, and how much that says, both (T, W).
 
-    Surely before the strikes and after the leaves `found` (T, 2) the share is 0 and 1: what the point of action tells
+    Surely before the strikes and after the leaves that were found the share is 0 and 1: what the point of action tells
     there shows how far it can be trusted. A body animated by eye moves with little regard to the foot that bears it.
     """
-    inside = step < end[:, None]
+    step, end = windows.step, windows.end[:, None]
+    trailing, leading = windows.feet[:, :1], windows.feet[:, 1:]
+    inside = step < end
     sure = round(SURE * TIMING_DEVIATION * unit)
-    before = step < found.min(axis=1, keepdims=True) - sure
-    after = (step >= found.max(axis=1, keepdims=True) + sure) & inside
-    within = np.minimum(step, end[:, None] - 1)
-    back, front = lowest[within, feet[:, :1]], lowest[within, feet[:, 1:]]
+    before = step < windows.found.min(axis=1, keepdims=True) - sure
+    after = (step >= windows.found.max(axis=1, keepdims=True) + sure) & inside
+    within = np.minimum(step, end - 1)
+    back, front = lowest[within, trailing], lowest[within, leading]
     ground = np.select([before, after], [back[..., 2], front[..., 2]], (back[..., 2] + front[..., 2]) / 2)
     along = (front - back)[..., :2]
     length = (along**2).sum(axis=-1)
     share = ((body.point_of_action(ground, within) - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
     share = np.clip(share, 0.0, 1.0)
     # The point of action wanders under each sole as far as that can press: so much less it tells about the shares.
-    wander = (1 - share) * extent[within, feet[:, :1]] ** 2 + share * extent[within, feet[:, 1:]] ** 2
+    wander = (1 - share) * extent[within, trailing] ** 2 + share * extent[within, leading] ** 2
     wander /= np.maximum(length, 1e-12)
     off = np.select([before, after], [share, 1 - share], 0.0) ** 2
     beyond = np.maximum(off - wander, 0.0).sum(axis=1, keepdims=True)
@@ -288,10 +305,9 @@ def _shares_told(
     return share, np.where(inside, telling, 0.0)
 
 
-def _best_ramps(
-    found: NDArray[np.intp], step: NDArray[np.intp], end: NDArray[np.intp], share: Array, telling: Array, unit: float
-) -> NDArray[np.intp]:
-    """The pairs of strike and leave near those `found` (T, 2) whose ramps fit the shares (T, W) best, (T, 2)."""
+def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) -> NDArray[np.intp]:
+    """The pairs of strike and leave near those found whose ramps fit the shares (T, W) best, (T, 2)."""
+    found, step, end = windows.found, windows.step, windows.end[:, None]
     search = max(round(SEARCH * unit), 1)
     best = found
     for stride in (COARSE_STRIDE, 1):
@@ -299,7 +315,7 @@ def _best_ramps(
         offset = np.arange(-reach, reach + 1, stride)
         pairs = best[:, None] + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
         strike, leave = pairs[..., 0], pairs[..., 1]
-        possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > step[:, :1]) & (leave < end[:, None])
+        possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > step[:, :1]) & (leave < end)
         overlap = np.where(possible, leave - strike, 1)[..., None]
         phase = (step[:, None] - strike[..., None]) / overlap
         ramp = np.cos(np.pi * np.clip(phase, 0.0, 1.0, out=phase), out=phase)
