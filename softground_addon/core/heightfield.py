@@ -19,6 +19,7 @@ from .errors import InputError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 TILE = 32
 """Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""
@@ -95,6 +96,12 @@ class Window(NamedTuple):
     def expanded(self, margin: int) -> Window:
         """The window with `margin` more cells on every side."""
         return Window(self.column - margin, self.row - margin, self.columns + 2 * margin, self.rows + 2 * margin)
+
+    def cells_under(self, x: Array, y: Array, cell_size: float) -> tuple[Indices, Indices]:
+        """Rows and columns within the window of the cells under world positions [m]; beyond it, of the nearest."""
+        column = np.floor(x / cell_size).astype(np.intp) - self.column
+        row = np.floor(y / cell_size).astype(np.intp) - self.row
+        return np.clip(row, 0, self.rows - 1), np.clip(column, 0, self.columns - 1)
 
     def union(self, other: Window) -> Window:
         """The smallest window that holds both."""
@@ -258,6 +265,14 @@ class Surface:
         """Cells that take a print: on the ground and no wall."""
         mask: Mask = np.isfinite(self.heights) & (self.slope_x**2 + self.slope_y**2 <= STEEPEST_CELL**2)
         return mask
+
+    def planes_at(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Heights at world positions [m]: of the cell there, and on its plane; NaN where the cell does not bear."""
+        row, column = cell = self.window.cells_under(x, y, self.cell_size)
+        level = np.where(self.bears, self.heights, np.nan)[cell]
+        rise = self.slope_x[cell] * (x / self.cell_size - self.window.column - column - 0.5)
+        rise += self.slope_y[cell] * (y / self.cell_size - self.window.row - row - 0.5)
+        return level, level + rise * self.cell_size
 
 
 class SampledGrid(SparseGrid):

@@ -20,7 +20,7 @@ from .heightfield import Terrain, TerrainTiles, Window
 from .indentation import Springs, stress
 from .pressure import Pressure, pressure_field
 from .simulation import CharacterLoads
-from .sole_points import contact_window, places, point_contact, sole_points, under_points
+from .sole_points import contact_window, places, point_contact, sole_points
 from .solid_imprint import ground_under
 from .solids import posed
 from .stance import descent
@@ -190,7 +190,8 @@ def stance_loads(
                 x, y = places(points, poses)
                 factors = None
                 if varying:
-                    factors = Factors(*(under_points(one, window, cell_size, x, y) for one in varying.factors(window)))
+                    cells = window.cells_under(x, y, cell_size)
+                    factors = Factors(*(factor[cells] for factor in varying.factors(window)))
                 landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
                 force = np.einsum("ni,ni->n", character.forces.forces[steps, index], normals)
                 stances.append(

@@ -140,9 +140,14 @@ def in_contact(coverage: Fraction) -> Mask:
     return mask
 
 
+def whole_reach(reach: float) -> int:
+    """How many cells away from a contact its rim ends, at least one, with a reach in cells."""
+    return max(1, int(reach + 1e-6))
+
+
 def dilate(mask: Mask, reach: float) -> Mask:
     """Cells within `reach` cells (at least one) of a marked cell, for each of N masks (N, rows, columns)."""
-    radius = max(1, int(reach + 1e-6))
+    radius = whole_reach(reach)
     reach_squared = max(reach + 1e-6, 1.0) ** 2
     result = np.zeros_like(mask)
     wider, half_width = mask.copy(), 0  # `wider` is the mask dilated along the row by half_width

@@ -26,20 +26,16 @@ def treadmill_speed(motion: CharacterMotion, contacts: Contacts) -> float:
     """
     if motion.centre is not None or len(motion.frames) < 2:
         return 0.0
-    slides, ways = [np.zeros((0, 2))], []
+    slides = [np.zeros((0, 2))]
     for number, sole in enumerate(motion.soles):
-        points = sole.landmark_positions()
-        path = points[..., :2].mean(axis=1)
+        path = sole.landmark_positions()[..., :2].mean(axis=1)
         slides.append(np.gradient(path, motion.time_step, axis=0)[contacts.touching[:, number]])
-        ways.append(path[-1] - path[0])
     standing = np.concatenate(slides)
     if not len(standing):
         return 0.0
     belt = np.median(standing, axis=0)
-    body = np.mean(ways, axis=0) / (motion.time_step * (len(motion.frames) - 1))
-    if "hips" in motion.joints:
-        hips = motion.joints["hips"][:, :2]
-        body = (hips[-1] - hips[0]) / (motion.time_step * (len(motion.frames) - 1))
+    hips = motion.hips[[0, -1], :2]
+    body = (hips[1] - hips[0]) / (motion.time_step * (len(motion.frames) - 1))
     speed = float(np.linalg.norm(belt))
-    slow = REST_SPEED * np.sqrt(motion.gravity * motion.leg_length)
-    return speed if speed > slow and np.linalg.norm(belt - body) > speed / 2 else 0.0
+    moves = speed > REST_SPEED * motion.froude_speed
+    return speed if moves and np.linalg.norm(belt - body) > speed / 2 else 0.0

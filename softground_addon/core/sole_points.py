@@ -151,27 +151,21 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
     PointContact
         Points off the ground, over a wall or inside of one, or turned away from the ground have no area.
     """
-    window, heights, bears = ground.window, ground.heights, ground.bears
-    level = bool(bears.all()) and np.ptp(heights) == 0
+    is_level = bool(ground.bears.all()) and np.ptp(ground.heights) == 0
     clearances, areas, levels = [], [], []
     for number, patch in enumerate(points.patches):
         rotation, place = transforms[:, number, :3, :3], transforms[:, number, :3, 3]
         height = rotation[:, 2] @ patch.positions.T + place[:, 2:]
         area = np.maximum(rotation[:, 2] @ patch.normals.T, 0.0) * patch.area
         area[rotation[:, 2, 2] < LEAST_FACING] = 0.0
-        if level:
-            height -= heights[0, 0]
+        if is_level:
+            height -= ground.heights[0, 0]
         else:
-            # The ground's plane in the cell under each point.
-            column = (rotation[:, 0] @ patch.positions.T + place[:, :1]) / ground.cell_size - window.column
-            row = (rotation[:, 1] @ patch.positions.T + place[:, 1:2]) / ground.cell_size - window.row
-            i = np.clip(column.astype(int), 0, window.columns - 1)
-            j = np.clip(row.astype(int), 0, window.rows - 1)
-            rise = ground.slope_x[j, i] * (column - i - 0.5) + ground.slope_y[j, i] * (row - j - 0.5)
-            on_ground = bears[j, i]
-            height -= np.where(on_ground, heights[j, i] + rise * ground.cell_size, 0.0)
-            area *= on_ground
-            levels.append(heights[j, i])
+            x, y = (rotation[:, axis] @ patch.positions.T + place[:, axis, None] for axis in (0, 1))
+            level, plane = ground.planes_at(x, y)
+            height -= plane
+            area[np.isnan(plane)] = 0.0
+            levels.append(level)
         height[area == 0] = FAR
         clearances.append(height)
         areas.append(area)
@@ -250,14 +244,6 @@ def places(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
         ]
         along.append(np.concatenate(parts, axis=1))
     return along[0], along[1]
-
-
-def under_points(values: Array, window: Window, cell_size: float, x: Array, y: Array) -> Array:
-    """The values (rows, columns) of the cells of a window that lie under places (N, Q) [m]."""
-    column = np.floor(x / cell_size).astype(int) - window.column
-    row = np.floor(y / cell_size).astype(int) - window.row
-    under: Array = values[np.clip(row, 0, window.rows - 1), np.clip(column, 0, window.columns - 1)]
-    return under
 
 
 def contact_window(points: SolePoints, transforms: Array, cell_size: float) -> Window:

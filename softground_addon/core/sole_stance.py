@@ -11,8 +11,8 @@ from .heightfield import Window
 from .imprint import cell_coverage
 from .motion import Sole
 from .pressure import pressure_field
-from .rim import in_contact, rim_weights
-from .sole_points import SolePoints, centroid, contact_window, places, point_contact, under_points
+from .rim import in_contact, rim_weights, whole_reach
+from .sole_points import SolePoints, centroid, contact_window, places, point_contact
 from .stance import Stance, Steps
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class SoleStance(Stance):
 
     def _window(self, start: int, end: int, bed: Bed) -> Window:
         window = contact_window(self.points, self._steps.poses[start - self.first : end - self.first], bed.cell_size)
-        return window.expanded(max(1, int(bed.rim_reach + 1e-6)))
+        return window.expanded(whole_reach(bed.rim_reach))
 
     def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
         steps, points, material = slice(start - self.first, end - self.first), self.points, bed.material
@@ -57,9 +57,7 @@ class SoleStance(Stance):
             material=material,
             sinkage=self._sinkage,
             landing_speed=self._descent / step,
-            softness=under_points(factors.softness, cells.window, cells.cell_size, *places(points, poses))
-            if factors
-            else None,
+            softness=factors.softness[window.cells_under(*places(points, poses), bed.cell_size)] if factors else None,
         )
         self._sinkage = sinking.reached
         pressing = sinking.target > 0

@@ -69,7 +69,8 @@ def ground_under(
     """
     window, size = cells.window, cells.cell_size
     vertices, (a, b, c) = posed(solid.vertices, pose), solid.triangles.T
-    height = vertices[:, 2] - _ground_below(vertices, cells)
+    _, ground = cells.planes_at(vertices[:, 0], vertices[:, 1])
+    height = np.where(np.isnan(ground), np.inf, vertices[:, 2] - ground)
     above = np.minimum(np.minimum(height[a], height[b]), height[c])
     if not np.isfinite(above.min()):
         return None
@@ -98,16 +99,6 @@ def ground_under(
     varying = (field[rows, columns] for field in (factors.stiffness, factors.depth))
     stiffness, depth = (_repeated(field, divisions)[over] for field in varying)
     return GroundUnder(rows, columns, divisions, over, Springs(clearance, area, stiffness, depth))
-
-
-def _ground_below(points: Array, cells: Surface) -> Array:
-    """Height of the ground's plane in the cell under each point (Q, 3), (Q,) [m]; -inf where nothing bears."""
-    column = points[:, 0] / cells.cell_size - cells.window.column
-    row = points[:, 1] / cells.cell_size - cells.window.row
-    i = np.clip(np.floor(column).astype(int), 0, cells.window.columns - 1)
-    j = np.clip(np.floor(row).astype(int), 0, cells.window.rows - 1)
-    rise = cells.slope_x[j, i] * (column - i - 0.5) + cells.slope_y[j, i] * (row - j - 0.5)
-    return np.where(cells.bears[j, i], cells.heights[j, i] + rise * cells.cell_size, -np.inf)
 
 
 def _finer(cells: Surface, rows: slice, columns: slice, divisions: int) -> Array:

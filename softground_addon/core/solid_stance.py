@@ -14,7 +14,7 @@ from .heightfield import Surface, Window
 from .indentation import stress
 from .interpolation import turning
 from .motion import Sole
-from .rim import in_contact, rim_weights
+from .rim import in_contact, rim_weights, whole_reach
 from .solid_imprint import ground_under
 from .solids import Solid
 from .stance import Stance, Steps
@@ -63,7 +63,7 @@ class SolidStance(Stance):
         low, high = self._reach[:, start - self.first : end - self.first]
         half = bed.cell_size / 2
         window = Window.around(low.min(axis=0) - half, high.max(axis=0) + half, bed.cell_size)
-        return window.expanded(max(1, int(bed.rim_reach + 1e-6)))
+        return window.expanded(whole_reach(bed.rim_reach))
 
     def _parts(self, start: int, end: int, bed: Bed) -> int:
         path = self._between(start, end, 1, before=True)[:, :2, 3]
