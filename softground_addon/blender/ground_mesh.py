@@ -21,14 +21,13 @@ from ..core.footprints import NEVER
 from ..core.heightfield import Terrain
 from ..core.pressed_ground import GroundSample, PressedGround
 from ..core.terrain import MeshTerrain
-from . import mesh_arrays, painted_ground, playback
+from . import display_key, mesh_arrays, painted_ground, playback
 from .compat import remove_scene
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 REST = "softground_rest"
-DISPLAY_KEY = "SoftGround Display"
 COMPRESSION = "softground_compression"
 RIM = "softground_rim"
 AGE = "softground_age"
@@ -229,21 +228,12 @@ def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     try:
         rest = rest_positions(mesh)
         if mesh.shape_keys:
-            _drop_shape_keys(mesh)
+            display_key.drop_all(mesh)
         write_positions(mesh, rest)
         with _stand_in(ground, mesh) as evaluated:
             yield mesh_of(evaluated)
     finally:
         bpy.data.meshes.remove(mesh)
-
-
-def _drop_shape_keys(mesh: bpy.types.Mesh) -> None:
-    """Take the shape keys off a copy of a mesh: before 5.x their data stays, as a copy counts it twice."""
-    keys = mesh.shape_keys.session_uid
-    holder = bpy.data.objects.new("SoftGround Evaluation", mesh)
-    holder.shape_key_clear()
-    bpy.data.objects.remove(holder)
-    bpy.data.batch_remove([left for left in bpy.data.shape_keys if left.session_uid == keys])
 
 
 def write(
@@ -257,7 +247,7 @@ def write(
 ) -> None:
     """Put a bake on the ground, in place of the one that may be there.
 
-    The raw heights become the mesh's positions and Basis, the blurred ones the shape key `DISPLAY_KEY` at value 1.
+    The raw heights become the mesh's positions and Basis, the blurred ones the shape key of `display_key` at value 1.
     Without shape keys, the blurred heights are the mesh's positions.
 
     Parameters
@@ -284,9 +274,9 @@ def write(
     display[index] += (pressed.display[:, None] * up).astype(np.float32)
 
     if shape_keys:
-        _write_shape_keys(ground, raw, display)
+        display_key.put(ground, raw, display)
     else:
-        _take_off_shape_keys(ground, display)
+        display_key.take_off(ground, display)
     for name, values, default in (
         (COMPRESSION, pressed.compression, 0.0),
         (RIM, pressed.rim, 0.0),
@@ -315,42 +305,6 @@ def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -
     attribute.data.foreach_set("vector", whole.ravel())
 
 
-def _write_shape_keys(ground: bpy.types.Object, raw: NDArray[np.float32], display: NDArray[np.float32]) -> None:
-    mesh = mesh_of(ground)
-    if not mesh.shape_keys:
-        ground.shape_key_add(name="Basis", from_mix=False)
-    if DISPLAY_KEY not in mesh.shape_keys.key_blocks:
-        ground.shape_key_add(name=DISPLAY_KEY, from_mix=False).value = 1.0
-    _move_basis(mesh, raw)
-    mesh.shape_keys.key_blocks[DISPLAY_KEY].points.foreach_set("co", display.ravel())
-
-
-def _take_off_shape_keys(ground: bpy.types.Object, basis: NDArray[np.float32]) -> None:
-    """Leave no shape keys but those that the user has made since, on a basis of these positions."""
-    mesh = mesh_of(ground)
-    if not mesh.shape_keys:
-        return
-    if shown := mesh.shape_keys.key_blocks.get(DISPLAY_KEY):
-        ground.shape_key_remove(shown)
-    if mesh.shape_keys and len(mesh.shape_keys.key_blocks) > 1:
-        _move_basis(mesh, basis)
-    else:
-        ground.shape_key_clear()
-
-
-def _move_basis(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
-    """Give the first key other positions; the user's keys keep what they add to it."""
-    first = mesh.shape_keys.reference_key
-    before = np.empty_like(positions)
-    first.points.foreach_get("co", before.ravel())
-    first.points.foreach_set("co", positions.ravel())
-    for key in mesh.shape_keys.key_blocks:
-        if key.name not in (first.name, DISPLAY_KEY):
-            added = np.empty_like(positions)
-            key.points.foreach_get("co", added.ravel())
-            key.points.foreach_set("co", (added + (positions - before)).ravel())
-
-
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     """World up in the ground's own space and units, of the length of one metre, (3,)."""
     up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
@@ -360,12 +314,8 @@ def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
 def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
     """Positions of the finished ground as it is shown, (V, 3) in the object's own space and units."""
     mesh = mesh_of(ground)
-    key = mesh.shape_keys.key_blocks.get(DISPLAY_KEY) if mesh.shape_keys else None
-    if key is None:
-        return mesh_arrays.positions(mesh)
-    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    key.points.foreach_get("co", positions)
-    return positions.reshape(-1, 3)
+    shown = display_key.positions(mesh)
+    return mesh_arrays.positions(mesh) if shown is None else shown
 
 
 def restore(ground: bpy.types.Object) -> None:
@@ -378,7 +328,7 @@ def restore(ground: bpy.types.Object) -> None:
     playback.remove(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    _take_off_shape_keys(ground, rest)
+    display_key.take_off(ground, rest)
     for name in (REST, *SHADING_ATTRIBUTES, SOLE):
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 Result = TypeVar("Result")
 State = TypeVar("State")
@@ -49,16 +49,25 @@ class Progress:
 Job = Generator[Progress, None, Result]
 
 
+class _Watched(Generic[State, Result]):
+    """A generator that a loop can go through and that tells its result afterwards."""
+
+    result: Result
+
+    def __init__(self, work: Generator[State, None, Result]) -> None:
+        self._work = work
+
+    def __iter__(self) -> Iterator[State]:
+        self.result = yield from self._work
+
+
 def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Result:
     """Drive a job to its end."""
-    while True:
-        try:
-            progress = next(job)
-        except StopIteration as finished:
-            result: Result = finished.value
-            return result
+    watched = _Watched(job)
+    for progress in watched:
         if show:
             show(progress)
+    return watched.result
 
 
 def counted(
@@ -77,14 +86,11 @@ def counted(
     share : float
         What all of them together are of the stage, from its beginning.
     """
+    watched = _Watched(work)
     with closing(work):
-        while True:
-            try:
-                done = next(work)
-            except StopIteration as finished:
-                result: Result = finished.value
-                return result
+        for done in watched:
             yield Progress(stage, share * (part + done / count) / parts)
+    return watched.result
 
 
 def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:

@@ -25,24 +25,6 @@ _ATTRIBUTES = (nodes.MOVED, nodes.SPLINE, nodes.PRESSURE)
 _VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_COLOR": "color"}
 
 
-def install(
-    ground: bpy.types.Object, index: Indices, lines: Polylines, *, up: Array, frame_rate: float
-) -> bpy.types.Modifier:
-    """Put the playback on a ground, in place of the one that may be there: `player` and `attach` in one go.
-
-    Parameters
-    ----------
-    ground : bpy.types.Object
-    index : (K,) int array
-        Vertices that the places stand for.
-    lines : Polylines
-    up, frame_rate
-        See `player`.
-    """
-    with player(lines, up=up, frame_rate=frame_rate) as group:
-        return attach(ground, index[lines.point], group)
-
-
 @contextmanager
 def player(lines: Polylines, *, up: Array, frame_rate: float) -> Iterator[bpy.types.NodeTree]:
     """The node group that plays timelines; it is taken away at the end if nothing has come to use it.

@@ -75,18 +75,7 @@ PART = 1.0
 def polylines_at(
     footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
 ) -> Polylines:
-    """The record as polylines at given places; see `histories.histories`.
-
-    Parameters
-    ----------
-    footprints : sequence of Footprint
-    x, y : (K,) float arrays
-        World positions [m].
-    blur_sigma : float
-        Standard deviation of the display blur [m].
-    tolerance : float
-        Largest error of a displayed height while it moves [m].
-    """
+    """The record as polylines at given places; what it is given is what `histories.histories` takes."""
     order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
     parts = []
     for number in range(0, max(len(order), 1), PLACES_AT_ONCE):

@@ -8,6 +8,7 @@ import pytest
 
 from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
 from softground_addon.blender.character_setup import set_up_automatically
+from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core import record
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import FOLDER
@@ -87,7 +88,7 @@ def test_steps_alternate_and_lie_under_the_feet(walk):
 def test_no_print_where_no_foot_was(walk):
     bake(walk)
     ground = walk.softground.ground
-    moved = np.abs(rest(ground)[:, 2] - heights(ground, ground_mesh.DISPLAY_KEY)[:, 2]) > 1e-4
+    moved = np.abs(rest(ground)[:, 2] - heights(ground, DISPLAY_KEY)[:, 2]) > 1e-4
     steps, _ = record.load(ground.data[ground_mesh.RECORD])
     place = rest(ground)[moved, :2]
     nearest = np.min([np.linalg.norm(place - step.position[:2], axis=1) for step in steps], axis=0)
@@ -144,19 +145,19 @@ def test_baking_again_gives_the_same_ground_and_not_twice_the_depth(walk):
 def test_a_bake_survives_save_reload_and_append(walk, tmp_path):
     bpy.ops.softground.bake()
     ground = walk.softground.ground
-    name, baked = ground.name, heights(ground, ground_mesh.DISPLAY_KEY)
+    name, baked = ground.name, heights(ground, DISPLAY_KEY)
     stored = bytes(ground.data[ground_mesh.RECORD])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     ground = bpy.context.scene.softground.ground
-    assert np.array_equal(heights(ground, ground_mesh.DISPLAY_KEY), baked)
+    assert np.array_equal(heights(ground, DISPLAY_KEY), baked)
     assert bytes(ground.data[ground_mesh.RECORD]) == stored
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with bpy.data.libraries.load(str(tmp_path / "shot.blend")) as (_, wanted):
         wanted.objects = [name]
     bpy.context.scene.collection.objects.link(wanted.objects[0])
     bpy.context.view_layer.update()
-    assert np.array_equal(heights(wanted.objects[0], ground_mesh.DISPLAY_KEY), baked)
+    assert np.array_equal(heights(wanted.objects[0], DISPLAY_KEY), baked)
     assert bytes(wanted.objects[0].data[ground_mesh.RECORD]) == stored
 
 
@@ -423,12 +424,12 @@ def test_a_plane_of_four_vertices_gets_detail_along_the_trail_and_comes_back(wal
     fine = baked_ground.carrier_of(ground)
     assert walk.softground.ground == ground
     assert (ground.hide_viewport, ground.hide_render, len(ground.data.vertices)) == (True, True, 4)
-    depth = (rest(fine) - heights(fine, ground_mesh.DISPLAY_KEY))[:, 2].max()
+    depth = (rest(fine) - heights(fine, DISPLAY_KEY))[:, 2].max()
     footprints, _ = baked_ground.load(ground)
     assert depth == pytest.approx(max(print_.max_depth_m for print_ in footprints), rel=0.15)
-    first = heights(fine, ground_mesh.DISPLAY_KEY)
+    first = heights(fine, DISPLAY_KEY)
     bpy.ops.softground.bake()
-    assert np.array_equal(heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY), first)
+    assert np.array_equal(heights(baked_ground.carrier_of(ground), DISPLAY_KEY), first)
     bpy.ops.softground.clear_bake()
     after = fingerprints.of_file()
     after["names"], before["names"] = ({**names, "materials": None} for names in (after["names"], before["names"]))
@@ -440,12 +441,12 @@ def test_detail_survives_a_reload_and_a_bake_after_it(walk, tmp_path):
     ground.location = (0.3, -0.2, 0.0)
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
-    first = heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY)
+    first = heights(baked_ground.carrier_of(ground), DISPLAY_KEY)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     ground = bpy.context.scene.softground.ground
     bpy.ops.softground.bake()
-    assert np.array_equal(heights(baked_ground.carrier_of(ground), ground_mesh.DISPLAY_KEY), first)
+    assert np.array_equal(heights(baked_ground.carrier_of(ground), DISPLAY_KEY), first)
 
 
 def test_changing_the_choice_of_detail_moves_the_bake(walk):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import ground_mesh, trail_detail
+from softground_addon.blender.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.test_bake import plane
 
@@ -40,13 +41,13 @@ def refusal(operator):
 
 @pytest.mark.parametrize("change", ["delete", "rename"])
 def test_a_display_key_that_is_gone_is_made_again(baked, change):
-    shown = baked.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY]
+    shown = baked.data.shape_keys.key_blocks[DISPLAY_KEY]
     if change == "delete":
         baked.shape_key_remove(shown)
     else:
         shown.name = "Mine"
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    assert baked.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY].value == 1.0
+    assert baked.data.shape_keys.key_blocks[DISPLAY_KEY].value == 1.0
 
 
 def test_a_key_that_the_user_sculpted_on_the_bake_stays_on_the_ground_under_it(scene, baked):

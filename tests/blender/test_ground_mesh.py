@@ -6,6 +6,7 @@ import pytest
 from mathutils import Euler
 
 from softground_addon.blender import created_ground, ground_mesh
+from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.heightfield import FlatTerrain
@@ -79,7 +80,7 @@ def test_vertices_move_along_world_z_whatever_the_objects_transform(scene, trans
     before = world(ground)
     index = np.arange(100, 200)
     ground_mesh.write(ground, *pressed(index, -0.05, -0.03), b"record", 1.0)
-    for key, change in (("Basis", -0.05), (ground_mesh.DISPLAY_KEY, -0.03)):
+    for key, change in (("Basis", -0.05), (DISPLAY_KEY, -0.03)):
         expected = before.copy()
         expected[index, 2] += change
         assert np.allclose(world(ground, key), expected, atol=1e-5)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import ground_mesh, playback
+from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.polylines import polylines_at
 from softground_addon.core.pressed_ground import PressedGround
@@ -49,7 +50,8 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True
     ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
     lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma)
-    playback.install(ground, index, lines, up=up, frame_rate=30.0)
+    with playback.player(lines, up=up, frame_rate=30.0) as group:
+        playback.attach(ground, index[lines.point], group)
     return surface
 
 
@@ -137,7 +139,7 @@ def test_without_the_modifier_the_finished_ground_stands_there(scene, footprints
 def test_the_shape_key_does_not_move_the_ground_twice(scene, footprints, key_value):
     ground = ground_object(scene)
     surface = bake_onto(ground, footprints)
-    ground.data.shape_keys.key_blocks[ground_mesh.DISPLAY_KEY].value = key_value
+    ground.data.shape_keys.key_blocks[DISPLAY_KEY].value = key_value
     moved = world_positions(evaluated(ground, scene, 52)) - surface.vertices
     touched = recorded(footprints, 1e9, surface).compression > 1e-5
     difference = moved[:, 2] - recorded(footprints, 52, surface).display
