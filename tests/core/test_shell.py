@@ -1,6 +1,5 @@
 """A command line survives the shell that it is pasted into."""
 
-import doctest
 import re
 import shlex
 import subprocess
@@ -9,7 +8,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from softground_addon.core import shell
 from softground_addon.core.errors import InputError
 from softground_addon.core.shell import command_line
 
@@ -85,7 +83,3 @@ def test_what_needs_no_quotation_marks_has_none():
 def test_what_cannot_be_typed_is_named(word, windows):
     with pytest.raises(InputError, match="rename"):
         command_line([word], windows=windows)
-
-
-def test_the_examples_hold():
-    assert doctest.testmod(shell).failed == 0
