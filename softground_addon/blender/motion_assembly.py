@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.foot_attitude import (
+    UP,
     FlatFoot,
     FootSize,
     flat_foot,
@@ -24,6 +25,7 @@ from ..core.rigid import displacement, nearest_rotation, unit
 from ..core.soles import solid_sole
 from ..core.solids import capsule
 from .jobs import meanwhile
+from .rig_at_rest import RestPose
 from .rig_mapping import RigMapping, SoleSource
 from .settings import frame_rate_of, gravity_of
 from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
@@ -85,7 +87,7 @@ def assemble_motion(
     InputError
         If a mesh that should print has no underside.
     """
-    rest = RestPose(armature, recording.armature[0])
+    rest = RestPose.of(armature, mapping, recording.armature)
     frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
     leg = rest.leg_length(mapping)
 
@@ -102,8 +104,8 @@ def assemble_motion(
     trust = [_REST_IS_FLAT if source.name in meshes else 0.0 for source in sources]
     images = _mirror_images(feet)
     flats = [
-        _stand(foot, planted, feet, images[place], facing=facing, leg=leg, trust_rest_within=trust[place], place=place)
-        for place, foot in enumerate(feet)
+        _stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, trust_rest_within=trust[place])
+        for place in range(len(feet))
     ]
     sizes = [
         foot_size(flat, ankle_tip=foot.tip, ball=foot.ball, leg=leg) for foot, flat in zip(feet, flats, strict=True)
@@ -180,68 +182,6 @@ def along_bone(matrices: Array, distance: float) -> Array:
     return matrices[:, :3, 1] * distance + matrices[:, :3, 3]
 
 
-_ACROSS, _ALONG = 0.6, 0.7
-"""Largest cosine between the legs and a four-legged trunk, smallest between hind and front legs."""
-
-
-@dataclass(frozen=True)
-class RestPose:
-    """The rig at rest, placed in the world as at the first frame [m]."""
-
-    armature: bpy.types.Object
-    world: Array
-
-    @property
-    def is_mirrored(self) -> bool:
-        return bool(np.linalg.det(self.world[:3, :3]) < 0)
-
-    def matrix(self, bone: str) -> Array:
-        return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
-
-    def end(self, bone: str, end: str) -> Array:
-        point = self.armature.data.bones[bone]
-        local = np.array(point.head_local if end == "head" else point.tail_local)
-        return self.world[:3, :3] @ local + self.world[:3, 3]
-
-    def leg_length(self, mapping: RigMapping) -> float:
-        """Thigh and shank together, or about half the rig's height where they are not mapped."""
-        lengths = []
-        for side in "lr":
-            joints = [f"hip_{side}", f"knee_{side}", f"ankle_{side}"]
-            if all(joint in mapping.joints for joint in joints):
-                points = np.array([self.end(*mapping.joints[joint]) for joint in joints])
-                lengths.append(float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()))
-        if lengths and min(lengths) > 0:
-            return float(np.mean(lengths))
-        ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
-        return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
-
-    def is_four_legged(self, mapping: RigMapping) -> bool:
-        """Whether the trunk lies across the legs, and the arms along them."""
-        names = [f"{joint}_{side}" for joint in ("hip", "ankle", "shoulder", "wrist") for side in "lr"]
-        if any(name not in mapping.joints for name in names):
-            return False
-        left, right = (np.array([self.end(*mapping.joints[name]) for name in names[side::2]]) for side in (0, 1))
-        hip, ankle, shoulder, wrist = (left + right) / 2
-        leg, trunk, arm = (unit(line) for line in (ankle - hip, shoulder - hip, wrist - shoulder))
-        return bool(abs(leg @ trunk) < _ACROSS and leg @ arm > _ALONG)
-
-    def facing(self, mapping: RigMapping) -> Array:
-        """Horizontal direction in which the character faces; Blender's front where left and right do not show."""
-        ahead = np.cross(self._across(mapping), (0.0, 0.0, -1.0 if self.is_mirrored else 1.0))
-        length = float(np.linalg.norm(ahead))
-        return ahead / length if length > 0 else np.array((0.0, -1.0, 0.0))
-
-    def _across(self, mapping: RigMapping) -> Array:
-        """From a joint on the right to the same on the left."""
-        for joint in ("hip", "shoulder", "knee", "ankle"):
-            if f"{joint}_l" in mapping.joints and f"{joint}_r" in mapping.joints:
-                across = self.end(*mapping.joints[f"{joint}_l"]) - self.end(*mapping.joints[f"{joint}_r"])
-                if np.linalg.norm(across[:2]) > 0:
-                    return across
-        return np.zeros(3)
-
-
 @dataclass(frozen=True)
 class _Foot:
     """A foot's bones: joints in the rest pose and rigid motions from it [m]."""
@@ -283,30 +223,41 @@ class _Foot:
 
 
 def _stand(
-    foot: _Foot,
-    planted: Sequence[NDArray[np.bool_]],
+    place: int,
     feet: Sequence[_Foot],
+    planted: Sequence[NDArray[np.bool_]],
     images: Mapping[int, Array],
+    rest: RestPose,
     *,
     facing: Array,
     leg: float,
     trust_rest_within: float,
-    place: int,
 ) -> FlatFoot:
-    """How a foot stands, from its own planted instants and, reflected, from those of its mirror image."""
-    own = planted[place]
-    foot_turns, toe_turns = foot.motion[own, :3, :3], foot.toe_motion[own, :3, :3]
-    foot_images = [feet[other].motion[planted[other], :3, :3] @ mirror for other, mirror in images.items()]
-    toe_images = [feet[other].toe_motion[planted[other], :3, :3] @ mirror for other, mirror in images.items()]
-    foot_up = standing_up(foot_turns, foot_images, trust_rest_within=trust_rest_within)
-    toe_up = standing_up(toe_turns, toe_images, trust_rest_within=trust_rest_within)
+    """How a foot stands, from its own planted instants and, reflected, from those of its mirror image.
+
+    It stands level in the world or, where the whole rig is tilted, level in the rig: whichever is nearer to how it
+    stands at rest.
+    """
+
+    def standing(turns: Sequence[Array], tilts: Array) -> Array:
+        def levelled(index: int) -> Array:
+            stands = planted[index]
+            return np.swapaxes(tilts[stands], -1, -2) @ turns[index][stands, :3, :3]
+
+        mirrored = [levelled(other) @ mirror for other, mirror in images.items()]
+        return standing_up(levelled(place), mirrored, trust_rest_within=trust_rest_within)
+
+    foot_motions, toe_motions = [other.motion for other in feet], [other.toe_motion for other in feet]
+    levels = (np.broadcast_to(np.eye(3), rest.tilts.shape), rest.tilts)
+    foot_up, tilts = max(((standing(foot_motions, level), level) for level in levels), key=lambda found: found[0] @ UP)
+    foot, own = feet[place], planted[place]
     return flat_foot(
         foot.ankle,
         foot.hinge,
         _pointing(foot, foot_up, facing, leg),
         foot_up=foot_up,
-        toe_up=toe_up,
-        toe_turns=np.swapaxes(toe_turns, -1, -2) @ foot_turns,
+        toe_up=standing(toe_motions, tilts),
+        toe_turns=np.swapaxes(foot.toe_motion[own, :3, :3], -1, -2) @ foot.motion[own, :3, :3],
     )
 
 

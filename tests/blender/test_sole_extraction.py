@@ -143,6 +143,61 @@ def test_a_scaled_and_moved_character_has_soles_of_its_size(scene):
         np.testing.assert_allclose(sole.landmark_positions()[..., 2], 1.0, atol=1e-5)
 
 
+def under_an_empty(armature, turns):
+    """Parent a rig to an empty that is turned so at these frames [rad]."""
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    armature.parent = parent
+    rigs.key(parent, "rotation_euler", turns)
+
+
+TILTS = {
+    "forward": {1: (0.35, 0, 0)},
+    "back and aside": {1: (-0.25, 0.3, 2.0)},
+    "steeply": {1: (1.2, 0, 0)},
+    "more and more": {1: (0, 0, 0), 10: (0.35, 0.2, 0)},
+    "less and less": {1: (0.9, 0, 0.4), 10: (0, 0, 0)},
+}
+
+
+@pytest.mark.parametrize("dressed", [True, False])
+@pytest.mark.parametrize("tilt", TILTS)
+def test_a_tilted_rig_has_the_soles_that_it_has_upright(scene, tilt, dressed):
+    """However its parents lie and move, the soles are those of the rig, under its own feet."""
+    armature = standing()
+    if dressed:
+        dress(armature, LEFT_BOOT)
+    upright = sample(armature)
+    under_an_empty(armature, TILTS[tilt])
+    tilted = sample(armature)
+    scene.frame_set(10)
+    at_last = np.array(armature.matrix_world)
+    for a, b in zip(upright.soles, tilted.soles, strict=True):
+        assert b.sole.area == pytest.approx(a.sole.area, rel=1e-4)
+        np.testing.assert_allclose(b.transforms[-1], at_last @ a.transforms[-1], atol=1e-5)
+
+
+@pytest.mark.parametrize("dressed", [True, False])
+def test_who_stands_upright_in_a_tilted_rig_has_level_soles(scene, dressed):
+    """The bones make up for what the parent tilts."""
+    armature = standing()
+    if dressed:
+        dress(armature, LEFT_BOOT)
+    upright = sample(armature)
+    hips = armature.pose.bones["hips"]
+    pose = hips.matrix.copy()
+    under_an_empty(armature, TILTS["back and aside"])
+    scene.frame_set(1)
+    hips.rotation_mode = "QUATERNION"
+    hips.matrix = armature.matrix_world.inverted() @ pose
+    for channel in ("location", "rotation_quaternion"):
+        hips.keyframe_insert(channel, frame=1)
+        hips.keyframe_insert(channel, frame=10)
+    for a, b in zip(upright.soles, sample(armature).soles, strict=True):
+        assert b.sole.area == pytest.approx(a.sole.area, rel=1e-4)
+        np.testing.assert_allclose(b.transforms, a.transforms, atol=1e-5)
+
+
 def test_bent_toes_leave_the_toe_patch_on_the_ground(scene):
     armature = standing()
     dress(armature, LEFT_BOOT)
