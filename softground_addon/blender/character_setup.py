@@ -309,9 +309,10 @@ def animated_frames(
 def _leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
     """Objects that the constraints of an object and of its bones follow."""
     bones = thing.pose.bones if thing.pose else ()
-    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints]
-    targets = [getattr(constraint, "target", None) for constraint in constraints if not constraint.mute]
-    return {target for target in targets if target is not None} - {thing}
+    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints if not one.mute]
+    followed = [getattr(one, "target", None) for one in constraints]
+    followed += [weighted.target for one in constraints if one.type == "ARMATURE" for weighted in one.targets]
+    return {leader for leader in followed if leader is not None} - {thing}
 
 
 def set_up_automatically(scene: bpy.types.Scene) -> None:

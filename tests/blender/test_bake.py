@@ -340,16 +340,18 @@ def test_a_selected_mesh_becomes_the_ground_as_it_is(walk):
     assert fingerprints.of_file() == before
 
 
-def test_a_rig_that_copies_another_is_baked_over_the_frames_of_that_one(scene):
+@pytest.mark.parametrize("kind", ["COPY_TRANSFORMS", "ARMATURE"])
+def test_a_rig_that_copies_another_is_baked_over_the_frames_of_that_one(scene, kind):
     source = shots.walker(scene, frames=40)
     follower = shots.walker(scene, frames=20)
     follower.animation_data_clear()
     for bone in follower.pose.bones:
-        constraint = bone.constraints.new("COPY_TRANSFORMS")
-        constraint.target, constraint.subtarget = source, bone.name
+        constraint = bone.constraints.new(kind)
+        leader = constraint.targets.new() if kind == "ARMATURE" else constraint
+        leader.target, leader.subtarget = source, bone.name
     bpy.ops.softground.add_character()
     assert (scene.softground.frame_start, scene.softground.frame_end) == (1, 40)
-    follower.pose.bones[0].constraints[0].target = follower
+    leader.target = follower
     source.animation_data_clear()
     source.constraints.new("COPY_LOCATION").target = follower  # round in a circle
     scene.frame_start, scene.frame_end = 5, 33
