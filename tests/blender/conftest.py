@@ -14,6 +14,14 @@ def scene(addon):
     return bpy.context.scene
 
 
+@pytest.fixture
+def walk(scene):
+    """A scene with a character that walks, ready to be baked."""
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    return scene
+
+
 @pytest.fixture(scope="session")
 def saved_walker(addon, tmp_path_factory):
     bpy.ops.wm.read_factory_settings(use_empty=True)

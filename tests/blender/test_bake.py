@@ -6,57 +6,16 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
+from softground_addon.blender import bake_job, baked_ground, ground_mesh
 from softground_addon.blender.character_setup import set_up_automatically
 from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core import record
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import FOLDER
 from tests.blender import fingerprints, shots
+from tests.blender.grounds import bake, heights, plane, rest
 
 PRESETS = sorted(path.stem for path in FOLDER.glob("*.json"))
-
-
-def heights(ground, key="Basis"):
-    """World positions (V, 3) of the ground in one of its shapes."""
-    mesh = ground.data
-    points = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    (mesh.shape_keys.key_blocks[key].points if mesh.shape_keys else mesh.vertices).foreach_get("co", points)
-    matrix = np.array(ground.matrix_world)
-    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def rest(ground):
-    points = np.empty(len(ground.data.vertices) * 3, dtype=np.float32)
-    ground.data.attributes[ground_mesh.REST].data.foreach_get("vector", points)
-    matrix = np.array(ground.matrix_world)
-    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def bake(scene, **values):
-    for name, value in values.items():
-        setattr(scene.softground, name, value)
-    return jobs.run(bake_job.bake(scene))
-
-
-def plane(scene, size=7.0, vertices=240, height=lambda x, y: 0.0 * x):
-    """The user's own ground: a grid of their making, larger than the walk."""
-    axis = np.linspace(-size / 2, size / 2, vertices)
-    x, y = np.meshgrid(axis, axis)
-    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
-    corner = (np.arange(vertices - 1)[:, None] * vertices + np.arange(vertices - 1)).ravel()
-    mesh = bpy.data.meshes.new("Field")
-    mesh.from_pydata(points, [], (corner[:, None] + [0, 1, vertices + 1, vertices]).tolist())
-    ground = bpy.data.objects.new("Field", mesh)
-    scene.collection.objects.link(ground)
-    return ground
-
-
-@pytest.fixture
-def walk(scene):
-    shots.walker(scene)
-    bpy.ops.softground.add_character()
-    return scene
 
 
 def test_two_clicks_lead_from_an_animated_rig_to_prints(scene):
@@ -214,90 +173,6 @@ def test_prints_do_not_depend_on_the_scenes_units(walk):
     for a, b in zip(metres["steps"], centimetres["steps"], strict=True):
         assert b["max_depth_m"] == pytest.approx(a["max_depth_m"], rel=1e-3)
         assert np.allclose(b["position"], a["position"], atol=1e-3)
-
-
-def unset(scene):
-    scene.softground.characters.clear()
-
-
-def no_animation(scene):
-    scene.softground.characters[0].armature.animation_data_clear()
-
-
-def no_feet(scene):
-    scene.softground.characters[0].soles.clear()
-
-
-def wrong_bone(scene):
-    scene.softground.characters[0].soles[0].bone = "Nonexistent"
-
-
-def stretched(scene):
-    scene.softground.characters[0].armature.scale = (1.0, 1.0, 2.0)
-
-
-def massless(scene):
-    scene.softground.characters[0].mass = 0.0
-
-
-def nan_key(scene):
-    from softground_addon.blender.compat import action_curves
-
-    curve = action_curves(scene.softground.characters[0].armature.animation_data.action)[0]
-    for point in curve.keyframe_points:
-        point.co[1] = float("nan")
-
-
-def empty_range(scene):
-    scene.softground.frame_start, scene.softground.frame_end = 10, 5
-
-
-def too_coarse(scene):
-    scene.softground.detail = "NEVER"
-    scene.softground.ground = plane(scene, vertices=40)
-
-
-def far_below(scene):
-    ground = scene.softground.ground = plane(scene)
-    ground.location.z = -5.0
-
-
-def bridge(scene):
-    ground = scene.softground.ground = plane(scene, vertices=200)
-    ground.modifiers.new("twice", "ARRAY").relative_offset_displace = (0, 0, 0)
-    ground.modifiers["twice"].use_constant_offset = True
-    ground.modifiers["twice"].constant_offset_displace = (0, 0, -1.0)
-
-
-def moving_ground(scene):
-    ground = scene.softground.ground = plane(scene)
-    ground.keyframe_insert("location", frame=1)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (unset, "Add Character"),
-        (no_animation, "'Walker'"),
-        (no_feet, "'Walker'.*[Ff]oot|'Walker'.*[Ff]eet|'Walker'.*sole"),
-        (wrong_bone, "'Walker'.*Nonexistent"),
-        (stretched, "'Walker'.*scale"),
-        (massless, "mass"),
-        (nan_key, "'Walker'"),
-        (empty_range, "10-5 is empty"),
-        (too_coarse, "'Field' is too coarse.*Subdivide"),
-        (far_below, "'Walker'.*touches 'Field'.*move"),
-        (bridge, "'Field' has several layers.*separate"),
-        (moving_ground, "'Field' moves"),
-    ],
-)
-def test_bad_input_is_named_with_its_remedy_and_changes_nothing(walk, spoil, message):
-    spoil(walk)
-    bpy.context.view_layer.update()
-    before = fingerprints.of_file()
-    with pytest.raises(RuntimeError, match=message):
-        bpy.ops.softground.bake()
-    assert repr(fingerprints.of_file()) == repr(before)
 
 
 def test_an_armature_is_needed_to_add_a_character(scene):

@@ -7,7 +7,7 @@ import pytest
 from softground_addon.blender import ground_mesh, trail_detail
 from softground_addon.blender.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from softground_addon.blender import bake_job, baked_ground, cli, export_formats, exports, jobs, playback
 from softground_addon.core import point_cache
 from tests.blender import command_line, shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image
 
 

@@ -10,7 +10,7 @@ from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround
 from softground_addon.core.ramps import TOLERANCE
 from tests.blender import shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 
 FRAMES = (10, 40)
 

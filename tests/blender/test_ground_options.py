@@ -9,7 +9,7 @@ from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import MATERIAL_RANGES, find
 from tests.blender import shots
-from tests.blender.test_bake import bake, heights, plane, rest
+from tests.blender.grounds import bake, heights, plane, rest
 
 
 @pytest.fixture

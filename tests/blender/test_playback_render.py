@@ -9,7 +9,7 @@ import pytest
 
 from softground_addon.blender import bake_job, jobs
 from tests.blender import shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 
 RENDER = """
 import sys

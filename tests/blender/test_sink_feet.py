@@ -5,7 +5,7 @@ import pytest
 
 from softground_addon.blender import bake_report, jobs, nla_layer, sink_feet
 from tests.blender import fingerprints, shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 
 from softground_addon.blender import analysis, bake_report, baked_ground
 from tests.blender import shots
-from tests.blender.test_bake import plane
+from tests.blender.grounds import plane
 
 
 @pytest.fixture(scope="module", params=["NEVER", "ALWAYS"])

@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender import ground_mesh
 from tests.blender import shots
-from tests.blender.test_bake import bake
+from tests.blender.grounds import bake
 
 
 @pytest.fixture

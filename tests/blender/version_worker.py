@@ -18,7 +18,7 @@ def make(blend: str, heights: str) -> None:
     from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
     from softground_addon.core.pressed_ground import PressedGround
     from tests.blender import shots
-    from tests.blender.test_bake import plane
+    from tests.blender.grounds import plane
     from tests.blender.test_playback_render import set_up_render
 
     softground_addon.register()
