@@ -1,12 +1,13 @@
 """What is known of a shot before it is baked: its loads on the ground and the depth to expect.
 
 A shot is read when the user asks for something that needs it, and kept while Blender runs, outside the file. It counts
-as known until what it was read from changes.
+as known until what it was read from changes; what the add-on itself writes leaves it known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -56,7 +57,7 @@ _known: dict[int, Analysis] = {}
 """By session uid of the scene; a cache only: everything in it can be read again."""
 
 _depths: dict[tuple[int, GroundMaterial, Pressure], float] = {}
-"""Depths that were asked for lately, by identity of the analysis; emptied with it."""
+"""Depths that were asked for lately, by identity of an analysis' stances; emptied with it."""
 
 
 def forget() -> None:
@@ -71,16 +72,25 @@ def is_empty() -> bool:
 
 
 def known(scene: bpy.types.Scene) -> Analysis | None:
-    """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
+    """The scene's analysis if it was read and still holds, with the masses and force models that it was last asked for.
+
+    Only looks; see `current`.
+    """
     analysis = _known.get(scene.session_uid)
-    if analysis is None or analysis.source != _source(scene):
+    return analysis if analysis and analysis.source == _source(scene) else None
+
+
+def current(scene: bpy.types.Scene) -> Analysis | None:
+    """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
+    analysis = known(scene)
+    if analysis is None or analysis.terms == _terms(scene):
+        return analysis
+    try:
+        analysis = _estimated(scene, analysis.shot)
+    except InputError:
+        del _known[scene.session_uid]
         return None
-    if analysis.terms != _terms(scene):
-        try:
-            analysis = _estimated(scene, analysis.shot)
-        except InputError:
-            return None
-        _keep(scene, analysis)
+    _keep(scene, analysis)
     return analysis
 
 
@@ -92,23 +102,58 @@ def read(scene: bpy.types.Scene) -> Analysis:
     InputError
         If the shot could not be baked either; names what is wrong and the remedy.
     """
-    analysis = known(scene)
+    analysis = current(scene)
     if analysis is None:
         analysis = _estimated(scene, jobs.run(read_shot(scene)))
         _keep(scene, analysis)
     return analysis
 
 
+@contextmanager
+def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
+    """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
+    _tell_of_changes(scene)
+    analysis = known(scene)
+    yield
+    if analysis is None:
+        return
+    _tell_of_changes(scene)
+    source = _source(scene)
+    if analysis.source == source:
+        _known[scene.session_uid] = analysis
+    elif analysis.shot.surface is None:
+        _known[scene.session_uid] = replace(analysis, source=source)
+
+
+def _tell_of_changes(scene: bpy.types.Scene) -> None:
+    """Have Blender call the handlers for what was changed by now."""
+    for layer in scene.view_layers:
+        layer.update()
+
+
 def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> float | None:
     """Depth of the deepest print to expect [m] in a material, or the scene's; None where the shot is not known."""
-    analysis = known(scene)
+    analysis = current(scene)
     if analysis is None:
         return None
-    pressure: Pressure = scene.softground.pressure
-    key = (id(analysis), material or settings.material_of(scene), pressure)
+    key = _key(scene, analysis, material)
     if key not in _depths:
         _depths[key] = deepest(analysis.stances, *key[1:])
     return _depths[key]
+
+
+def known_depth(scene: bpy.types.Scene) -> float | None:
+    """The expected depth [m] if it was asked for since anything has changed that it depends on. Only looks."""
+    analysis = known(scene)
+    if analysis is None or analysis.terms != _terms(scene):
+        return None
+    return _depths.get(_key(scene, analysis))
+
+
+def _key(
+    scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial | None = None
+) -> tuple[int, GroundMaterial, Pressure]:
+    return id(analysis.stances), material or settings.material_of(scene), scene.softground.pressure
 
 
 def match_depth(scene: bpy.types.Scene, depth: float) -> float:
@@ -158,7 +203,7 @@ def _source(scene: bpy.types.Scene) -> Hashable:
     return (
         (options.frame_start, options.frame_end, settings.frame_rate_of(scene), settings.time_stretch_of(scene)),
         (settings.gravity_of(scene), scene.unit_settings.scale_length),
-        options.ground and options.ground.session_uid,
+        options.ground and (options.ground.session_uid, *(tuple(row) for row in options.ground.matrix_world)),
         (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         tuple(
             (

@@ -80,6 +80,15 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
     return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"])}
 
 
+def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
+    """What the panel shows of prints that no bake reported, such as those kept of live mode."""
+    return {
+        "steps": len(footprints),
+        "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
+        "peak_force_n": max((float(footprint.peak_force_n) for footprint in footprints), default=0.0),
+    }
+
+
 def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
     """Constant float (positive) or sink of the source animation, by character and sole [mm]."""
     return {

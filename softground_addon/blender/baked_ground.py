@@ -149,6 +149,26 @@ def write(
     return place.carrier
 
 
+def stored_record(ground: bpy.types.Object) -> memoryview:
+    """The record of a ground's bake as it is stored, in bytes; to be looked at, not to be kept.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record is something else.
+    """
+    stored = ground_mesh.mesh_of(carrier_of(ground)).get(ground_mesh.RECORD)
+    if stored is None:
+        raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
+    try:
+        return memoryview(stored).cast("B")
+    except TypeError:
+        raise InputError(
+            f"The stored record of the footprints on '{ground.name}' was replaced by something else: clear the bake "
+            "and bake again."
+        ) from None
+
+
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     """The record of a ground's bake: its footprints, and what is known about them.
 
@@ -157,23 +177,12 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    mesh = ground_mesh.mesh_of(carrier_of(ground))
-    stored = mesh.get(ground_mesh.RECORD)
-    if stored is None:
-        raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
-    try:
-        content = bytes(memoryview(stored))
-    except TypeError:
-        raise InputError(
-            f"The stored record of the footprints on '{ground.name}' was replaced by something else: clear the bake "
-            "and bake again."
-        ) from None
-    footprints, about = record.load(content)
+    footprints, about = record.load(bytes(stored_record(ground)))
     return footprints, dict(about)
 
 
-def blur_sigma_of(about: dict[str, Any]) -> float:
-    """Standard deviation of the display blur that a bake was made with [m].
+def baked_with(about: dict[str, Any], value: str) -> float:
+    """A value of the material that a bake was made with, such as its `blur_sigma`, in SI units.
 
     Raises
     ------
@@ -181,7 +190,7 @@ def blur_sigma_of(about: dict[str, Any]) -> float:
         If the record does not say.
     """
     try:
-        return float(about["inputs"]["material"]["blur_sigma"])
+        return float(about["inputs"]["material"][value])
     except (KeyError, TypeError, ValueError):
         raise InputError(
             "The stored record of the footprints lacks its material: clear the bake and bake again."

@@ -34,7 +34,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     moved = playback.moved_vertices(ground_mesh.mesh_of(carrier))
     world = ground_mesh.rest_vertices(carrier, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
-    over_time = histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.blur_sigma_of(about))
+    over_time = histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
     up = ground_mesh.up_of(carrier, unit_scale)
 
     def samples() -> Iterator[NDArray[np.float32]]:

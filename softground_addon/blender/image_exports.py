@@ -65,7 +65,7 @@ def export_images(
     """
     baked_carrier(ground)
     footprints, about = baked_ground.load(ground)
-    sigma = baked_ground.blur_sigma_of(about)
+    sigma = baked_ground.baked_with(about, "blur_sigma")
     pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)
     over_time = histories(footprints, *pixels.position.T, blur_sigma=sigma)
     if not folder.is_dir():

@@ -21,16 +21,18 @@ from ..core.playhead import Playhead
 from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
-from . import analysis, baked_ground, ground_mesh, jobs, session, settings, trail_detail
+from . import analysis, bake_report, baked_ground, ground_mesh, jobs, session, settings, staleness, trail_detail
 from .bake_checks import expected_coverage, wants_detail
-from .character_setup import characters_of
+from .character_setup import characters_of, movers_of
 from .created_ground import create_ground, reach_for
 from .live_ground import LiveGround
 from .operators import reports_errors
 from .shots import ground_of
 from .translation import rpt_
 
-Array = NDArray[np.float64]
+Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
+"""Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
+around them [m]."""
 
 
 class LiveMode:
@@ -51,7 +53,8 @@ class LiveMode:
         options = scene.softground
         known = analysis.read(scene)
         if options.ground is None:
-            create_ground(scene, known.shot.plan)
+            with analysis.own_changes(scene):
+                create_ground(scene, known.shot.plan)
             known = analysis.read(scene)
         self.scene = scene.session_uid
         self.rendering = False
@@ -99,11 +102,11 @@ class LiveMode:
 
     def is_outdated(self, scene: bpy.types.Scene) -> bool:
         """Whether the character has changed since it was read."""
-        return analysis.known(scene) is not self._analysis
+        return analysis.current(scene) is not self._analysis
 
-    def changes(self) -> tuple[list[tuple[Window, Array]], float]:
-        """What the shown frame changed in each window [m], and the size of the cells [m]."""
-        return self._playhead.last_change(), self._playhead.ground.cell_size
+    def in_contact(self) -> Contact:
+        """See `in_contact` of this module."""
+        return self._playhead.in_contact(), self._playhead.ground.cell_size, self._playhead.material.rim_reach
 
     def keep(self, scene: bpy.types.Scene) -> None:
         """Leave the ground as it is shown, as the bake of the frames up to now."""
@@ -122,7 +125,9 @@ class LiveMode:
         )
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
-        stored = record.dump(footprints, {"inputs": {}, "input_hash": ""})
+        inputs = bake_report.inputs_of(scene)
+        so_far = inputs | {"frames": [scene.softground.frame_start, int(self._playhead.frame)]}
+        stored = record.dump(footprints, {"inputs": so_far, "input_hash": ""})
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
         over_time = polylines_at(footprints, *across, blur_sigma=sigma)
@@ -136,7 +141,9 @@ class LiveMode:
             time_stretch=settings.time_stretch_of(scene),
             shape_keys=scene.softground.shape_keys,
         )
-        jobs.run(writing)
+        carrier = jobs.run(writing)
+        ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
+        staleness.store(inputs, scene.softground.ground, movers_of(scene))
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
@@ -187,11 +194,11 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> Non
         forget()
 
 
-def changes_of(scene: bpy.types.Scene) -> tuple[list[tuple[Window, Array]], float] | None:
-    """What the shown frame changed in each window, and the size of the cells [m]; None if live mode is not on there."""
+def in_contact(scene: bpy.types.Scene) -> Contact | None:
+    """Cells in contact at the frame that is shown; None if live mode is not on there."""
     if _mode is None or _mode.scene != scene.session_uid:
         return None
-    return _mode.changes()
+    return _mode.in_contact()
 
 
 def rendering(active: bool) -> None:
@@ -277,7 +284,8 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
             session.current().is_live = True
             _mode.follow(scene)
         elif self.keep:
-            _mode.keep(scene)
+            with analysis.own_changes(scene):
+                _mode.keep(scene)
             forget()
         else:
             discard()

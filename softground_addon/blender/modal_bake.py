@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import InputError, SoftGroundError
-from . import bake_job, jobs, session, settings, sink_feet
+from . import analysis, bake_job, jobs, session, settings, sink_feet
 from .character_setup import characters_of
 from .operators import reports_errors
 from .translation import iface_, rpt_
@@ -57,7 +57,10 @@ class _Bake(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        self._show(jobs.run(self._job_of(settings.scene_of(context))))
+        scene = settings.scene_of(context)
+        with analysis.own_changes(scene):
+            result = jobs.run(self._job_of(scene))
+        self._show(result)
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -69,8 +72,8 @@ class _Bake(bpy.types.Operator):
 
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
-        self._job = self._job_of(settings.scene_of(context))
-        self._needed = _read_by_bake(settings.scene_of(context))
+        scene = settings.scene_of(context)
+        self._job, self._scene, self._needed = self._job_of(scene), scene.session_uid, _read_by_bake(scene)
         self._started = self._ticked = self._shown = time.perf_counter()
         self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
@@ -111,16 +114,9 @@ class _Bake(bpy.types.Operator):
             self._shown = now
             self._show_progress(self._progress)
             return {"PASS_THROUGH"}
-        until = now + TICK
         try:
             _check_still_there(self._needed)
-            progress = next(self._job)
-            while time.perf_counter() < until or progress.overall >= 1.0:  # what is written is not to be cancelled
-                progress = next(self._job)
-        except StopIteration as finished:
-            self._end()
-            self._show(finished.value)
-            return {"FINISHED"}
+            result = self._work(until=now + TICK)
         except SoftGroundError as error:
             self._end()
             self.report({"ERROR"}, str(error))
@@ -128,8 +124,24 @@ class _Bake(bpy.types.Operator):
         except BaseException:
             self._end()
             raise
-        self._progress = progress
-        return {"PASS_THROUGH"}
+        if result is None:
+            return {"PASS_THROUGH"}
+        self._end()
+        self._show(result)
+        return {"FINISHED"}
+
+    def _work(self, until: float) -> bake_job.BakeResult | None:
+        """Go on with the bake until a time; the result if it is done by then."""
+        scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
+        with analysis.own_changes(scene):
+            try:
+                self._progress = next(self._job)
+                while time.perf_counter() < until or self._progress.overall >= 1.0:  # what is written is not cancelled
+                    self._progress = next(self._job)
+            except StopIteration as finished:
+                result: bake_job.BakeResult = finished.value
+                return result
+        return None
 
     def _show_progress(self, progress: jobs.Progress) -> None:
         done = max(session.current().progress, progress.overall)

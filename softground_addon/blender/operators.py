@@ -96,8 +96,10 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
             settings.scene_of(context).softground.ground = chosen
             self.report({"INFO"}, f"'{chosen.name}' is the ground")
             return {"FINISHED"}
-        plan = jobs.run(shots.fit_ground(settings.scene_of(context)))
-        ground = create_ground(settings.scene_of(context), plan)
+        scene = settings.scene_of(context)
+        plan = jobs.run(shots.fit_ground(scene))
+        with analysis.own_changes(scene):
+            ground = create_ground(scene, plan)
         for warning in plan.warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
@@ -138,9 +140,10 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         ground = scene.softground.ground
-        if ground is not None and baked_ground.has_remains(ground):
-            baked_ground.clear(ground)
-        response_job.remove_layers(scene)
+        with analysis.own_changes(scene):
+            if ground is not None and baked_ground.has_remains(ground):
+                baked_ground.clear(ground)
+            response_job.remove_layers(scene)
         return {"FINISHED"}
 
 

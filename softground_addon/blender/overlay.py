@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,10 +15,10 @@ from numpy.typing import NDArray
 from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
-from . import analysis, baked_ground, ground_mesh, live, overlay_shapes, session, settings
+from . import analysis, baked_ground, forecast, live, overlay_shapes, session, settings
 from .character_setup import characters_of
 from .operators import reports_errors
-from .overlay_shapes import Outline
+from .overlay_shapes import Cells, Outline
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
@@ -58,12 +57,8 @@ def _footfalls(source: _ById) -> list[Outline]:
     return overlay_shapes.footfalls(source.analysis.loads, source.analysis.shot.terrain)
 
 
-@lru_cache(maxsize=2)
-def _footprints(_mesh: int, _checksum: int, stored: bytes) -> tuple[Footprint, ...]:
-    try:
-        return tuple(record.load(stored)[0])
-    except InputError:
-        return ()
+_bake: dict[tuple[int, bytes], tuple[Sequence[Footprint], float]] = {}
+"""Footprints and rim reach [m] of the bake that was shown last, by its mesh and what tells its record from others."""
 
 
 def draw_shapes() -> None:
@@ -72,9 +67,10 @@ def draw_shapes() -> None:
     context: Any = bpy.context
     if not state.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
         return
-    known = analysis.known(settings.scene_of(context))
-    if known is None:
+    foretold = forecast.of(settings.scene_of(context))
+    if foretold is None:
         return
+    known = foretold.analysis
     import gpu  # noqa: PLC0415  (not there in background)
 
     scene = settings.scene_of(context)
@@ -83,9 +79,9 @@ def draw_shapes() -> None:
     gpu.state.blend_set("ALPHA")
     try:
         if state.show_cells:
-            contact, rim, size = _cells(scene, frame)
-            for centres, colour in ((contact, CONTACT), (rim, RIM)):
-                _fill(overlay_shapes.squares(centres, size, known.shot.terrain) * metre, colour)
+            contact, rim, size = _cells(scene)
+            for cells, colour in ((contact, CONTACT), (rim, RIM)):
+                _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
         if state.show_footfalls:
             for outline in _footfalls(_ById(known)):
                 _line(_closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
@@ -105,9 +101,10 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if not (state.show_overlay and state.show_footfalls) or not context.space_data.overlay.show_overlays:
         return
-    known = analysis.known(settings.scene_of(context))
-    if known is None:
+    foretold = forecast.of(settings.scene_of(context))
+    if foretold is None:
         return
+    known = foretold.analysis
     import blf  # noqa: PLC0415
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
@@ -127,23 +124,33 @@ def draw_numbers() -> None:
     blf.disable(0, blf.SHADOW)
 
 
-def _cells(scene: bpy.types.Scene, frame: float) -> tuple[Array, Array, float]:
-    """Centres of the cells in contact and in the rim at a frame, and their size, from live mode or from the bake."""
-    none = np.empty((0, 2))
-    shown = live.changes_of(scene)
+def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
+    """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
+    shown = live.in_contact(scene)
     if shown is not None:
-        pairs = [overlay_shapes.changed_cells(window, change, shown[1]) for window, change in shown[0]]
-        contact, rim = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-        return np.concatenate([none, *contact]), np.concatenate([none, *rim]), shown[1]
-    ground = scene.softground.ground
+        windows, size, reach = shown
+        touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
+    else:
+        footprints, reach = _baked(scene.softground.ground)
+        size = footprints[0].cell_size if footprints else 1.0
+        touched = list(overlay_shapes.touched_at(footprints, float(scene.frame_current)))
+    return *overlay_shapes.contact_and_rim(touched, reach / size), size
+
+
+def _baked(ground: bpy.types.Object | None) -> tuple[Sequence[Footprint], float]:
+    """The footprints on a ground, and the reach of their rims [m]; nothing where there is no bake that can be read."""
     if ground is None or not baked_ground.is_baked(ground):
-        return none, none, 1.0
-    carrier = baked_ground.carrier_of(ground)
-    stored = bytes(ground_mesh.mesh_of(carrier)[ground_mesh.RECORD])
-    footprints = _footprints(carrier.data.session_uid, zlib.crc32(stored), stored)
-    contact, rim = overlay_shapes.cells_at(footprints, frame)
-    size = footprints[0].cell_size if footprints else 1.0
-    return np.concatenate([none, *contact]), np.concatenate([none, *rim]), size
+        return (), 0.0
+    try:
+        tail = bytes(baked_ground.stored_record(ground)[-record.TAIL :])
+        key = (baked_ground.carrier_of(ground).data.session_uid, tail)
+        if key not in _bake:
+            footprints, about = baked_ground.load(ground)
+            _bake.clear()
+            _bake[key] = footprints, baked_ground.baked_with(about, "rim_reach")
+    except InputError:
+        return (), 0.0
+    return _bake[key]
 
 
 def _line(points: Array, colour: Colour, width: float) -> None:
@@ -245,7 +252,7 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(read_again):
         bpy.app.timers.unregister(read_again)
     _footfalls.cache_clear()
-    _footprints.cache_clear()
+    _bake.clear()
 
 
 CLASSES = (SOFTGROUND_OT_overlay,)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.cell_keys import cells_of, keys_of
 from ..core.contacts import runs
 from ..core.footprints import Footprint
 from ..core.heightfield import Terrain, Window
 from ..core.motion import Sole
 from ..core.outlines import convex_hull
+from ..core.rim import dilate
 from ..core.simulation import CharacterLoads
 from ..core.solids import posed
 
 Array = NDArray[np.float64]
+Cells = NDArray[np.integer[Any]]
+"""Column and row of each cell, (N, 2)."""
 
 BODY_WEIGHT_LENGTH = 0.6
 """Length of the arrow of one body weight, in leg lengths."""
@@ -113,49 +118,60 @@ def arrows(loads: Sequence[CharacterLoads], frame: float) -> Iterator[Arrow]:
                     yield Arrow(kind, foot + place * aside, foot + place * aside + vector)
 
 
-def cells_at(footprints: Sequence[Footprint], frame: float) -> tuple[list[Array], list[Array]]:
-    """Centres of the cells in contact and of those that rise at a frame, one (N, 2) array of each per footprint [m]."""
-    contact, rim = [], []
+def touched_at(footprints: Sequence[Footprint], frame: float) -> Iterator[Cells]:
+    """The cells that each sole touches at a frame."""
     for footprint in footprints:
         if footprint.start_frame - footprint.frame_step <= frame <= footprint.end_frame + footprint.frame_step:
             touched = (footprint.contact_start <= frame) & (frame <= footprint.contact_end)
-            contact.append(_centres(footprint, footprint.contact_cells[touched]))
-            now = np.flatnonzero(np.abs(footprint.rim.frames - frame) < footprint.frame_step / 2)
-            cells = [footprint.rim.cells[footprint.rim.first[k] : footprint.rim.first[k + 1]] for k in now]
-            rim.append(_centres(footprint, np.concatenate([np.empty(0, np.int32), *cells])))
-    return contact, rim
+            row, column = np.divmod(footprint.contact_cells[touched], footprint.window.columns)
+            yield np.stack([column + footprint.window.column, row + footprint.window.row], axis=-1)
 
 
-def changed_cells(window: Window, change: Array, cell_size: float) -> tuple[Array, Array]:
-    """Centres of the cells of a window whose compression and whose rim grew, (N, 2) each [m].
+def marked(window: Window, mask: NDArray[np.bool_]) -> Cells:
+    """The cells of a window that are marked in a mask (rows, columns)."""
+    row, column = np.nonzero(mask)
+    return np.stack([column + window.column, row + window.row], axis=-1)
+
+
+def contact_and_rim(touched: Iterable[Cells], reach: float) -> tuple[Cells, Cells]:
+    """The cells in contact, and those around them that the rim rises on (the paper, Fig. 3).
 
     Parameters
     ----------
-    window : Window
-    change : (2, rows, columns) float array
-        Change of compression and rim [m].
-    cell_size : float
-        Side of a cell [m].
+    touched : iterable of (N, 2) int arrays
+        Column and row of the cells that each sole touches.
+    reach : float
+        Of the rim, in cells.
+
+    Returns
+    -------
+    two (M, 2) int arrays
+        Column and row of each cell, each once.
     """
-    x, y = np.meshgrid(*window.centres(cell_size))
-    compressed = change[0] > 0
-    risen = (change[1] > 0) & ~compressed
-    return np.stack([x[compressed], y[compressed]], -1), np.stack([x[risen], y[risen]], -1)
+    soles = [cells for cells in touched if len(cells)]
+    contact = keys_of(np.concatenate([np.empty((0, 2), np.int64), *soles]))
+    near = keys_of(np.concatenate([np.empty((0, 2), np.int64), *(_near(cells, reach) for cells in soles)]))
+    return cells_of(np.unique(contact)), cells_of(np.setdiff1d(near, contact))
 
 
-def squares(centres: Array, size: float, terrain: Terrain) -> Array:
-    """Two triangles for each cell, (6·N, 3) [m]."""
+def _near(cells: Cells, reach: float) -> Cells:
+    """Cells within reach of some, and these."""
+    corner = cells.min(axis=0) - int(reach) - 1
+    column, row = (cells - corner).T
+    mask = np.zeros((1, row.max() + int(reach) + 2, column.max() + int(reach) + 2), dtype=bool)
+    mask[0, row, column] = True
+    _, row, column = np.nonzero(dilate(mask, reach))
+    return np.stack([column, row], axis=-1) + corner
+
+
+def squares(cells: Cells, size: float, terrain: Terrain) -> Array:
+    """Two triangles for each of the cells (N, 2) of some size [m], (6·N, 3) [m]."""
+    centres = (cells + 0.5) * size
     half = 0.42 * size  # a narrow gap lets the cells be told apart
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]) * half
     places = (centres[:, None] + corners).reshape(-1, 2)
     heights = np.repeat(terrain.heights(centres[:, 0], centres[:, 1]), 6) + LIFT
     return np.column_stack([places, np.nan_to_num(heights)])
-
-
-def _centres(footprint: Footprint, cells: NDArray[np.int32]) -> Array:
-    row, column = np.divmod(cells, footprint.window.columns)
-    place = np.stack([column + footprint.window.column, row + footprint.window.row], axis=-1)
-    return (place + 0.5) * footprint.cell_size
 
 
 def _posed(sole: Sole, transforms: Array) -> Array:

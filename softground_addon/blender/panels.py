@@ -8,7 +8,7 @@ import bpy
 
 from ..core.cell_limits import BYTES_PER_CELL
 from ..core.motion import JOINTS
-from . import analysis, bake_report, baked_ground, ground_mesh, response_job, session, settings
+from . import bake_report, baked_ground, forecast, ground_mesh, response_job, session, settings
 from .character_editing import active_character, active_sole
 from .character_setup import is_set_up, is_thing
 from .translation import iface_
@@ -184,9 +184,9 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
         column.prop(options, "shape_keys")
-        known = analysis.known(settings.scene_of(context))
-        if known:
-            _note(layout, _estimate(known.area, settings.cell_size_of(settings.scene_of(context))))
+        foretold = forecast.of(settings.scene_of(context))
+        if foretold:
+            _note(layout, _estimate(foretold.analysis.area, settings.cell_size_of(settings.scene_of(context))))
 
 
 class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
@@ -207,16 +207,18 @@ class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
         column.prop(material, "stiffness_mpa")
         column.prop(material, "poisson_ratio")
         column.prop(material, "characteristic_time")
-        depth = analysis.expected_depth(scene)
+        foretold = forecast.of(scene)
         row = layout.row(align=True)
-        if depth is None:
+        if foretold is None:
             row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
             return
+        depth = "…" if foretold.depth is None else f"{foretold.depth * 100:.1f} cm"
         split = row.split(factor=0.4)
         split.alignment = "RIGHT"
         split.label(text="Deepest Print")
         row = split.row(align=True)
-        row.operator("softground.match_depth", text=f"{depth * 100:.1f} cm", icon="DRIVER_DISTANCE", translate=False)
+        row.active = foretold.is_current
+        row.operator("softground.match_depth", text=depth, icon="DRIVER_DISTANCE", translate=False)
         row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
 
 
@@ -318,12 +320,14 @@ class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
 def _result(layout: Any, summary: Any) -> None:
     """What the bake that is on the ground came to."""
     box = layout.box().column(align=True)
-    for label, value in (
+    rows = [
         ("Steps", f"{summary['steps']:.0f}"),
         ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
         ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
-        ("Time", f"{summary['seconds']:.1f} s"),
-    ):
+    ]
+    if "seconds" in summary:  # live mode takes none
+        rows.append(("Time", f"{summary['seconds']:.1f} s"))
+    for label, value in rows:
         row = box.split(factor=0.5)
         row.alignment = "RIGHT"
         row.label(text=label)

@@ -12,6 +12,7 @@ from . import (
     cli,
     export_formats,
     force_curves,
+    forecast,
     ground_options_panel,
     handlers,
     live,
@@ -65,6 +66,7 @@ def register() -> None:
         for part in (handlers, overlay, menus):
             part.register()
             undo.callback(part.unregister)
+        undo.callback(forecast.unregister)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())

@@ -100,13 +100,9 @@ class Playhead:
             windows += self._changes[self._shown].windows
         return windows
 
-    def last_change(self) -> list[tuple[Window, Array]]:
-        """Windows that the shown frame changed, each with its change of compression and rim [m]."""
-        change = self._changes[self._shown]
-        return [
-            (window, after - before)
-            for window, before, after in zip(change.windows, change.before, change.after, strict=True)
-        ]
+    def in_contact(self) -> tuple[tuple[Window, NDArray[np.bool_]], ...]:
+        """The cells (rows, columns) of some windows that were in contact since the frame before the shown one."""
+        return self._changes[self._shown].contact
 
     def footprints(self) -> list[Footprint]:
         """The record of the ground that is shown, with the contacts that are under way as they are by now."""

@@ -34,7 +34,11 @@ def recorded(ground, frame, x, y):
     """Displayed height, compression and rim at places, from the record."""
     footprints, about = baked_ground.load(ground)
     whole = PressedGround.at(
-        footprints, frame=frame, frame_rate=24.0, cell_size=0.01, blur_sigma=baked_ground.blur_sigma_of(about)
+        footprints,
+        frame=frame,
+        frame_rate=24.0,
+        cell_size=0.01,
+        blur_sigma=baked_ground.baked_with(about, "blur_sigma"),
     )
     return whole.sample(x, y)
 

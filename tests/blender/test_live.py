@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import baked_ground, ground_mesh, handlers, live
+from softground_addon.blender import bake_report, baked_ground, ground_mesh, handlers, live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 
@@ -114,6 +114,18 @@ def test_keeping_leaves_a_bake_of_the_frames_so_far(live_shot):
     assert heights(live_shot) == pytest.approx(shown, abs=3e-4)
     bpy.ops.softground.clear_bake()
     assert np.abs(heights(live_shot)).max() < LEVEL
+
+
+def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
+    live_shot.frame_set(live_shot.softground.frame_end)
+    bpy.ops.softground.live(keep=True)
+    ground = live_shot.softground.ground
+    kept = ground_mesh.summary_of(ground)
+    assert bake_report.stale_reasons(live_shot) == ()
+    assert bpy.ops.softground.export(filepath=str(tmp_path / "ground.pc2"), format="PC2") == {"FINISHED"}
+    bpy.ops.softground.bake()
+    baked = ground_mesh.summary_of(ground)
+    assert kept == {key: pytest.approx(baked[key]) for key in ("steps", "max_depth_m", "peak_force_n")}
 
 
 def test_a_softer_ground_acts_on_what_follows_only(live_shot):

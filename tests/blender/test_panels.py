@@ -81,6 +81,51 @@ def test_the_depth_to_expect_follows_the_sliders(shot):
     assert analysis.expected_depth(shot) > 0.5 * before
 
 
+def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
+    bpy.ops.softground.predict_depth()
+    known, expected = analysis.known(shot), analysis.expected_depth(shot)
+    bpy.ops.softground.create_ground()
+    bpy.context.view_layer.update()
+    assert analysis.known(shot).stances is known.stances
+    assert analysis.expected_depth(shot) == expected
+
+
+@pytest.mark.parametrize("grounding", [False, True])
+def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding):
+    shot.softground.grounding.use = grounding
+    bpy.ops.softground.predict_depth()
+    known, expected = analysis.known(shot), analysis.expected_depth(shot)
+    for change in (bpy.ops.softground.bake, bpy.ops.softground.bake, bpy.ops.softground.clear_bake):
+        change()
+        bpy.context.view_layer.update()
+        assert analysis.known(shot).stances is known.stances
+        assert analysis.expected_depth(shot) == expected
+
+
+def test_the_depth_to_expect_holds_on_through_live_mode(shot):
+    bpy.ops.softground.predict_depth()
+    known = analysis.known(shot)
+    bpy.ops.softground.live()
+    shot.frame_set(40)
+    bpy.ops.softground.live(keep=True)
+    bpy.context.view_layer.update()
+    assert analysis.known(shot).stances is known.stances
+
+
+def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot):
+    bpy.ops.softground.create_ground()
+    ground = shot.softground.ground
+    analysis.read(shot)
+    ground.location.z += 0.02
+    bpy.context.view_layer.update()
+    assert analysis.known(shot) is None
+    analysis.read(shot)
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.ops.softground.create_ground()
+    assert shot.softground.ground != ground
+    assert analysis.known(shot) is None
+
+
 @pytest.mark.parametrize("depth", [2.0, 6.0])
 @pytest.mark.parametrize("motion", [None, "walk", "run"])
 def test_a_matched_depth_is_met_by_the_bake(scene, motion, depth):

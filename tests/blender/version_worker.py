@@ -36,7 +36,7 @@ def make(blend: str, heights: str) -> None:
         carrier.name = "Carrier"
         rest = ground_mesh.rest_vertices(carrier, 1.0)
         footprints, about = baked_ground.load(ground)
-        sigma = baked_ground.blur_sigma_of(about)
+        sigma = baked_ground.baked_with(about, "blur_sigma")
         recorded = {}
         for frame in (*FRAMES, BETWEEN):
             whole = PressedGround.at(footprints, frame=frame, frame_rate=24.0, cell_size=0.01, blur_sigma=sigma)
