@@ -32,6 +32,9 @@ Mask = NDArray[np.bool_]
 
 HEADING_TIME = 0.25
 """Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""
+SUPPORT_TIME = 0.04
+"""Standard deviation of the smoothing of what holds a body over its support [s], for an adult: a foot loads and
+unloads in about a tenth of a second."""
 RING_WEIGHT = 0.15
 """What a place of the ring around the body counts beside one under a sole that stands."""
 
@@ -180,8 +183,13 @@ def _unmoved(count: int) -> Placement:
 
 def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt: TiltOptions) -> Array:
     slope = along_heading(seen_slope(motion, touching, history), _heading(motion), tilt.lateral)
-    supported = smoothed(touching.any(axis=1).astype(float), 1.0)
-    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=supported)
+    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=_support(motion, touching))
+
+
+def _support(motion: CharacterMotion, touching: Mask) -> Array:
+    """How far something holds the body (F,), from 0 to 1."""
+    width = SUPPORT_TIME * motion.frame_rate * time_scale(motion)
+    return smoothed(touching.any(axis=1).astype(float), width)
 
 
 def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) -> Array:
