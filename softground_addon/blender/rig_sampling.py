@@ -160,15 +160,18 @@ def _evaluate(
     thing_matrices = np.empty((len(frames), len(things), 4, 4))
     armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
     simulated = any(is_simulated(object_named(thing)) for thing in things)
-    source = simulated_scene(scene, int(frames[0])) if simulated else sampling_scene(scene, armature, bones, things)
+    source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, things)
     with source as name:
+        for frame in _simulated_before(scene, int(frames[0])) if simulated else ():
+            with handlers_silent():
+                _still_there(name).frame_set(frame)
+            yield 0
         for done, frame in enumerate(frames):
-            temporary = bpy.data.scenes.get(name)
-            if temporary is None:
-                raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
+            temporary = _still_there(name)
             with handlers_silent(), without_layer(object_named(armature)) if armature else nullcontext():
                 temporary.frame_set(int(frame))
                 depsgraph = temporary.view_layers[0].depsgraph
+                assert depsgraph is not None
                 if armature:
                     evaluated = object_named(armature).evaluated_get(depsgraph)
                     armature_matrices[done] = evaluated.matrix_world
@@ -231,26 +234,34 @@ def is_simulated(thing: bpy.types.Object) -> bool:
 
 
 @contextmanager
-def simulated_scene(scene: bpy.types.Scene, first: int) -> Iterator[str]:
-    """Name of the user's scene, stepped to just before a frame from where its rigid bodies start; back afterwards.
-
-    Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
-    cache.
-    """
+def user_scene(scene: bpy.types.Scene) -> Iterator[str]:
+    """Name of the user's scene, which is put back to its frame afterwards."""
     shown = scene.frame_current, scene.frame_subframe
     name = scene.name
     try:
-        world = scene.rigidbody_world
-        if world and not world.point_cache.is_baked:
-            with handlers_silent():
-                for frame in range(world.point_cache.frame_start, first):
-                    scene.frame_set(frame)
         yield name
     finally:
         left = bpy.data.scenes.get(name)
         if left is not None:
             with handlers_silent():
                 left.frame_set(shown[0], subframe=shown[1])
+
+
+def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
+    """Frames to step through before the first one.
+
+    Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
+    cache.
+    """
+    world = scene.rigidbody_world
+    return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)
+
+
+def _still_there(name: str) -> bpy.types.Scene:
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
+    return scene
 
 
 def object_named(name: str) -> bpy.types.Object:

@@ -205,6 +205,24 @@ def test_a_simulated_rigid_body_falls_where_blender_drops_it(scene):
     assert step["peak_force_n"] == pytest.approx(7 * (9.81 + np.sqrt(2 * 9.81 * 1.25) / 0.2), rel=0.15)
 
 
+def test_rigid_bodies_are_stepped_to_a_late_start_a_frame_at_a_time(scene):
+    """Blender answers its user between the frames that lead up to the shot, and is put back when it is left early."""
+    bpy.ops.object.select_all(action="DESELECT")
+    thing = ball(location=(0.0, 0.0, 50.0))
+    bpy.ops.rigidbody.object_add()
+    add_things(scene, [thing])
+    scene.softground.frame_start, scene.softground.frame_end = 30, 40
+    scene.frame_set(5)
+    reading, shown = read_shot(scene), []
+    for _ in reading:
+        shown.append(scene.frame_current)
+        if scene.frame_current == 32:
+            break
+    reading.close()
+    assert sorted(set(shown)) == list(range(1, 33))
+    assert scene.frame_current == 5
+
+
 def test_wheels_on_one_frame_are_one_thing_and_share_its_mass(scene):
     parent = bpy.data.objects.new("Bicycle", None)
     scene.collection.objects.link(parent)
