@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import bpy
 import numpy as np
@@ -100,50 +101,53 @@ def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
 
 
 def _upper_body(skeleton: _Skeleton, hips: int, left: Array) -> Joints:
-    """Spine, neck, head and arms of a figure on two legs: the mirrored limbs that part highest, and what is above."""
-    leaves = [
-        leaf
-        for leaf in skeleton.leaves
-        if hips in (chain := skeleton.chain(leaf))
-        and leaf != hips
-        and skeleton.heads[chain, 2].max() > skeleton.heads[hips, 2] + _LOW * skeleton.height
-    ]
-    leaves.sort(key=lambda leaf: -abs(float((skeleton.heads[leaf] - skeleton.heads[hips]) @ left)))
-    chains = [skeleton.chain(leaf) for leaf in leaves[:_WIDEST]]
-    arms: list[tuple[float, int, _Pair]] = []
-    for i, first in enumerate(chains):
-        for second in chains[i + 1 :]:
-            fork = _shared_length(first, second)
-            pair = first[fork:], second[fork:]
-            if fork and len(pair[0]) == len(pair[1]) >= 2 and _are_mirrored(skeleton, *pair):
-                arms.append((float(sum(skeleton.lengths(pair[0]))), fork, pair))
-    if not arms:
+    """Spine, neck, head and arms of a figure on two legs: longest mirrored limbs above the hips, what is on top."""
+    pairs = _mirrored_pairs(skeleton, _reaching_up(skeleton, hips, left))
+    if not pairs:
         return {}
-    _, fork, pair = max(arms)
+    arms = max(pairs, key=lambda pair: sum(skeleton.lengths(pair[0])))
     joints: Joints = {}
-    chest = skeleton.chain(pair[0][0])[:-1]
-    for arm, side in zip(sorted(pair, key=lambda arm: -float(skeleton.heads[arm[-1]] @ left)), "lr", strict=True):
-        lengths = skeleton.lengths(arm)
-        upper = max(range(len(arm) - 1), key=lambda place: min(lengths[place], lengths[place + 1]))
-        joints[f"shoulder_{side}"] = (skeleton.names[arm[upper]], "head")
-        joints[f"elbow_{side}"] = (skeleton.names[arm[upper + 1]], "head")
-        wrist = (arm[upper + 2], "head") if upper + 2 < len(arm) else (arm[upper + 1], "tail")
-        joints[f"wrist_{side}"] = (skeleton.names[wrist[0]], wrist[1])
-    above = [
-        leaf
-        for leaf in skeleton.leaves
-        if chest[-1] in skeleton.chain(leaf) and not {leaf, *skeleton.chain(leaf)} & {*pair[0], *pair[1]}
-    ]
+    for arm, side in zip(sorted(arms, key=lambda arm: -float(skeleton.heads[arm[-1]] @ left)), "lr", strict=True):
+        joints |= _arm_joints(skeleton, arm, side)
+    chest = skeleton.chain(arms[0][0])[:-1]
+    above = [chain for leaf in skeleton.leaves if chest[-1] in (chain := skeleton.chain(leaf))]
+    above = [chain for chain in above if not {*chain} & {*arms[0], *arms[1]}]
     if above:
-        top = skeleton.chain(max(above, key=lambda leaf: max(skeleton.heads[leaf, 2], skeleton.tails[leaf, 2])))
-        neck = top[len(chest) :]
-        joints["neck"] = (skeleton.names[neck[0]], "head")
-        if len(neck) > 1:
-            lengths = skeleton.lengths(neck)
-            head = max(range(1, len(neck)), key=lambda place: lengths[place])
-            joints["head"] = (skeleton.names[neck[head]], "head")
+        top = max(above, key=lambda chain: max(skeleton.heads[chain[-1], 2], skeleton.tails[chain[-1], 2]))
+        joints |= _neck_joints(skeleton, top[len(chest) :])
     if hips in chest and chest[-1] != hips:
         joints["spine"] = (skeleton.names[chest[chest.index(hips) + 1]], "head")
+    return joints
+
+
+def _reaching_up(skeleton: _Skeleton, hips: int, left: Array) -> list[list[int]]:
+    """Chains from the root through the hips to well above them, those first that end the farthest to the sides."""
+    chains = [chain for leaf in skeleton.leaves if leaf != hips and hips in (chain := skeleton.chain(leaf))]
+    level = skeleton.heads[hips, 2] + _LOW * skeleton.height
+    chains = [chain for chain in chains if skeleton.heads[chain, 2].max() > level]
+    chains.sort(key=lambda chain: -abs(float((skeleton.heads[chain[-1]] - skeleton.heads[hips]) @ left)))
+    return chains[:_WIDEST]
+
+
+def _arm_joints(skeleton: _Skeleton, arm: Sequence[int], side: str) -> Joints:
+    """Shoulder, elbow and wrist: its two longest bones that follow each other are the upper arm and the forearm."""
+    lengths = skeleton.lengths(arm)
+    upper = max(range(len(arm) - 1), key=lambda place: min(lengths[place], lengths[place + 1]))
+    wrist = (arm[upper + 2], "head") if upper + 2 < len(arm) else (arm[upper + 1], "tail")
+    return {
+        f"shoulder_{side}": (skeleton.names[arm[upper]], "head"),
+        f"elbow_{side}": (skeleton.names[arm[upper + 1]], "head"),
+        f"wrist_{side}": (skeleton.names[wrist[0]], wrist[1]),
+    }
+
+
+def _neck_joints(skeleton: _Skeleton, neck: Sequence[int]) -> Joints:
+    """Neck and head: the head is the longest bone after the first."""
+    joints: Joints = {"neck": (skeleton.names[neck[0]], "head")}
+    if len(neck) > 1:
+        lengths = skeleton.lengths(neck)
+        head = max(range(1, len(neck)), key=lambda place: lengths[place])
+        joints["head"] = (skeleton.names[neck[head]], "head")
     return joints
 
 
@@ -166,21 +170,22 @@ def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
 
 def _mirrored_legs(skeleton: _Skeleton) -> list[_Pair]:
     """Pairs of chains, from below where they part to the lowest bones; the lowest and longest pair first."""
-    has_child = {parent for parent in skeleton.parents if parent >= 0}
     floor = min(skeleton.heads[:, 2].min(), skeleton.tails[:, 2].min())
     limit = floor + _LOW * skeleton.height
     lowest = np.minimum(skeleton.heads[:, 2], skeleton.tails[:, 2])
-    low_leaves = [b for b in range(len(skeleton.names)) if b not in has_child and lowest[b] < limit]
-    chains = [skeleton.chain(leaf) for leaf in low_leaves]
+    chains = [skeleton.chain(leaf) for leaf in skeleton.leaves if lowest[leaf] < limit]
+    return _one_per_limb(skeleton, _mirrored_pairs(skeleton, chains))
 
+
+def _mirrored_pairs(skeleton: _Skeleton, chains: Sequence[list[int]]) -> list[_Pair]:
+    """Pairs of chains that are mirror images from below where they part."""
     pairs: list[_Pair] = []
-    for i, first in enumerate(chains):
-        for second in chains[i + 1 :]:
-            fork = _shared_length(first, second)
-            left, right = first[fork:], second[fork:]
-            if fork and len(left) == len(right) >= 2 and _are_mirrored(skeleton, left, right):
-                pairs.append((left, right))
-    return _one_per_limb(skeleton, pairs)
+    for first, second in combinations(chains, 2):
+        fork = _shared_length(first, second)
+        left, right = first[fork:], second[fork:]
+        if fork and len(left) == len(right) >= 2 and _are_mirrored(skeleton, left, right):
+            pairs.append((left, right))
+    return pairs
 
 
 def _shared_length(first: Sequence[int], second: Sequence[int]) -> int:
