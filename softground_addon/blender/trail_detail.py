@@ -1,6 +1,7 @@
 """Detail along the trail: where the ground is coarse, a copy of it that is fine under the prints takes them.
 
-The user's ground is hidden and otherwise left alone; removing the copy shows it again.
+The user's ground is hidden and otherwise left alone; removing the copy shows it again. While it is hidden, the copy is
+selected and active in its place.
 """
 
 from __future__ import annotations
@@ -101,6 +102,7 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
         ground[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
     for collection in ground.users_collection:
         collection.objects.link(draft)
+    _choose_instead(draft, ground)
     ground.hide_viewport = ground.hide_render = True
     return draft
 
@@ -113,11 +115,23 @@ def remove(ground: bpy.types.Object) -> None:
     detail = detail_of(ground)
     if detail is None:
         return
+    _choose_instead(ground, detail)
     playback.remove(detail)
     mesh: Any = detail.data
     bpy.data.objects.remove(detail)
     if not mesh.users:
         bpy.data.meshes.remove(mesh)
+
+
+def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:
+    """Select one object, and make it the active one, wherever the other is that."""
+    for scene in gone.users_scene:
+        for layer in scene.view_layers:
+            layer.update()  # an object that has just come in, or was hidden, cannot be selected yet
+            if gone.name in layer.objects and shown.name in layer.objects:
+                shown.select_set(gone.select_get(view_layer=layer), view_layer=layer)
+                if layer.objects.active == gone:
+                    layer.objects.active = shown
 
 
 def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:

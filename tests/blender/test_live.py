@@ -221,7 +221,6 @@ def coarse_shot(scene):
     bpy.ops.softground.add_character()
     bpy.ops.mesh.primitive_plane_add(size=20.0)
     scene.softground.ground = bpy.context.object
-    bpy.context.object.select_set(False)  # Blender lets go of what is hidden
     scene.frame_set(1)
     bpy.context.view_layer.update()
     yield scene

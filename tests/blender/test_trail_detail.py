@@ -7,6 +7,7 @@ import pytest
 from softground_addon.blender import ground_mesh, refined_mesh, trail_detail
 from softground_addon.core.refinement import Region, refine
 from tests.blender import fingerprints
+from tests.blender.shots import walker
 
 
 def region(cell_size=0.02):
@@ -243,6 +244,50 @@ def test_the_original_is_hidden_and_comes_back(scene):
     assert trail_detail.detail_of(ground) == detail
     trail_detail.remove(ground)
     assert fingerprints.of_file() == before
+
+
+@pytest.mark.parametrize("selected", [True, False])
+@pytest.mark.parametrize("active", [True, False])
+def test_the_copy_is_selected_and_active_as_the_ground_was_and_gives_it_back(scene, selected, active):
+    ground = coarse_ground(scene)
+    other = bpy.data.objects.new("Other", None)
+    scene.collection.objects.link(other)
+    layers = scene.view_layers[0], scene.view_layers.new("Second")
+    for layer in layers:
+        layer.update()
+    ground.select_set(selected, view_layer=layers[0])
+    ground.select_set(not selected, view_layer=layers[1])
+    layers[0].objects.active = ground if active else other
+
+    def state(thing):
+        return [(thing.select_get(view_layer=layer), layer.objects.active == thing) for layer in layers]
+
+    before = state(ground)
+    detail = refined(ground)
+    assert state(detail) == before
+    assert refined(ground, 0.04, region(0.04)) == detail
+    assert state(detail) == before
+    trail_detail.remove(ground)
+    for layer in layers:
+        layer.update()
+    assert state(ground) == before
+
+
+def test_a_bake_on_a_fine_copy_and_its_end_leave_selection_and_active_object(scene):
+    walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    ground = scene.softground.ground = bpy.context.object
+    scene.objects["Walker"].select_set(True)
+    chosen = set(bpy.context.selected_objects)
+    bpy.ops.softground.bake()
+    copy = trail_detail.detail_of(ground)
+    assert bpy.context.active_object == copy
+    assert set(bpy.context.selected_objects) == chosen - {ground} | {copy}
+    bpy.ops.softground.clear_bake()
+    bpy.context.view_layer.update()
+    assert bpy.context.active_object == ground
+    assert set(bpy.context.selected_objects) == chosen
 
 
 def test_another_trail_reuses_the_copy(scene):
