@@ -39,6 +39,11 @@ def warnings(
     """What the user should know of the footprints, with the remedy; the ground by its name."""
     found = []
     for character in loads:
+        if character.motion.centre is None and character.motion.stands_still:
+            found.append(
+                f"'{character.motion.name}' does not move in these frames: look whether its action has keys in them, "
+                "is assigned with its slot, and is not muted."
+            )
         missed = missed_steps(character.motion, character.contacts)
         if missed:
             found.append(advice(character.motion.name, missed, f"'{ground}'"))

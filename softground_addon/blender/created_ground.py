@@ -22,7 +22,8 @@ MAX_GRID_VERTICES = 4_000_000
 """Most vertices that a created grid gets; a longer walk gets a coarser mesh (the physics keeps its cells)."""
 
 COARSEST = 0.4
-"""Side of the largest faces at most, far from the trail [m]: what follows vertices, such as paint, still has some."""
+"""Side of the largest faces, far from the trail [m]: what follows vertices, such as paint, still has some. Larger only
+where so many would exceed `MAX_GRID_VERTICES`, as between characters that are kilometres apart."""
 
 BLUR_REACH = 3.0
 """How far the display blur carries, in standard deviations."""
@@ -140,5 +141,8 @@ def _graded(plan: GroundPlan, cell_size: float, reach: float) -> tuple[GradedGri
     while len(fine) * 4**level > MAX_GRID_VERTICES:
         spacing *= 2
         fine, level = plan.fine_blocks(spacing, reach)
+    lower, upper = corners(spacing)
     coarsest = max(level, int(np.floor(np.log2(max(COARSEST / spacing, 1.0)))))
-    return graded_grid(fine, level, *corners(spacing), coarsest), spacing
+    while np.prod((upper - lower) / 2.0**coarsest) > MAX_GRID_VERTICES:
+        coarsest += 1
+    return graded_grid(fine, level, lower, upper, coarsest), spacing

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 SIMULATION_RATE = 120.0
 """Lowest rate of the internal time grid, in Hz: at 24, 30, 60 and 120 fps the steps fall on the same instants."""
 
+STILL = 1e-6
+"""What moves less does not move, in leg lengths: positions come in single precision."""
+
 _LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
 
 JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
@@ -186,6 +189,12 @@ class CharacterMotion:
     def time_step(self) -> float:
         """Time between samples [s]."""
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether no joint and no sole moves from sample to sample."""
+        paths = (*self.joints.values(), *(sole.transforms for sole in self.soles))
+        return all(np.allclose(path, path[:1], rtol=0.0, atol=STILL * self.leg_length) for path in paths)
 
     @property
     def hips(self) -> Array:

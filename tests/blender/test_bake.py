@@ -8,6 +8,7 @@ import pytest
 
 from softground_addon.blender import bake_job, baked_ground, ground_mesh
 from softground_addon.blender.character_setup import set_up_automatically
+from softground_addon.blender.compat import action_curves
 from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core import record
 from softground_addon.core.errors import InputError
@@ -92,6 +93,14 @@ def test_a_mass_or_cells_that_do_not_suit_the_size_of_the_body_are_pointed_out(w
     mass, cells = sorted(bake(walk).report["warnings"])
     assert "weighs 3 kg" in mass
     assert "cells long: set the cell size to 0.01" in cells
+
+
+def test_a_character_that_does_not_move_is_pointed_out(walk):
+    for curve in action_curves(walk.softground.characters[0].armature.animation_data.action):
+        curve.mute = True
+    (still,) = [warning for warning in bake(walk).report["warnings"] if "does not move" in warning]
+    assert "'Walker'" in still
+    assert "muted" in still
 
 
 def test_baking_again_gives_the_same_ground_and_not_twice_the_depth(walk):

@@ -62,6 +62,16 @@ def test_an_absurdly_large_grid_is_made_coarser_instead_of_filling_the_memory(sc
     assert len(created_ground.lay_out(plan, 0.01, 1.0).vertices) < 11_000
 
 
+def test_a_ground_for_walks_that_are_far_apart_does_not_fill_the_memory(monkeypatch):
+    monkeypatch.setattr(created_ground, "MAX_GRID_VERTICES", 10_000)
+    footfalls = np.array([[0.0, 0.0], [400.0, 300.0]])
+    plan = GroundPlan(np.full(2, -1.0), np.array([401.0, 301.0]), FlatTerrain(), footfalls, 0.05)
+    vertices = created_ground.lay_out(plan, 0.01, 1.0).vertices
+    assert len(vertices) < 20_000
+    for place in footfalls:
+        assert (np.abs(vertices[:, :2] - place).max(axis=1) < 0.04).sum() == 64, "cells of 1 cm under the feet"
+
+
 @pytest.mark.parametrize("transform", ["plain", "tilted", "scaled", "mirrored", "parented"])
 def test_vertices_move_along_world_z_whatever_the_objects_transform(scene, transform):
     ground = grid(scene)

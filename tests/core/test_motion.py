@@ -1,5 +1,7 @@
 """The motion that crosses from Blender into the core, and its resampling to the internal time grid."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,21 @@ def test_resampled_poses_are_rigid_and_on_the_true_path():
 )
 def test_a_step_is_at_most_a_120th_of_a_second(rate, steps):
     assert motion.steps_per_frame(rate) == steps
+
+
+def test_somebody_who_only_nods_does_not_stand_still():
+    walking = rolling_sole(30, 30.0)
+    assert not walking.stands_still
+    path = np.ones((30, 3))
+    standing = walking.soles[0].transforms[:1].repeat(30, axis=0)
+    still = dataclasses.replace(
+        walking,
+        soles=(motion.SoleMotion(walking.soles[0].sole, standing),),
+        joints={"hips": path, "head": path.copy()},
+    )
+    assert still.stands_still
+    still.joints["head"][7, 2] += 0.01
+    assert not still.stands_still
 
 
 def test_the_hips_are_between_the_hip_joints_where_they_are_not_mapped():
