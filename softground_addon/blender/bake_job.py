@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..core import record, report
 from ..core.cell_limits import check_cell_size
 from ..core.footprints import Footprint
+from ..core.heightfield import Terrain
 from ..core.polylines import polylines_at
 from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
@@ -186,19 +187,13 @@ def _write(
             cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
             place = baked_ground.on_itself(ground, index, vertices)
             if wants_detail(ground, cover, options.detail, cell_size, loads):
-                surface = trail_detail.surface_of(ground, unit_scale)
-                region = trail_detail.region_of(pressed)
-                refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
-                mesh = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
-                yield Progress("write", 0.4)
-                fine = refinement.vertices(surface)
-                index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, fine, pressed, shot.terrain)
-                place = baked_ground.on_detail(ground, mesh, index, fine)
+                place = yield from _detail(drafts, ground, pressed, shot.terrain, cell_size, unit_scale)
             warnings += coverage_warnings(ground, cover, options.detail, cell_size)
         input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
         stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
         across = place.position[:, :2].T
         sample = yield from aside("write", 0.6, pressed.sample, *across)
+        del pressed  # the cells take as much memory as what is still to come
         over_time = yield from aside("write", 0.7, partial(polylines_at, footprints, *across, blur_sigma=blur_sigma))
         marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
         yield Progress("write", 0.9)
@@ -214,6 +209,25 @@ def _write(
         )
         ground_mesh.write_soles(carrier, place.index, marks)
     return _Written(ground, carrier, input_hash, over_time.error, warnings)
+
+
+def _detail(
+    drafts: ExitStack,
+    ground: bpy.types.Object,
+    pressed: PressedGround,
+    terrain: Terrain,
+    cell_size: float,
+    unit_scale: float,
+) -> Job[baked_ground.Place]:
+    """A draft of the ground refined along the trail, as the place for a bake."""
+    surface = trail_detail.surface_of(ground, unit_scale)
+    region = trail_detail.region_of(pressed)
+    refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
+    draft = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
+    yield Progress("write", 0.4)
+    vertices = refinement.vertices(surface)
+    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, pressed, terrain)
+    return baked_ground.on_detail(ground, draft, index, vertices)
 
 
 def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:

@@ -30,6 +30,9 @@ LAYOUT = {
 }
 """How values of each type are read in bulk: property, numbers per element, type. Texts stay behind."""
 
+AT_ONCE = 1 << 16
+"""Triangles that are worked on together: there may be millions, and they are worked on in double precision."""
+
 NOT_COPIED = ("position", "custom_normal")
 """Positions are made first; custom normals are coded against the faces around, which have changed."""
 SEAM = ".uv_seam"
@@ -72,13 +75,13 @@ def build(
     kept = refinement.kept_faces
     size = np.diff(surface.face_start)
     kept_corners = _runs(surface.face_start[kept], size[kept])
-    corner_vertex = np.concatenate([surface.corner_vertex[kept_corners], refinement.triangles.ravel()])
+    corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.triangles.ravel()])
     face_size = np.concatenate([size[kept], np.full(len(refinement.triangles), 3)])
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     _add_loose_edges(mesh, source)
     mesh.loops.add(len(corner_vertex))
-    mesh.loops.foreach_set("vertex_index", corner_vertex.astype(np.int32))
+    mesh.loops.foreach_set("vertex_index", corner_vertex)
     mesh.polygons.add(len(face_size))
     mesh.polygons.foreach_set("loop_start", (np.cumsum(face_size) - face_size).astype(np.int32))
     _copy_positions(mesh, source, surface, refinement)
@@ -92,11 +95,9 @@ def build(
             continue
         values = _values(attribute)
         if attribute.domain == "POINT":
-            new = _between(values, *refinement.vertex_sources(surface))
-            values = np.concatenate([values, new])
+            values = np.concatenate([values, _at_new_vertices(values, surface, refinement)])
         elif attribute.domain == "CORNER":
-            corners = np.repeat(refinement.corners, 3, axis=0)
-            new = _between(values, corners, refinement.weights.reshape(-1, 3))
+            new = _between(values, refinement.corners, refinement.weights)
             values = np.concatenate([values[kept_corners], new])
         elif attribute.domain == "FACE":
             values = values[np.concatenate([kept, refinement.face])]
@@ -138,17 +139,28 @@ def _comes_along(name: str) -> bool:
 
 def _copy_positions(mesh: bpy.types.Mesh, source: bpy.types.Mesh, surface: Surface, refinement: Refinement) -> None:
     positions = _values(source.attributes["position"])
-    new = _between(positions, *refinement.vertex_sources(surface))
     data = cast("Any", mesh.attributes["position"]).data
-    data.foreach_set("vector", np.concatenate([positions, new]).ravel())
+    data.foreach_set("vector", np.concatenate([positions, _at_new_vertices(positions, surface, refinement)]).ravel())
+
+
+def _at_new_vertices(values: NDArray[Any], surface: Surface, refinement: Refinement) -> NDArray[Any]:
+    sources, weights = refinement.vertex_sources(surface)
+    return _between(values, sources, weights[:, None])
 
 
 def _between(values: NDArray[Any], sources: Indices, weights: NDArray[np.float32]) -> NDArray[Any]:
-    """Values in between: interpolated where they are real numbers, else those of the source with the largest weight."""
+    """Values at C places each among N times three sources (N, 3), with weights (N, C, 3), one after the other.
+
+    Real numbers are interpolated, of others that of the source with the largest weight is taken.
+    """
     if values.dtype != np.float32:
-        return values[np.take_along_axis(sources, weights.argmax(axis=1)[:, None], axis=1)[:, 0]]
-    mixed = np.einsum("nk,nk...->n...", weights.astype(np.float64), values[sources].astype(np.float64))
-    return mixed.astype(np.float32)
+        return values[np.take_along_axis(sources, weights.argmax(axis=-1), axis=1).ravel()]
+    mixed = np.empty((*weights.shape[:2], *values.shape[1:]), dtype=np.float32)
+    for first in range(0, len(sources), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        given = values[sources[part]].astype(np.float64)
+        mixed[part] = np.einsum("nck,nk...->nc...", weights[part].astype(np.float64), given)
+    return mixed.reshape(-1, *values.shape[1:])
 
 
 def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:

@@ -74,6 +74,7 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
     with ground_mesh.undisturbed_copy(ground) as source:
         groups = [group.name for group in ground.vertex_groups]
         mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
+    del surface, refinement  # they may be large, and the draft is there for long
     detail = ground.copy()
     detail.name = f"{ground.name} Trail"
     detail.modifiers.clear()

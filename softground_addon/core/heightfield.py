@@ -24,6 +24,9 @@ Indices = NDArray[np.intp]
 TILE = 32
 """Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""
 
+PLACES_AT_ONCE = 1 << 16
+"""Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
+
 STEEPEST_CELL = np.tan(np.radians(60.0))
 """Slope of the steepest cell that takes a print: more is a wall."""
 
@@ -188,7 +191,14 @@ class SparseGrid:
     def sample(self, x: Array, y: Array) -> Array:
         """Values at world positions of any shape, bilinear between cell centres: (channels, ...)."""
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        column, row = x.ravel() / self.cell_size - 0.5, y.ravel() / self.cell_size - 0.5
+        values = np.empty((self.channels, x.size))
+        for first in range(0, x.size, PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            values[:, part] = self._between(x.ravel()[part], y.ravel()[part])
+        return values.reshape(self.channels, *x.shape)
+
+    def _between(self, x: Array, y: Array) -> Array:
+        column, row = x / self.cell_size - 0.5, y / self.cell_size - 0.5
         left, low = np.floor(column), np.floor(row)
         u, v = column - left, row - low
         left, low = left.astype(int), low.astype(int)
@@ -196,7 +206,7 @@ class SparseGrid:
         below, below_right, above, above_right = np.split(around, 4, axis=1)
         values = (below * (1 - u) + below_right * u) * (1 - v)
         values += (above * (1 - u) + above_right * u) * v
-        return values.reshape(self.channels, *x.shape)
+        return values
 
     def nearest(self, x: Array, y: Array) -> Array:
         """Values of the cells that hold the world positions of any shape: (channels, ...)."""
@@ -218,8 +228,12 @@ class SparseGrid:
         slot = np.minimum(np.searchsorted(order, wanted), len(keys) - 1)
         known = (order[slot] == wanted) & (tile >= 0).all(axis=-1) & (tile < span).all(axis=-1)
         values = np.full((self.channels, column.size), self.fill)
-        stack = np.stack([self.tiles[key] for key in keys])
-        values[:, known] = stack[slot[known], :, row[known] % TILE, column[known] % TILE].T
+        used = np.zeros(len(keys), dtype=bool)
+        used[slot[known]] = True
+        if used.any():
+            stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()])
+            place = (np.cumsum(used) - 1)[slot[known]]
+            values[:, known] = stack[place, :, row[known] % TILE, column[known] % TILE].T
         return values
 
 

@@ -24,6 +24,8 @@ from .triangles import enumerated
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Numbers = NDArray[np.int32]
+"""Of vertices, edges and triangles, of which meshes hold no more either: there are many while they are cut."""
 Mask = NDArray[np.bool_]
 
 COARSEST_LEG = 2.0**0.25
@@ -134,11 +136,11 @@ class Refinement:
     """
 
     kept_faces: Indices
-    triangles: Indices
-    face: Indices
-    corners: Indices
+    triangles: Numbers
+    face: Numbers
+    corners: Numbers
     weights: NDArray[np.float32]
-    new_vertex: Indices
+    new_vertex: Numbers
     edges: Indices
     edge_of: Indices
 
@@ -229,10 +231,11 @@ def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
 
 
 def _longest(points: Array, triangles: Indices) -> Array:
-    corner = points[triangles]
-    side = corner - np.roll(corner, 1, axis=1)
-    longest: Array = np.sqrt(np.einsum("tki,tki->tk", side, side)).max(axis=1, initial=0.0)
-    return longest
+    longest = np.zeros(len(triangles))
+    for corner in range(3):
+        side = points[triangles[:, corner]] - points[triangles[:, corner - 1]]
+        np.maximum(longest, np.einsum("ni,ni->n", side, side), out=longest)
+    return np.sqrt(longest)
 
 
 def _along_curve(place: Array) -> NDArray[np.int64]:
@@ -247,11 +250,16 @@ def _along_curve(place: Array) -> NDArray[np.int64]:
     return code
 
 
-def _edges(corner: Indices, points: int) -> tuple[Indices, Indices]:
+def _edges(corner: Numbers, points: int) -> tuple[Numbers, Numbers]:
     """Edges of triangles, (E, 2) in ascending order, and those opposite each triangle's corners, (T, 3)."""
     ends = np.sort(np.stack([np.roll(corner, -1, axis=1), np.roll(corner, 1, axis=1)], axis=-1), axis=-1)
     keys, edge = np.unique(ends.reshape(-1, 2) @ (points, 1), return_inverse=True)
-    return np.stack(np.divmod(keys, max(points, 1)), axis=-1), edge.reshape(-1, 3)
+    pairs = np.stack(np.divmod(keys, max(points, 1)), axis=-1)
+    return pairs.astype(np.int32), edge.reshape(-1, 3).astype(np.int32)
+
+
+def _count(many: int, first: int = 0) -> Numbers:
+    return np.arange(first, first + many, dtype=np.int32)
 
 
 class _Bisection:
@@ -263,12 +271,12 @@ class _Bisection:
     def __init__(self, vertices: Array, triangles: Indices, parts: int = 1, grain: float = 1.0) -> None:
         self.vertex, local = np.unique(triangles, return_inverse=True)
         self.points = vertices[self.vertex]
-        self.corner = local.reshape(-1, 3)
+        self.corner: Numbers = local.reshape(-1, 3).astype(np.int32)
         self.ends, self.edge = _edges(self.corner, len(self.vertex))
-        self.root = np.arange(len(self.ends))
-        self.half = np.full(len(self.ends), -1)
-        self.middle = np.full(len(self.ends), -1)
-        self.source = np.arange(len(triangles))
+        self.root = _count(len(self.ends))
+        self.half = np.full(len(self.ends), -1, dtype=np.int32)
+        self.middle = np.full(len(self.ends), -1, dtype=np.int32)
+        self.source = _count(len(triangles))
         self.weight = np.tile(np.eye(3, dtype=np.float32), (len(triangles), 1, 1))
         self._roots = self.ends
         if parts > 1:
@@ -282,14 +290,15 @@ class _Bisection:
     def _cut_evenly(self, count: int, grain: float) -> None:
         """Cut all triangles into equal parts."""
         parts = equal_parts(self.points, self.corner, self.edge, self.ends, count, grain)
-        self.points, self.corner, self.source, self.weight = parts.points, parts.corner, parts.source, parts.weight
+        self.points, self.weight = parts.points, parts.weight
+        self.corner, self.source = parts.corner.astype(np.int32), parts.source.astype(np.int32)
         ends, edge = _edges(self.corner, len(self.points))
         pieces = np.sort(parts.pieces.reshape(-1, 2), axis=1) @ (len(self.points), 1)
-        root = np.full(len(ends), -1)
+        root = np.full(len(ends), -1, dtype=np.int32)
         root[np.searchsorted(ends @ (len(self.points), 1), pieces)] = np.repeat(self.root, count)
         pieces_from = self._add_edges(ends, root)[0]
         self.half[: len(self._roots)] = pieces_from  # whichever: no triangle has a whole edge any more
-        self.edge = len(self._roots) + edge
+        self.edge = np.int32(len(self._roots)) + edge
 
     def run(self, region: Region, leg: float) -> None:
         """Cut until no triangle with a longer leg reaches into the region."""
@@ -316,18 +325,19 @@ class _Bisection:
 
     def _cut_edges(self, edges: Indices) -> None:
         ends = self.ends[edges]
-        middle = len(self.points) + np.arange(len(edges))
+        middle = _count(len(edges), len(self.points))
         self.points = np.concatenate([self.points, (self.points[ends[:, 0]] + self.points[ends[:, 1]]) / 2])
         self.middle[edges] = middle
         halves = np.stack([ends, np.stack([middle, middle], axis=-1)], axis=-1).reshape(-1, 2)
         self.half[edges] = self._add_edges(halves, np.repeat(self.root[edges], 2))[::2]
 
-    def _add_edges(self, ends: Indices, root: Indices) -> Indices:
-        first = len(self.ends)
+    def _add_edges(self, ends: Numbers, root: Numbers) -> Numbers:
+        added = _count(len(ends), len(self.ends))
+        none = np.full(len(ends), -1, dtype=np.int32)
         self.ends = np.concatenate([self.ends, ends])
         self.root = np.concatenate([self.root, root])
-        self.half, self.middle = (np.concatenate([of, np.full(len(ends), -1)]) for of in (self.half, self.middle))
-        return first + np.arange(len(ends))
+        self.half, self.middle = (np.concatenate([of, none]) for of in (self.half, self.middle))
+        return added
 
     def _cut_triangles(self) -> Indices:
         """Cut every triangle whose base is cut, and again where a part's base is; returns the parts."""
@@ -345,7 +355,7 @@ class _Bisection:
         apex, left, right = self.corner[triangles].T
         base, by_right, by_left = self.edge[triangles].T  # edges opposite apex, left and right
         middle = self.middle[base]
-        across = self._add_edges(np.stack([apex, middle], axis=-1), np.full(len(triangles), -1))
+        across = self._add_edges(np.stack([apex, middle], axis=-1), np.full(len(triangles), -1, dtype=np.int32))
         at_left = self.half[base] + (self.ends[base, 0] != left)
         at_right = self.half[base] + (self.ends[base, 0] != right)
         weight = self.weight[triangles]
@@ -374,19 +384,19 @@ class _Bisection:
         ours = ours[np.argsort(place[self.corner[ours]].min(axis=1), kind="stable")]
         corner = self.corner[ours]
         by_place = given + np.argsort(place[given:], kind="stable")
-        vertex = np.empty(len(self.points), dtype=np.intp)
+        vertex = np.empty(len(self.points), dtype=np.int32)
         vertex[:given] = self.vertex
-        vertex[by_place] = len(surface.vertices) + np.arange(len(by_place))
-        first = np.zeros(len(self.points), dtype=np.intp)
-        first[corner.ravel()[::-1]] = np.arange(corner.size)[::-1]
+        vertex[by_place] = _count(len(by_place), len(surface.vertices))
+        first = np.zeros(len(self.points), dtype=np.int32)
+        first[corner.ravel()[::-1]] = _count(corner.size)[::-1]
         leaf = np.flatnonzero((self.half < 0) & (self.root >= 0) & (np.arange(len(self.ends)) >= len(self._roots)))
         return Refinement(
             kept_faces=np.flatnonzero(~changed),
             triangles=vertex[corner],
-            face=face[self.source[ours]],
-            corners=surface.triangle_corners[chosen[self.source[ours]]],
+            face=face[self.source[ours]].astype(np.int32),
+            corners=surface.triangle_corners[chosen].astype(np.int32)[self.source[ours]],
             weights=self.weight[ours],
             new_vertex=first[by_place],
-            edges=vertex[self.ends[leaf]],
+            edges=vertex[self.ends[leaf]].astype(np.intp),
             edge_of=self.vertex[self._roots[self.root[leaf]]],
         )

@@ -17,6 +17,9 @@ Indices = NDArray[np.intp]
 UPWARD = 0.05
 """Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
 
+PLACES_AT_ONCE = 1 << 16
+"""Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
+
 SAME_LAYER = 1e-3
 """Surfaces over one place that are closer than this are one [m]."""
 
@@ -111,9 +114,12 @@ class MeshTerrain:
 
     def heights(self, x: Array, y: Array) -> Array:
         """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
-        hits = self._surfaces(np.ravel(x), np.ravel(y))
+        across, along = np.ravel(x), np.ravel(y)
         highest = np.full(np.size(x), -np.inf)
-        np.maximum.at(highest, hits.point, hits.z)
+        for first in range(0, len(highest), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            np.maximum.at(highest[part], hits.point, hits.z)
         return np.where(np.isinf(highest), np.nan, highest).reshape(np.shape(x))
 
     def interpolated(self, x: Array, y: Array) -> Array:

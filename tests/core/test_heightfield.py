@@ -1,12 +1,22 @@
 """The sparse height field: exact where it is written, empty elsewhere, and as large as what was touched."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.heightfield import TILE, FlatTerrain, HeightField, SparseGrid, TerrainTiles, Window
+from softground_addon.core.heightfield import (
+    PLACES_AT_ONCE,
+    TILE,
+    FlatTerrain,
+    HeightField,
+    SparseGrid,
+    TerrainTiles,
+    Window,
+)
 
 windows = st.builds(
     Window, st.integers(-100, 100), st.integers(-100, 100), st.integers(1, 3 * TILE), st.integers(1, 3 * TILE)
@@ -81,6 +91,29 @@ def test_sampling_at_a_cell_centre_gives_that_cell_and_far_away_nothing():
     assert np.array_equal(field.nearest(x, y), values)
     assert not field.sample(np.array([1e3, -1e3]), np.array([0.0, 1e4])).any()
     assert not HeightField(0.01).sample(np.array([0.0]), np.array([0.0])).any()
+
+
+def test_of_many_places_only_what_is_found_takes_more_memory():
+    field = HeightField(0.01)
+    window = Window(-40, -3, 300, 200)
+    x, y = np.meshgrid(*window.centres(0.01))
+    values = np.stack([x - 2 * y, 3 * y])
+    field.write(window, values)
+
+    def found_and_peak(many):
+        inside = np.random.default_rng(2).integers(0, x.size, many)
+        px, py = x.ravel()[inside], y.ravel()[inside]
+        tracemalloc.start()
+        try:
+            sampled = field.sample(px, py)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert sampled == pytest.approx(values.reshape(2, -1)[:, inside], abs=1e-12)
+        return sampled.nbytes, peak
+
+    (few, before), (many, after) = found_and_peak(PLACES_AT_ONCE), found_and_peak(3 * PLACES_AT_ONCE + 5)
+    assert after - before < 1.5 * (many - few)
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, np.nan, np.inf])

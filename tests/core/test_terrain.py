@@ -32,6 +32,16 @@ def test_heights_are_those_of_scipys_linear_interpolation(seed, count, scale):
     assert np.isnan(terrain.heights(x, y)[np.isnan(expected)]).all()
 
 
+def test_any_number_of_places_is_looked_up(monkeypatch):
+    vertices = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [0.0, 4.0, 2.0]])
+    terrain = MeshTerrain.from_mesh(vertices, np.array([[0, 1, 2]]))
+    x, y = np.random.default_rng(5).uniform(-1, 5, (2, 3, 40))
+    monkeypatch.setattr("softground_addon.core.terrain.PLACES_AT_ONCE", 7)
+    expected = np.where((x >= 0) & (y >= 0) & (x + y <= 4), x / 4 + y / 2, np.nan)
+    np.testing.assert_allclose(terrain.heights(x, y), expected, atol=1e-12)
+    assert terrain.heights(x[:0], y[:0]).shape == (0, 40)
+
+
 def slab(z):
     vertices = np.array([[x, y, h] for h in (z - 1.0, z) for y in (0.0, 2.0) for x in (0.0, 2.0)])
     top, bottom = [[4, 5, 7], [4, 7, 6]], [[0, 3, 1], [0, 2, 3]]
