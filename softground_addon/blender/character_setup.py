@@ -12,7 +12,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.solids import mass_properties
 from .properties import SoftGroundCharacter
-from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
+from .rig_mapping import RigMapping, SoleSource, instances_armature, map_rig, require_armature
 from .rig_sampling import is_animated, is_simulated
 from .settings import exists, time_stretch_of
 from .solid_extraction import surface_of
@@ -95,7 +95,8 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
 def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     if thing.type != "MESH":
         raise InputError(
-            f"'{thing.name}' is a {thing.type.lower()}: select an animated armature, or mesh objects that fall or roll."
+            f"'{thing.name}' is no mesh but of type {thing.type.title()}: select an animated armature, or mesh objects "
+            "that fall or roll."
         )
     if thing == scene.softground.ground:
         raise InputError(f"'{thing.name}' is the ground: select what moves on it.")
@@ -327,12 +328,9 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
         return
     armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
     if not armatures:
-        inside = next((thing for thing in scene.objects if _instances_armature(thing)), None)
+        inside = next(filter(instances_armature, scene.objects), None)
         if inside:
-            raise InputError(
-                f"The armature of '{inside.name}' is in a collection instance and cannot be read there: make it real "
-                "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
-            )
+            require_armature(inside)
         raise InputError(
             f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
             "with Add Character in the SoftGround panel."
@@ -345,8 +343,3 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             "SoftGround panel and save the file."
         )
     add_character(scene, (moving or armatures)[0])
-
-
-def _instances_armature(thing: bpy.types.Object) -> bool:
-    collection = thing.instance_collection
-    return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)

@@ -202,13 +202,24 @@ def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
     return RigMapping(joints, tuple(soles), named.method)
 
 
+def instances_armature(thing: bpy.types.Object) -> bool:
+    """Whether an object shows an armature of the collection that it instances, as linked characters are at first."""
+    collection = thing.instance_collection
+    return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)
+
+
 def require_armature(armature: bpy.types.Object | None) -> None:
     """Raise InputError unless the object is an armature with bones."""
     if armature is None:
         raise InputError("No armature is chosen: select the character's armature and add it again.")
+    if instances_armature(armature):
+        raise InputError(
+            f"The armature of '{armature.name}' is in a collection instance and cannot be read there: make it real "
+            "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
+        )
     if armature.type != "ARMATURE":
         raise InputError(
-            f"'{armature.name}' is a {armature.type.lower()}, not an armature: select the character's armature."
+            f"'{armature.name}' is no armature but of type {armature.type.title()}: select the character's armature."
         )
     if not armature.data.bones:
         raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")

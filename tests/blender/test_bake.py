@@ -200,6 +200,9 @@ def test_an_armature_in_a_collection_instance_is_named_with_its_remedy(scene):
     scene.collection.objects.link(instance)
     with pytest.raises(InputError, match=r"'Instance'.*Library Override"):
         set_up_automatically(scene)
+    bpy.context.view_layer.objects.active = instance
+    with pytest.raises(RuntimeError, match=r"'Instance'.*Library Override"):
+        bpy.ops.softground.add_character()
 
 
 def test_clicking_the_characters_mesh_adds_its_armature(scene):

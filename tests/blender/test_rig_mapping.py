@@ -179,7 +179,7 @@ def test_a_rig_without_legs_is_refused_with_its_name_and_a_remedy(scene):
 
 
 def test_an_object_that_is_no_armature_is_refused(scene):
-    with pytest.raises(InputError, match=r"'Lamp' is a light"):
+    with pytest.raises(InputError, match=r"'Lamp'.*of type Light"):
         map_rig(bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT")))
     with pytest.raises(InputError, match="select the character's armature"):
         map_rig(None)
