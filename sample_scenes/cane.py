@@ -12,7 +12,7 @@ from sample_scenes.body import SIDES, Array, Body
 from sample_scenes.curves import quintic
 from sample_scenes.limbs import bend_to_reach, hanging
 from sample_scenes.motion import BodyMotion, Footfall, joint_paths, rotation
-from sample_scenes.stage import plain_material
+from sample_scenes.plain_objects import BOX, add_object, box_corners
 
 _ASIDE = 0.30  # of the cane from the middle of the way, relative to leg length
 _AHEAD = 0.04  # of the cane's tip from the foot that lands with it, relative to leg length
@@ -43,15 +43,10 @@ def create_cane(name: str, body: Body, collection: bpy.types.Collection) -> bpy.
     tip, top = len(vertices) - 2, len(vertices) - 1
     faces += [(tip, b, a) for a, b in zip(index[0], ahead[0], strict=True)]
     faces += [(top, a, b) for a, b in zip(index[-1], ahead[-1], strict=True)]
-    bar = np.array([(x, y, z) for x in (-0.011, 0.011) for y in (-0.05, 0.07) for z in (length, length + 0.022)])
-    box = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces += [tuple(len(vertices) + corner for corner in face) for face in box]
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(np.concatenate([vertices, bar]).tolist(), [], faces)
-    mesh.materials.append(plain_material("SoftGround Sample cane", (0.10, 0.045, 0.02), 0.4))
-    cane = bpy.data.objects.new(name, mesh)
-    collection.objects.link(cane)
-    return cane
+    bar = box_corners((-0.011, -0.05, length), (0.011, 0.07, length + 0.022))
+    faces += [tuple(len(vertices) + corner for corner in face) for face in BOX]
+    look = ("SoftGround Sample cane", (0.10, 0.045, 0.02), 0.4)
+    return add_object(name, np.concatenate([vertices, bar]), faces, look, collection)
 
 
 def with_cane(body: Body, motion: BodyMotion, side: str = "L") -> tuple[BodyMotion, Array, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi, sqrt
 
 import bpy
@@ -14,7 +13,7 @@ from sample_scenes.character import TO_BLENDER
 from sample_scenes.course import Course
 from sample_scenes.keys import object_curves, quaternions, write_curve
 from sample_scenes.motion import Array, rotation
-from sample_scenes.stage import plain_material
+from sample_scenes.plain_objects import add_object
 from sample_scenes.stride import inward_lean
 
 
@@ -31,7 +30,8 @@ def create_wheel(
         Of the wheel to the outside of the tyre, and of the tyre's section [m].
     """
     vertices, faces = wheel_mesh(radius, tyre)
-    return _mesh_object(name, vertices, faces, ("SoftGround Sample tyre", (0.015, 0.015, 0.016), 0.7), collection)
+    look = ("SoftGround Sample tyre", (0.015, 0.015, 0.016), 0.7)
+    return add_object(name, vertices, faces, look, collection, smooth=True)
 
 
 def create_ball(name: str, collection: bpy.types.Collection, radius: float = 0.15) -> bpy.types.Object:
@@ -50,7 +50,7 @@ def create_ball(name: str, collection: bpy.types.Collection, radius: float = 0.1
     caps = [(top, a, b) for a, b in zip(column, ahead, strict=True)]
     caps += [(bottom, last + b, last + a) for a, b in zip(column, ahead, strict=True)]
     material = ("SoftGround Sample ball", (0.45, 0.05, 0.03), 0.4)
-    return _mesh_object(name, vertices, [*faces.tolist(), *caps], material, collection)
+    return add_object(name, vertices, [*faces.tolist(), *caps], material, collection, smooth=True)
 
 
 def roll_along(
@@ -153,22 +153,6 @@ def _grid(rows: int, columns: int, stride: int, *, close_rows: bool) -> Array:
     below = (i + 1) % rows if close_rows else i + 1
     ahead = (j + 1) % columns
     return np.stack([i * stride + j, below * stride + j, below * stride + ahead, i * stride + ahead], -1).reshape(-1, 4)
-
-
-def _mesh_object(
-    name: str,
-    vertices: Array,
-    faces: Sequence[Sequence[int]],
-    material: tuple[str, tuple[float, float, float], float],
-    collection: bpy.types.Collection,
-) -> bpy.types.Object:
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(vertices.tolist(), [], faces)
-    mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), dtype=bool))
-    mesh.materials.append(plain_material(*material))
-    thing = bpy.data.objects.new(name, mesh)
-    collection.objects.link(thing)
-    return thing
 
 
 def write_poses(thing: bpy.types.Object, places: Array, turns: Array, first_frame: int) -> bpy.types.Action:

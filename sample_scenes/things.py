@@ -16,6 +16,7 @@ from sample_scenes.character import copy_character, create_character
 from sample_scenes.fall import LIMBS, fall_back
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import object_curves, write_action, write_curve
+from sample_scenes.plain_objects import BOX, Look, add_object, box_corners
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.rolling_things import create_ball, drop, write_poses
 from sample_scenes.snowshoe import snowshoe_mesh
@@ -126,20 +127,10 @@ def _sled(rate: float, collection: bpy.types.Collection) -> tuple[bpy.types.Obje
     return deck, runners
 
 
-def _box(
-    name: str,
-    size: tuple[float, float, float],
-    material: tuple[str, tuple[float, float, float], float],
-    collection: bpy.types.Collection,
-) -> bpy.types.Object:
-    corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
-    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata((np.array(corners) * size).tolist(), [], faces)
-    mesh.materials.append(stage.plain_material(*material))
-    box = bpy.data.objects.new(name, mesh)
-    collection.objects.link(box)
-    return box
+def _box(name: str, size: tuple[float, float, float], look: Look, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A box around its origin."""
+    half = np.array(size) / 2
+    return add_object(name, box_corners(-half, half), BOX, look, collection)
 
 
 def claims(built: Things) -> list[Claim]:
