@@ -182,9 +182,7 @@ def _bake(options: argparse.Namespace) -> None:
     read = receipts.checksums(_files_read(options)) if options.receipt else {}
     scene = _scene(options.scene)
     target = _save_target(options)
-    for path in (target, options.report, options.receipt):
-        if path:
-            files.check_place(Path(os.path.realpath(path)))
+    _check_places(options, target)
     set_up_automatically(scene)
     if options.preset:
         settings.apply_preset(scene, _preset(options.preset))
@@ -315,6 +313,19 @@ def _save_target(options: argparse.Namespace) -> Path | None:
             raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
         return Path(os.path.realpath(bpy.data.filepath))
     return options.save.resolve() if options.save else None
+
+
+def _check_places(options: argparse.Namespace, target: Path | None) -> None:
+    """Raise InputError unless all results can be written, each to a place of its own, and over no file that is read."""
+    places = [Path(os.path.realpath(path)) for path in (target, options.report, options.receipt) if path]
+    for path in places:
+        files.check_place(path)
+        if places.count(path) > 1:
+            raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
+    shot, *others = _files_read(options) or [None]
+    for path in places:
+        if path in others or (path == shot and path != target):
+            raise InputError(f"'{path}' is read by this bake and would be lost: write to another file.")
 
 
 def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:

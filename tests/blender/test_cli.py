@@ -136,6 +136,34 @@ def test_bad_options_exit_with_2_and_say_what_to_do(shot, capfd, options, says):
     assert re.search(says, capfd.readouterr().err)
 
 
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--in-place", "--report", "shot.blend"), "Two results"),
+        (("--save", "new.blend", "--report", "new.blend"), "Two results"),
+        (("--dry-run", "--report", "a.json", "--receipt", "./a.json"), "Two results"),
+        (("--dry-run", "--report", "shot.blend"), "is read by this bake"),
+        (("--dry-run", "--receipt", "link.blend"), "is read by this bake"),
+        (("--save", "rig.blend"), "is read by this bake"),
+    ],
+)
+def test_no_result_is_written_over_another_or_over_what_is_read(scene, tmp_path, monkeypatch, capfd, options, says):
+    shots.walker(scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rig.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (_, linked):
+        linked.objects = ["Walker"]
+    bpy.context.scene.collection.objects.link(linked.objects[0])
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    (tmp_path / "link.blend").symlink_to(shot)
+    monkeypatch.chdir(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert run(shot, *options) == 2
+    assert says in capfd.readouterr().err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 def test_a_broken_or_missing_file_exits_with_2(tmp_path):
     broken = tmp_path / "broken.blend"
     broken.write_bytes(b"BLENDER-v405" + b"\x00" * 100)
