@@ -13,7 +13,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..core.errors import InputError
 from . import bake_report, exports, image_exports, settings
-from .operators import OnBake, reports_errors
+from .operators import OnBake, beside_file, reports_errors
 from .translation import rpt_
 
 LARGEST_IMAGE = 16384
@@ -42,7 +42,7 @@ FORMATS = {
     "USD": Format(".usdc", "USD", "The moving ground with its shading attributes"),
     "PC2": Format(".pc2", "Point Cache (PC2)", "Positions of the ground's vertices, for a mesh cache"),
     "EXR": Format(
-        ".exr", "Image Sequences (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map"
+        ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map"
     ),
     "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step"),
 }
@@ -127,9 +127,8 @@ def with_suffix(path: Path, kind: str) -> Path:
 
 def default_path(scene: bpy.types.Scene, kind: str) -> Path:
     """A file beside the .blend, named after it and the ground."""
-    blend, ground = Path(bpy.data.filepath), scene.softground.ground
-    name = bpy.path.clean_name(ground.name) if ground else "ground"
-    return with_suffix(blend.with_name(f"{blend.stem or 'untitled'}_{name}"), kind)
+    ground = scene.softground.ground
+    return with_suffix(beside_file(bpy.path.clean_name(ground.name) if ground else "ground"), kind)
 
 
 def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
@@ -155,6 +154,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
     bl_options = {"REGISTER", "PRESET"}
 
     filepath: StringProperty(name="File", description="File to write", subtype="FILE_PATH")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser shows it in red
     filter_glob: StringProperty(
         default=";".join(f"*{one.suffix}" for one in FORMATS.values()) + ";*.usd;*.usda", options={"HIDDEN"}
     )
@@ -175,7 +175,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         description="Let a Mesh Cache modifier play the file on the ground, in place of the native playback",
     )
     outdated: BoolProperty(
-        name="Outdated Too", description="Export the bake also where it no longer fits what it was made from"
+        name="Even If Outdated", description="Export the bake also where it no longer fits what it was made from"
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
@@ -193,7 +193,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         self.filepath = path
         return changed
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout: Any = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -205,7 +205,11 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         if self.format == "EXR":
             column = layout.column()
             column.prop(self, "resolution")
-            column.prop(self, "uv_map")
+            column.prop_search(self, "uv_map", settings.scene_of(context).softground.ground.data, "uv_layers")
+            column = layout.column(align=True)
+            column.active = False
+            for kind in (image_exports.DISPLACEMENT, image_exports.MASK):
+                column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
         if self.format == "PC2":
             layout.prop(self, "use_cache")
         layout.prop(self, "outdated")

@@ -10,13 +10,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 from numpy.typing import NDArray
 
 from ..core import files
 from ..core.footprints import Footprint
 from . import baked_ground, compat, settings
-from .operators import OnBake, reports_errors
+from .operators import OnBake, beside_file, reports_errors
 from .translation import rpt_
 
 Array = NDArray[np.float64]
@@ -142,11 +142,11 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(name="File", description="Table to write", subtype="FILE_PATH")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser shows it in red
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
-        blend = Path(bpy.data.filepath)
-        self.filepath = str(blend.with_name(f"{blend.stem or 'untitled'}_forces.csv"))
+        self.filepath = str(beside_file("forces.csv"))
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

@@ -46,6 +46,12 @@ class OnBake:
         return ground is not None and baked_ground.is_baked(ground)
 
 
+def beside_file(what: str) -> Path:
+    """A path beside the open file that begins with its name; one that was not saved yet is called as Blender does."""
+    blend = Path(bpy.data.filepath or "untitled.blend")
+    return blend.with_name(f"{blend.stem}_{what}")
+
+
 class SOFTGROUND_OT_add_character(bpy.types.Operator):
     """Add the active armature: its feet, hips and limbs are recognised by their names or by the rest pose. Without an
     armature, add the selected mesh objects as things that fall, roll or slide"""

@@ -2,6 +2,7 @@
 
 import os
 import re
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -209,3 +210,8 @@ def test_an_interrupted_export_leaves_the_older_file(scene, tmp_path, monkeypatc
         export_formats.export(scene, export_formats.Options("PC2", path, 30, 31))
     assert path.read_bytes() == b"older"
     assert files_in(tmp_path) == ["a.pc2"]
+
+
+def test_a_scene_that_was_never_saved_proposes_a_name_too(scene):
+    assert not bpy.data.filepath
+    assert export_formats.default_path(scene, "USD") == Path("untitled_ground.usdc")
