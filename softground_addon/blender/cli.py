@@ -322,9 +322,9 @@ def _check_places(options: argparse.Namespace, target: Path | None) -> None:
         files.check_place(path)
         if places.count(path) > 1:
             raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
-    shot, *others = _files_read(options) or [None]
+    read, opened = _files_read(options), Path(os.path.realpath(bpy.data.filepath))
     for path in places:
-        if path in others or (path == shot and path != target):
+        if path in read and not path == opened == target:
             raise InputError(f"'{path}' is read by this bake and would be lost: write to another file.")
 
 
