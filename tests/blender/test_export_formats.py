@@ -213,5 +213,5 @@ def test_an_interrupted_export_leaves_the_older_file(scene, tmp_path, monkeypatc
 
 
 def test_a_scene_that_was_never_saved_proposes_a_name_too(scene):
-    assert not bpy.data.filepath
-    assert export_formats.default_path(scene, "USD") == Path("untitled_ground.usdc")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert export_formats.default_path(bpy.context.scene, "USD") == Path("untitled_ground.usdc")
