@@ -13,15 +13,29 @@ import numpy as np
 from ..core import report
 from . import ground_mesh, mesh_arrays, nla_layer
 from .baked_ground import carrier_of
+from .character_setup import ancestors
 from .compat import action_curves, slot_of
 
 FINGERPRINTS = "softground_fingerprints"
 """Property of the mesh that carries a bake: what it was made from, as JSON."""
 
-SETTINGS, GROUND, PRINTS, ANIMATION = "settings", "ground", "prints", "animation"
+SETTINGS, GROUND, PRINTS, ANIMATION, PLACE = "settings", "ground", "prints", "animation", "place"
 
 _NOT_INPUTS = ("file", "scene")
 """Entries of a bake's inputs that may change without the bake changing."""
+
+_CHANNELS = (
+    "location",
+    "rotation_euler",
+    "rotation_quaternion",
+    "rotation_axis_angle",
+    "scale",
+    "delta_location",
+    "delta_rotation_euler",
+    "delta_rotation_quaternion",
+    "delta_scale",
+)
+"""Properties that place, turn and scale an object."""
 
 _ANSWERS = (nla_layer.RESPONSE, nla_layer.EXTRA, nla_layer.STANDING)
 """Tracks that hold the ground's answer to the rig, and not what the rig was animated to do."""
@@ -52,7 +66,8 @@ def reasons(
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
         now = _fingerprints(inputs, ground, armatures)
-        changed = [key for key in dict.fromkeys((*then, *now)) if then.get(key) != now.get(key)]
+        told = [key for key in now if key in then or not key.startswith(PLACE)]  # earlier bakes do not tell of places
+        changed = [key for key in dict.fromkeys((*then, *told)) if then.get(key) != now.get(key)]
     except (KeyError, TypeError, ValueError, AttributeError):
         return ("The bake does not say what it was made from",)
     texts = {
@@ -60,7 +75,9 @@ def reasons(
         GROUND: f"The mesh or the place of '{ground.name}' has changed",
         PRINTS: f"The mesh of '{carrier.name}' has been edited",
     }
-    return tuple(texts.get(key, f"The animation of '{key.partition(':')[2]}' has changed") for key in changed)
+    of_movers = {ANIMATION: "The animation of '{}' has changed", PLACE: "'{}' or a parent of it was moved"}
+    kinds = (key.partition(":") for key in changed)
+    return tuple(texts[kind] if kind in texts else of_movers[kind].format(name) for kind, _, name in kinds)
 
 
 def _fingerprints(
@@ -68,11 +85,13 @@ def _fingerprints(
 ) -> dict[str, str]:
     carrier = carrier_of(ground)
     animations = {f"{ANIMATION}:{armature.name}": _of_animation(armature) for armature in armatures}
+    places = {f"{PLACE}:{armature.name}": _of_place(armature) for armature in armatures}
     return {
         SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
         GROUND: _of_ground(ground),
         PRINTS: _of_topology(ground_mesh.mesh_of(carrier)),
         **animations,
+        **places,
     }
 
 
@@ -87,6 +106,21 @@ def _of_ground(ground: bpy.types.Object) -> str:
 def _of_topology(mesh: bpy.types.Mesh) -> str:
     corners = mesh_arrays.corner_vertices(mesh)
     return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.tobytes()):08x}"
+
+
+def _of_place(thing: bpy.types.Object) -> str:
+    """Where an object and its parents stand, but for what their own animation decides."""
+    values = []
+    for one in (thing, *ancestors(thing)):
+        animated = nla_layer.animated_paths(one)
+        values += [
+            value
+            for channel in _CHANNELS
+            for index, value in enumerate(getattr(one, channel))
+            if (channel, index) not in animated
+        ]
+        values += np.array(one.matrix_parent_inverse).ravel().tolist()
+    return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
 
 
 def _of_animation(armature: bpy.types.Object) -> str:

@@ -80,6 +80,17 @@ def change_unit(scene):
     scene.unit_settings.scale_length = 0.5
 
 
+def move_character(scene):
+    scene.softground.characters[0].armature.location.x += 0.1
+
+
+def move_parent(scene):
+    parent = bpy.data.objects.new("Parent", None)
+    scene.collection.objects.link(parent)
+    scene.softground.characters[0].armature.parent = parent
+    parent.location.x = 0.1
+
+
 def add_strip(scene):
     armature = scene.softground.characters[0].armature
     track = armature.animation_data.nla_tracks.new()
@@ -96,6 +107,8 @@ def add_strip(scene):
         (change_unit, "settings"),
         (move_ground, "'Field' has changed"),
         (delete_vertex, "'Field"),
+        (move_character, "'Walker' or a parent of it was moved"),
+        (move_parent, "'Walker' or a parent of it was moved"),
         (move_key, "animation of 'Walker'"),
         (add_strip, "animation of 'Walker'"),
     ],
@@ -118,6 +131,20 @@ def test_what_was_read_at_another_time_scale_gravity_or_unit_is_not_known(scene,
     assert analysis.known(scene) is not None
     change(scene)
     assert analysis.known(scene) is None
+
+
+def test_a_keyed_place_is_no_move(scene):
+    armature = shots.walker(scene, frames=40)
+    for frame, x in ((1, 0.0), (40, 0.3)):
+        armature.location.x = x
+        armature.keyframe_insert("location", index=0, frame=frame)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.bake()
+    for frame in (1, 40):
+        scene.frame_set(frame)
+        assert bake_report.stale_reasons(scene) == ()
+    armature.location.y = 0.1
+    assert bake_report.stale_reasons(scene) == ("'Walker' or a parent of it was moved",)
 
 
 def test_a_cleared_ground_is_not_stale(baked):
