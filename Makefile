@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes test slow versions marathon bench validate gui pictures package lint types clean
+.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -30,6 +30,10 @@ demo: $(READY)
 # The scenes of docs/gallery.md with their pictures, from nothing, into build/scenes.
 scenes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all
+
+# The same, and then the pictures into docs/images and the small .blend files into sample_scenes.
+gallery: scenes
+	$(BIN)/python -m sample_scenes.publish
 
 # Processes side by side gain nothing from threads that wait for each other's processors.
 test slow marathon: export OPENBLAS_NUM_THREADS := 1

@@ -49,9 +49,9 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
         for wheel, distance, steered in zip(wheels, rolled[number], (steering, 0.0), strict=True):
             wheel.rotation_euler = (0.0, distance / WHEEL, steered)
             wheel.keyframe_insert("rotation_euler", frame=number + 1)
-    chosen = {"shape_keys": "false", "material.surface": "wet_sand"} | dict(options or {})
+    chosen = {"shape_keys": "false"} | dict(options or {})
     bicycle = Walker(wheels[0], MASS, with_things=wheels[1:])
-    bake = production.bake(scene, [bicycle], "Mud", cell_size, options=chosen)
+    bake = production.bake(scene, [bicycle], "Wet Sand", cell_size, options=chosen)
     return Bicycle({"sand": bake}, wheels, course)
 
 

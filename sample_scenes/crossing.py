@@ -19,7 +19,7 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.core.footprints import Footprint, recompose
 from softground_addon.core.heightfield import HeightField
 
-CELL_SIZE = 0.0075  # m
+CELL_SIZE = 0.012  # m
 FRAMES = 84  # 3.5 s
 PICTURE = (896, 504)
 
@@ -105,10 +105,10 @@ def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
     scene.frame_set(scene.frame_end)
     stage.add_sun(scene, radians(-30), radians(16))
     scene.view_settings.exposure = -0.4
-    camera = stage.add_camera(scene, "Crossing", lens=36.0)
+    camera = stage.add_camera(scene, "Crossing", lens=28.0)
     bake = built.bakes["Snow"]
     middle = np.mean([step.position for step in bake.footprints], axis=0)
-    stage.aim(camera, middle + np.array((2.6, 5.0, 3.0)), middle + np.array((-0.35, -0.9, 0.45)))
+    stage.aim(camera, middle + np.array((1.9, 3.9, 2.9)), middle + np.array((-0.2, -0.75, 0.4)))
     low, _ = stage.bounds([bake.carrier])
     stage.add_floor(low[2] - 0.02, scene.collection)
     path = folder / "crossing.jpg"

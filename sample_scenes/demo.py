@@ -239,8 +239,9 @@ def _looking(heading: float, pitch: float) -> np.ndarray:
 
 
 def _points_to_show(lanes: list[Lane]) -> np.ndarray:
-    """The prints with some ground around them, and the bones with the flesh around them."""
-    prints = np.array([step.position for lane in lanes for step in lane.footprints])
+    """The grounds to the corners of their trays, and the bones with the flesh around them."""
+    low, high = stage.bounds([lane.ground for lane in lanes])
+    corners = np.array([(x, y, low[2] - 0.16) for x in (low[0], high[0]) for y in (low[1], high[1])])
     bones = np.array(
         [
             lane.armature.matrix_world @ end
@@ -249,9 +250,8 @@ def _points_to_show(lanes: list[Lane]) -> np.ndarray:
             for end in (bone.head, bone.tail)
         ]
     )
-    around = [(x, y, 0.0) for x in (-0.4, 0.4) for y in (-0.4, 0.4)]
     flesh = [(0.0, 0.0, 0.15), (0.15, 0.15, 0.0), (-0.15, -0.15, 0.0)]
-    return np.concatenate([prints + offset for offset in around] + [bones + offset for offset in flesh])
+    return np.concatenate([corners] + [bones + offset for offset in flesh])
 
 
 if __name__ == "__main__":

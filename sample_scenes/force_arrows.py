@@ -111,18 +111,18 @@ def shoot(built: ForceArrows, folder: Path, samples: int) -> list[Path]:
 
 def _ghost() -> bpy.types.Material:
     """Figures that let the arrows through."""
-    material = stage.plain_material("SoftGround Sample ghost", (0.55, 0.55, 0.58), 0.7)
+    material = stage.plain_material("SoftGround Sample ghost", (0.10, 0.11, 0.14), 0.9)
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Alpha"].default_value = 0.22
+    shader.inputs["Alpha"].default_value = 0.26
     return material
 
 
 def _glowing(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
     """A plain colour that no shadow darkens."""
-    material = stage.plain_material(name, colour, 0.6)
+    material = stage.plain_material(name, (0.0, 0.0, 0.0), 1.0)
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Emission Color"].default_value = (*colour, 1.0)
-    shader.inputs["Emission Strength"].default_value = 0.6
+    shader.inputs["Emission Strength"].default_value = 1.0
     return material
 
 

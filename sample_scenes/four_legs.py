@@ -97,8 +97,8 @@ def shoot(built: FourLegs, folder: Path, samples: int) -> list[Path]:
     ground = built.bakes["Mud"].carrier
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
-    camera = stage.add_camera(scene, "Dogs", lens=38.0)
-    stage.aim(camera, (-3.6, -8.0, 2.3), (0.75, -3.3, 0.1))
+    camera = stage.add_camera(scene, "Dogs", lens=40.0)
+    stage.aim(camera, (-2.9, -7.4, 2.1), (0.55, -3.75, 0.12))
     path = folder / "four_legs.jpg"
     stage.render(scene, camera, path, PICTURE, samples)
     return [path]

@@ -31,7 +31,7 @@ from softground_addon.core.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")
 
-COARSENESS = 1.7
+COARSENESS = 2.4
 """Of the figures in the scenes, see `character.create_character`: files stay small."""
 
 Options = Mapping[str, str]

@@ -16,12 +16,12 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 
-CELL_SIZE = 0.015  # m
+CELL_SIZE = 0.025  # m
 FRAMES = 96  # 4 s
 APART = 3.2  # m between the two hills
 HALF_WIDTH, LENGTH = 0.7, (-6.2, 1.4)  # m; of a hill across the way and along it
 SHOWN = (14, 36, 58, 82)
-PICTURE = (960, 300)
+PICTURE = (960, 320)
 
 _RESPONSE: Options = {"tilt.use": "true", "tilt.strength": "0.8", "grounding.use": "true"}
 
@@ -111,7 +111,7 @@ def shoot(built: ResponseHill, folder: Path, samples: int) -> list[Path]:
         for other in built.bakes:
             for thing in (*copies[other], sides[other], built.bakes[other].carrier):
                 thing.hide_render = other != name
-        middle = np.array((built.walkers[name].location.x, -2.35, 1.22))
+        middle = np.array((built.walkers[name].location.x, -2.35, 0.95))
         stage.aim(camera, middle + np.array((11.8, 0.0, 2.4)), middle)
         pictures.append(folder / f"response_hill_{name}.png")
         stage.render(scene, camera, pictures[-1], PICTURE, samples)

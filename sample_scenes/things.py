@@ -24,7 +24,7 @@ from softground_addon.blender import analysis
 from softground_addon.core.footprints import Footprint, recompose
 from softground_addon.core.simulation import CharacterLoads
 
-CELL_SIZE = 0.0125  # m
+CELL_SIZE = 0.015  # m
 FRAMES = 56  # 2.3 s
 MODULUS = 0.25e6  # Pa, the soft end of the paper's snow
 SIDE, CRATE_MASS = 0.40, 30.0  # m, kg

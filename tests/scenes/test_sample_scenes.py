@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from sample_scenes.make_all import SCENES
+from sample_scenes.publish import LARGEST, publish
 
 ROOT = Path(__file__).parents[2]
 
@@ -63,3 +64,21 @@ def test_every_scene_is_in_the_gallery():
     gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     for name in SCENES:
         assert f"python -m sample_scenes.{name}" in gallery
+
+
+def test_pictures_of_the_gallery_and_small_scenes_are_published(tmp_path):
+    built, project = tmp_path / "built", tmp_path / "project"
+    for folder in (built, project / "docs" / "images", project / "sample_scenes"):
+        folder.mkdir(parents=True)
+    (project / "docs" / "gallery.md").write_text("![One](images/craters.jpg) ![Two](images/not_built.png)")
+    for name, size in {"craters.jpg": 5, "other.jpg": 5, "craters.blend": LARGEST, "stunts.blend": LARGEST + 1}.items():
+        (built / name).write_bytes(bytes(size))
+    publish(built, project)
+    published = {path.name for path in project.rglob("*") if path.suffix in (".jpg", ".blend")}
+    assert published == {"craters.jpg", "craters.blend"}
+
+
+def test_scenes_in_the_repository_are_small_and_of_this_package():
+    for blend in (ROOT / "sample_scenes").glob("*.blend"):
+        assert blend.stem in SCENES, blend.name
+        assert blend.stat().st_size <= LARGEST, blend.name

@@ -1,0 +1,43 @@
+"""`make gallery`: puts what `make scenes` built where the project shows it.
+
+The pictures of docs/gallery.md go to docs/images, the .blend files that are small to sample_scenes.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+from sample_scenes.make_all import SCENES
+from sample_scenes.production import OUTPUT
+
+ROOT = Path(__file__).parents[1]
+
+LARGEST = 2_000_000
+"""A .blend file larger than this stays out of the repository [bytes]."""
+
+
+def publish(built: Path, root: Path) -> list[Path]:
+    """Copy pictures and small scenes into a project; returns what was written.
+
+    Parameters
+    ----------
+    built : Path
+        Folder into which the scenes were built.
+    root : Path
+        The project, with docs/gallery.md and sample_scenes.
+    """
+    gallery = (root / "docs" / "gallery.md").read_text(encoding="utf-8")
+    pictures = [built / name for name in re.findall(r"\(images/([\w.]+)\)", gallery)]
+    blends = [built / f"{name}.blend" for name in SCENES]
+    copies = [(picture, root / "docs" / "images") for picture in pictures if picture.is_file()]
+    copies += [
+        (blend, root / "sample_scenes") for blend in blends if blend.is_file() and blend.stat().st_size <= LARGEST
+    ]
+    return [Path(shutil.copyfile(source, folder / source.name)) for source, folder in copies]
+
+
+if __name__ == "__main__":
+    for path in publish(OUTPUT, ROOT):
+        print(path.relative_to(ROOT))
