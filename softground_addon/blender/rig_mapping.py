@@ -212,6 +212,11 @@ def require_armature(armature: bpy.types.Object | None) -> None:
     """Raise InputError unless the object is an armature with bones."""
     if armature is None:
         raise InputError("No armature is chosen: select the character's armature and add it again.")
+    if armature.is_missing:
+        raise InputError(
+            f"'{armature.name}' is not in this file, and its library '{armature.library.filepath}' was not found: put "
+            "the library back, or relocate it (File > External Data > Find Missing Files)."
+        )
     if instances_armature(armature):
         raise InputError(
             f"The armature of '{armature.name}' is in a collection instance and cannot be read there: make it real "

@@ -155,6 +155,20 @@ def test_a_linked_rig_is_baked_and_not_changed(library, capfd):
     assert library.read_bytes() == content
 
 
+def test_a_rig_whose_library_is_gone_is_told_with_the_library(library, tmp_path, capfd):
+    rig = link(library, objects="Walker").objects[0]
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.softground.add_character()
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    library.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    said = refused(capfd)
+    assert "'Walker'" in said
+    assert "rig.blend' was not found" in said
+
+
 def test_an_overridden_rig_is_baked(library, capfd):
     rig = link(library, objects="Walker").objects[0]
     bpy.context.scene.collection.objects.link(rig)
