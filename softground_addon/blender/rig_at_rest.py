@@ -18,6 +18,9 @@ _ACROSS, _ALONG = 0.6, 0.7
 _ALONG_LEGS = 0.8
 """An axis of the armature is its upward one when the legs lie along it with at least this cosine."""
 
+_UPRIGHT = np.cos(np.radians(1.0))
+"""Cosine of the tilt within which an armature stands upright."""
+
 
 @dataclass(frozen=True)
 class RestPose:
@@ -97,7 +100,12 @@ class RestPose:
 
 
 def _own_up(armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> Array:
-    """The axis of the armature along which its legs reach up at rest; where none shows, the one that points up most."""
+    """The axis of the armature along which its legs reach up at rest; where none shows, the one that points up most.
+
+    An armature that stands upright itself does so whatever its rest pose: those of captured motions may lie.
+    """
+    if unit(placed[:3, 2]) @ UP > _UPRIGHT:
+        return UP
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     bones = armature.data.bones
     legs = np.zeros(3)
