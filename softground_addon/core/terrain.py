@@ -17,6 +17,12 @@ Indices = NDArray[np.intp]
 UPWARD = 0.05
 """Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
 
+CROWDED = 10
+"""Triangles per bin from which smaller bins are worth their table: those of a grid have 8 each, where the mesh's faces
+are slivers, as at the pole of a sphere, each has hundreds."""
+LARGEST_TABLE = 1 << 17
+"""Triangles in all bins, each as often as it is in one, up to which the bins are made smaller."""
+
 PLACES_AT_ONCE = 1 << 16
 """Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
 
@@ -100,9 +106,14 @@ class MeshTerrain:
         extent = high.max(axis=0) - origin
         bins_along = max(1.0, np.sqrt(len(corners) / 2))
         size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
-        shape = np.floor(extent / size).astype(np.intp) + 1
-        from_bin = np.floor((low - origin) / size).astype(np.intp)
-        span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
+        while True:
+            shape = np.floor(extent / size).astype(np.intp) + 1
+            from_bin = np.floor((low - origin) / size).astype(np.intp)
+            span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
+            members = span.prod(axis=1).sum()
+            if members <= CROWDED * shape.prod() or members > LARGEST_TABLE / 4:  # half the size: up to four times
+                break
+            size = size / 2
         triangle, within = enumerated(span.prod(axis=1))
         bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
         bin_y = from_bin[triangle, 1] + within // span[triangle, 0]

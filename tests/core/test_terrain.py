@@ -42,6 +42,20 @@ def test_any_number_of_places_is_looked_up(monkeypatch):
     assert terrain.heights(x[:0], y[:0]).shape == (0, 40)
 
 
+def test_slivers_do_not_crowd_the_bins():
+    spokes = np.linspace(0, 2 * np.pi, 301)[:-1]
+    rim = np.stack([5 * np.cos(spokes), 5 * np.sin(spokes), np.full(300, -1.0)], axis=-1)
+    number = np.arange(300)
+    fan = np.stack([np.full(300, 300), number, (number + 1) % 300], axis=-1)
+    terrain = MeshTerrain.from_mesh(np.vstack([rim, [[0.0, 0.0, 0.0]]]), fan)
+    angle, radius = np.random.default_rng(6).uniform([0, 0.5], [2 * np.pi, 4.9], (500, 2)).T
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    np.testing.assert_allclose(terrain.heights(x, y), -radius / 5, atol=1e-3)
+    at_bin = np.floor((np.stack([x, y], axis=-1) - terrain.origin) / terrain.bin_size).astype(int)
+    number = at_bin[:, 1] * terrain.shape[0] + at_bin[:, 0]
+    assert (terrain.first[number + 1] - terrain.first[number]).mean() < 50
+
+
 def slab(z):
     vertices = np.array([[x, y, h] for h in (z - 1.0, z) for y in (0.0, 2.0) for x in (0.0, 2.0)])
     top, bottom = [[4, 5, 7], [4, 7, 6]], [[0, 3, 1], [0, 2, 3]]
