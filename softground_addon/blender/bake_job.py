@@ -84,6 +84,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     started = time.perf_counter()
     options = scene.softground
     characters = characters_of(scene)
+    moving = bake_report.ground_warnings(options.ground, options.frame_start)
     shot = yield from read_shot(scene)
     sampled = time.perf_counter()
 
@@ -123,6 +124,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
             *bake_report.warnings(
                 footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
             ),
+            *moving,
             *(written.warnings if written else ()),
             *response_job.warnings(answers),
         ],

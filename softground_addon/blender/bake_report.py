@@ -14,7 +14,7 @@ from ..core.footprints import Footprint
 from ..core.missed_steps import advice, missed_steps
 from ..core.simulation import CharacterLoads
 from ..core.sliding import treadmill_speed
-from . import properties, response_job, settings, staleness
+from . import ground_mesh, properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, movers_of, title_of
 from .jobs import STAGES
 
@@ -75,6 +75,17 @@ def warnings(
                 f"size weighs about {likely:.2g} kg. Set Mass in the Character panel."
             )
     return found
+
+
+def ground_warnings(ground: bpy.types.Object | None, frame: int) -> list[str]:
+    """What the user should know of a ground that changes its shape over time, taken at a frame, with the remedy."""
+    modifier = ground_mesh.changes_with_time(ground) if ground else ""
+    if not (ground and modifier):
+        return []
+    return [
+        f"Ground '{ground.name}' changes its shape over time by its modifier '{modifier}': it was taken as it is at "
+        f"frame {frame}, where the bake starts. Apply the modifier at the frame that is wanted, or switch it off."
+    ]
 
 
 def summary(result: dict[str, Any]) -> dict[str, float]:

@@ -39,6 +39,9 @@ SUMMARY = "softground_summary"
 PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
 """Properties of a mesh that carries a bake."""
 
+TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
+"""Modifiers that change a mesh from frame to frame with nothing keyed."""
+
 ON_SURFACE = 2e-3
 """Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
 
@@ -117,6 +120,11 @@ def check_usable(ground: bpy.types.Object) -> None:
     moved_by = _what_moves(ground)
     if moved_by:
         raise InputError(f"Ground '{name}' moves: {moved_by} is animated. Only ground that stands still takes prints.")
+
+
+def changes_with_time(ground: bpy.types.Object) -> str:
+    """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
+    return next((item.name for item in ground.modifiers if item.show_viewport and item.type in TIME_DEPENDENT), "")
 
 
 def _what_moves(ground: bpy.types.Object) -> str:
@@ -201,8 +209,13 @@ def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
 
 @contextmanager
 def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
-    """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers."""
+    """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
+
+    Modifiers that change over time are evaluated at the first frame of the bake.
+    """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
+    for shown_in in ground.users_scene[:1]:
+        scene.frame_current = shown_in.softground.frame_start
     copy = ground.copy()
     try:
         copy.hide_viewport = False

@@ -176,3 +176,19 @@ def test_an_unusable_ground_is_named_with_the_remedy(scene, spoil, remedy):
     spoil(ground)
     with pytest.raises(InputError, match=f"'SoftGround'.*{remedy}"):
         ground_mesh.check_usable(ground)
+
+
+def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is_shown(scene):
+    ground = grid(scene, spacing=0.1)
+    wave = ground.modifiers.new("Swell", "WAVE")
+    assert ground_mesh.changes_with_time(ground) == "Swell"
+    scene.softground.frame_start = 40
+    scene.frame_set(40)
+    shown = world(ground.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    for frame in (1, 40, 90):
+        scene.frame_set(frame)
+        taken = ground_mesh.undisturbed_surface(ground, 1.0).vertices
+        np.testing.assert_allclose(taken, shown, atol=1e-6)
+    assert np.ptp(shown[:, 2]) > 0.1
+    wave.show_viewport = False
+    assert not ground_mesh.changes_with_time(ground)

@@ -167,3 +167,13 @@ def test_a_depth_cannot_be_matched_on_ground_that_takes_no_print(walk):
     paint(walk.softground.ground, "softground_layer_depth", np.zeros(len(walk.softground.ground.data.vertices)))
     with pytest.raises(InputError, match="takes none under the feet"):
         analysis.match_depth(walk, 0.05)
+
+
+def test_a_ground_that_changes_over_time_is_told_of_with_the_remedy(walk):
+    ground = plane(walk, vertices=60)
+    walk.softground.frame_start = 3
+    ground.modifiers.new("Swell", "WAVE").height = 0.01
+    bpy.context.view_layer.update()
+    (warning,) = bake(walk, ground=ground, output="PRINTS", detail="AUTO").report["warnings"]
+    for part in ("'Field'", "'Swell'", "frame 3", "Apply the modifier"):
+        assert part in warning
