@@ -61,8 +61,8 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     )
     show_cells: BoolProperty(
         name="Cells",
-        description="Cells that are in contact (red) and that rise around it (blue) at the current frame, from live "
-        "mode or the bake",
+        description="Cells that are in contact (red), and those around them that take up the rim (blue), at the "
+        "current frame, from live mode or the bake",
         default=True,
     )
     is_live: BoolProperty(name="Live", description="The ground gives way while the timeline plays")
