@@ -131,7 +131,7 @@ class _Worker:
     attempt: int
     spent: float
     lock: IO[bytes]
-    started: float = field(default_factory=time.monotonic)
+    started: float
     totals: dict[str, Any] = field(default_factory=dict)
     message: str = ""
     timed_out: bool = False
@@ -213,6 +213,7 @@ class _Batch:
             log.write(f"$ {shlex.join(command)}\n".encode())
             log.flush()
             inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # who outlives us keeps the lock
+            started = time.monotonic()
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -227,7 +228,7 @@ class _Batch:
                 lock.close()
             self._end(Outcome(shot, "refused", attempt - 1, spent, message=f"{error.filename}: {error.strerror}"))
             return
-        worker = _Worker(shot, process, attempt, spent, lock)
+        worker = _Worker(shot, process, attempt, spent, lock, started)
         self._running[shot.name] = worker
         threading.Thread(target=self._read, args=(worker, log), daemon=True).start()
 
