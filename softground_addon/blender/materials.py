@@ -351,21 +351,23 @@ def _mud(graph: Graph, ground: Ground) -> Look:
 
 
 def _soil(graph: Graph, ground: Ground) -> Look:
-    """Dark dry crumbs of all sizes, dull; crushed even under the foot, pushed up in clods around it."""
+    """Dry crumbs of all sizes, dull; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
     loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
     stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
     stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
     wavy = graph.out(stirred)  # crumbs are no honeycomb
-    large = graph.ramp(graph.out(graph.cells(wavy, 0.030)), 0.1, 0.7, 1.0, 0.0)
-    small = graph.ramp(graph.out(graph.cells(wavy, 0.009)), 0.1, 0.8, 1.0, 0.0)
+    large, middle, small = (
+        graph.ramp(graph.out(graph.cells(wavy, size)), 0.1, 0.75, 1.0, 0.0) for size in (0.030, 0.017, 0.009)
+    )
     dust = graph.noise(ground.place, 0.0035, 3.0, 0.7)
-    clods = graph.math("MAXIMUM", graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.46, 0.62), ground.risen)
-    crumbs = large * clods * 0.014 + small * graph.blend(ground.risen, 0.0045, 0.0075)
-    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0026, 0.0014)
+    clods = graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.50, 0.66)
+    crumbs = large * clods * 0.010 + middle * ground.risen * 0.013 + small * graph.blend(ground.risen, 0.0022, 0.0060)
+    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0018, 0.0012)
     relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008 + ground.tread
     tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
-    colour = graph.mix(tint, (0.050, 0.029, 0.018), (0.190, 0.118, 0.074))
-    colour = graph.mix(ground.pressed * 0.5, colour, (0.095, 0.057, 0.034))
+    colour = graph.mix(tint, (0.072, 0.042, 0.026), (0.195, 0.122, 0.077))
+    colour = graph.mix(ground.risen * middle * 0.6, colour, (0.28, 0.18, 0.115))
+    colour = graph.mix(ground.pressed * 0.6, colour, (0.085, 0.051, 0.031))
     return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
 
 
