@@ -351,7 +351,7 @@ def _mud(graph: Graph, ground: Ground) -> Look:
 
 
 def _soil(graph: Graph, ground: Ground) -> Look:
-    """Dry crumbs of all sizes, dull; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
+    """Dull crumbs of all sizes; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
     loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
     stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
     stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
