@@ -367,7 +367,7 @@ def _soil(graph: Graph, ground: Ground) -> Look:
     tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
     colour = graph.mix(tint, (0.072, 0.042, 0.026), (0.195, 0.122, 0.077))
     colour = graph.mix(ground.risen * middle * 0.6, colour, (0.28, 0.18, 0.115))
-    colour = graph.mix(ground.pressed * 0.6, colour, (0.085, 0.051, 0.031))
+    colour = graph.mix(ground.pressed * 0.7, colour, (0.060, 0.036, 0.022))
     return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
 
 
