@@ -19,7 +19,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     open_walk(FRAMES)
     yield from hand.open_sidebar()
     yield from hand.frame_all()
-    yield from hand.picture("panel_start", of="UI")
+    yield from hand.picture("panel_start", of="UI", in_docs=False)
 
     yield from hand.press_button("softground.add_character")
     facts["characters"] = [character.name for character in scene().softground.characters]
@@ -52,7 +52,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["prints"] = summary()
     facts["deepest vertex"] = deepest()
     yield from hand.frame_all()
-    yield from hand.picture("panel_baked")
+    yield from hand.picture("panel_baked", in_docs=False)
 
     baked = fingerprints.of_file()
     yield from hand.move(*hand.middle())
