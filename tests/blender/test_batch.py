@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 from softground_addon.blender import batch, cli, ground_mesh
@@ -215,19 +216,21 @@ def test_fifty_shots_killed_five_times_equal_the_uninterrupted_ones(night):
 def test_two_jobs_are_almost_twice_as_fast_as_one(night):
     if (os.cpu_count() or 1) < 2:
         pytest.skip("needs two cores")
-    manifest = night(8, frames=120)
+    count, turns = 16, 2  # enough that the start of the batch itself counts for little
+    manifest = night(count, frames=120)
     busy = os.getloadavg()[0] > 1.2
-    seconds = {}
-    for jobs in (1, 2):
-        started = time.perf_counter()
-        assert run(manifest, "--jobs", jobs, "--state", manifest.parent / f"state{jobs}").returncode == 0
-        seconds[jobs] = time.perf_counter() - started
-    print(
-        f"\n8 shots: {seconds[1]:.1f} s with one job, {seconds[2]:.1f} s with two ({seconds[1] / seconds[2]:.2f} times)"
-    )
+    seconds = {1: np.inf, 2: np.inf}
+    for turn in range(turns):
+        for jobs in (1, 2):
+            started = time.perf_counter()
+            state = manifest.parent / f"state{turn}{jobs}"
+            assert run(manifest, "--jobs", jobs, "--state", state).returncode == 0
+            seconds[jobs] = min(seconds[jobs], time.perf_counter() - started)
+    ratio = seconds[1] / seconds[2]
+    print(f"\n{count} shots: {seconds[1]:.1f} s with one job, {seconds[2]:.1f} s with two ({ratio:.2f} times)")
     if busy:
         pytest.skip("the machine was busy with other work, so that the ratio says nothing")
-    assert seconds[1] / seconds[2] >= 1.8
+    assert ratio >= 1.8
 
 
 @pytest.mark.benchmark
