@@ -123,13 +123,16 @@ def touched_at(footprints: Sequence[Footprint], frame: float) -> Iterator[Cells]
     for footprint in footprints:
         if footprint.start_frame - footprint.frame_step <= frame <= footprint.end_frame + footprint.frame_step:
             touched = (footprint.contact_start <= frame) & (frame <= footprint.contact_end)
-            row, column = np.divmod(footprint.contact_cells[touched], footprint.window.columns)
-            yield np.stack([column + footprint.window.column, row + footprint.window.row], axis=-1)
+            yield _placed(footprint.window, *np.divmod(footprint.contact_cells[touched], footprint.window.columns))
 
 
 def marked(window: Window, mask: NDArray[np.bool_]) -> Cells:
     """The cells of a window that are marked in a mask (rows, columns)."""
-    row, column = np.nonzero(mask)
+    return _placed(window, *np.nonzero(mask))
+
+
+def _placed(window: Window, row: Cells, column: Cells) -> Cells:
+    """The cells (N, 2) in the rows and columns (N,) of a window."""
     return np.stack([column + window.column, row + window.row], axis=-1)
 
 
