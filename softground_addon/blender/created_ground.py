@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..core.graded_grid import GradedGrid, graded_grid
 from ..core.ground_plan import GroundPlan
-from . import playback, settings
-from .ground_mesh import mesh_of, write_positions
+from . import settings
+from .ground_mesh import discard, mesh_of, write_positions
 from .materials import ensure_material
 
 Array = NDArray[np.float64]
@@ -111,9 +111,7 @@ def draft(layout: Layout) -> Iterator[bpy.types.Object]:
         yield ground
     finally:
         if not ground.users_collection:
-            playback.remove(ground)
-            bpy.data.objects.remove(ground)
-            bpy.data.meshes.remove(mesh)
+            discard(ground)
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:

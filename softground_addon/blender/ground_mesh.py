@@ -350,6 +350,16 @@ def restore(ground: bpy.types.Object) -> None:
     write_positions(mesh, rest)
 
 
+def discard(ground: bpy.types.Object) -> None:
+    """Remove a ground that the add-on made, with its mesh and playback, unless another object has taken those over."""
+    mesh = mesh_of(ground)
+    if mesh.users - mesh.use_fake_user == 1:
+        playback.remove(ground)
+    bpy.data.objects.remove(ground)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+
+
 def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> bpy.types.Attribute:
     """A new point attribute; the one that the user has active stays so."""
     active = mesh.attributes.active_index

@@ -83,10 +83,7 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
         yield detail
     finally:
         if not detail.users_collection:
-            playback.remove(detail)
-            bpy.data.objects.remove(detail)
-        if not mesh.users:
-            bpy.data.meshes.remove(mesh)
+            ground_mesh.discard(detail)
 
 
 def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:
@@ -117,11 +114,7 @@ def remove(ground: bpy.types.Object) -> None:
     if detail is None:
         return
     _choose_instead(ground, detail)
-    playback.remove(detail)
-    mesh: Any = detail.data
-    bpy.data.objects.remove(detail)
-    if not mesh.users:
-        bpy.data.meshes.remove(mesh)
+    ground_mesh.discard(detail)
 
 
 def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:

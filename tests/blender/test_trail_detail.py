@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender import ground_mesh, refined_mesh, trail_detail
 from softground_addon.core.refinement import Region, refine
-from tests.blender import fingerprints
+from tests.blender import fingerprints, grounds
 from tests.blender.shots import walker
 
 
@@ -301,6 +301,26 @@ def test_another_trail_reuses_the_copy(scene):
     assert len(detail.data.vertices) < first
     assert [mesh.name for mesh in bpy.data.meshes] == ["Field", "Field Trail"]
     assert (ground.hide_viewport, ground.hide_render) == (True, True)
+
+
+def test_a_second_bake_on_the_fine_copy_plays_like_the_first(scene):
+    walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    field = scene.softground.ground = grounds.plane(scene, vertices=2)
+    bpy.context.view_layer.update()
+
+    def played(frame):
+        scene.frame_set(frame)
+        shown = trail_detail.detail_of(field).evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return points(shown.data)[:, 2]
+
+    bpy.ops.softground.bake()
+    first = {frame: played(frame) for frame in (1, 15, 30)}
+    bpy.ops.softground.bake()
+    assert np.ptp(first[1]) < 1e-6
+    assert np.ptp(first[30]) > 0.02
+    assert all(np.array_equal(played(frame), heights) for frame, heights in first.items())
 
 
 def test_a_transformed_ground_is_cut_where_the_trail_is_in_the_world(scene):
