@@ -1,14 +1,11 @@
 """Which bone is what: joints and feet of an armature, from the names of the usual rigs, else from its rest pose.
 
-Names are compared whole, after taking off the side and what a family puts around the words, so that a control, pole or
-twist bone (`foot_ik.L`, `c_foot_roll.l`, `thigh_twist_01_l`) is never taken for the limb. Where several bones carry one
-name (Rigify's DEF-, ORG- and control layers), the one that deforms the mesh wins.
+What each name says by itself is in `bone_names`; here the bones that carry the same word are told apart, and what the
+names leave out is completed from the rest pose.
 """
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -16,7 +13,11 @@ import bpy
 from mathutils import Vector
 
 from ..core.errors import InputError
+from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
 from .rest_pose import map_by_rest_pose
+
+BoneEnd = tuple[str, str]
+"""A bone's name, and "head" or "tail"."""
 
 
 @dataclass(frozen=True)
@@ -53,92 +54,17 @@ class RigMapping:
 
     Attributes
     ----------
-    joints : mapping of str to (str, str)
-        Canonical joint (`core.motion.JOINTS`) to bone name and end, "head" or "tail".
+    joints : mapping of str to BoneEnd
+        Canonical joint (`core.motion.JOINTS`) to the end of a bone.
     soles : tuple of SoleSource
         What prints, feet first.
     method : str
         "names" or "rest pose", for the report.
     """
 
-    joints: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    joints: Mapping[str, BoneEnd] = field(default_factory=dict)
     soles: tuple[SoleSource, ...] = ()
     method: str = "names"
-
-
-_LIMBS: Mapping[str, tuple[str, ...]] = {
-    "thigh": (
-        "thigh", "upleg", "upperleg", "thighbend", "thightwist", "thighstretch", "femur", "upperthigh", "legupper",
-        "hip", "hipjoint",
-    ),
-    "shin": (
-        "shin", "calf", "lowerleg", "loleg", "lowleg", "leg", "knee", "legstretch", "crus", "tibia", "leglower",
-        "kneejoint",
-    ),
-    "foot": ("foot", "ankle", "feet", "footjoint", "anklejoint"),
-    "toe": (
-        "toe11", "toe", "toes", "toebase", "ball", "football", "toesbase", "foottoe", "foottoes", "toebig", "bigtoe",
-        "toejoint",
-    ),
-    "upper_arm": (
-        "upperarm", "uparm", "arm", "upperarmbend", "shldrbend", "armtwist", "armstretch", "humerus", "armupper",
-        "shldr", "shoulder",
-    ),
-    "forearm": (
-        "forearm", "lowerarm", "loarm", "lowarm", "elbow", "forearmstretch", "forearmbend", "armlower", "radius",
-    ),
-    "hand": ("hand", "wrist", "palm"),
-}  # fmt: skip
-"""Words for the segments of a limb, most telling first, as they read without side, number and decoration."""
-
-_TRUNK: Mapping[str, tuple[str, ...]] = {
-    "hips": ("hips", "pelvis", "hip"),
-    "spine": (
-        "spine", "abdomen", "lowerback", "torso", "waist", "chest", "spinelower", "abdomenlower", "back", "upperbody",
-    ),
-    "neck": ("neck", "lowerneck", "necklower", "necktwist", "spine4"),
-    "head": ("head", "skull", "spine6"),
-}  # fmt: skip
-
-_HIPS_OF_SOME = ("root", "cog", "spine")
-"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
-
-_DECORATION = frozenset(
-    (
-        "def", "org", "mixamorig", "bip", "biped", "valve", "j", "bn", "jnt", "joint", "jt", "bone", "bind", "bnd",
-        "deform", "skin", "sk", "cc", "base", "rig", "armature", "skel",
-    )
-)  # fmt: skip
-"""Words that families put around a bone's name and that say nothing about what it is."""
-
-_DISTRACTIONS = frozenset(
-    (
-        "ik", "fk", "pole", "ctrl", "control", "ctl", "controller", "cntrl", "target", "tgt", "mch", "tweak", "vis",
-        "wgt", "ref", "helper", "offset", "parent", "master", "spin", "pivot", "heel", "roll", "snap", "switch",
-        "socket", "end", "nub", "leaf", "effector", "locator", "track",
-    )
-)  # fmt: skip
-"""Words of bones that steer a rig; none of them is ever part of the body."""
-
-_SIDES = {"l": "L", "left": "L", "r": "R", "right": "R"}
-
-_WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-
-_COMMON_PREFIX_SHARE = 0.6
-"""A first word that so many bones share is the character's name, not a body part."""
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """A bone's name, taken apart."""
-
-    bone: str
-    side: str
-    word: str
-    number: int
-    decoration: int
-    deforms: bool
-    depth: int
 
 
 def map_rig(armature: bpy.types.Object) -> RigMapping:
@@ -182,24 +108,38 @@ _WHOLE_BODY = frozenset(("hips", "neck", "head", *(f"{joint}_{side}" for joint i
 
 
 def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
-    """What the names say, with the limbs that they name in part read from the rest pose, where the two do not differ
-    about where a limb ends."""
-    joints, soles = dict(named.joints), list(named.soles)
+    """What the names say, with what they leave out taken from the shape of the rest pose.
+
+    A leg that is named in part is taken whole from there, as its words may mean other bones; of arms and trunk, what is
+    missing. Limbs about whose place the two differ stay as they are named.
+    """
+    joints, soles, found = dict(named.joints), named.soles, shaped.joints
+    shaped_soles = {sole.name: sole for sole in shaped.soles}
     for side in "lr":
-        leg, arm = ({joint: f"{joint}_{side}" for joint in limb} for limb in (_LEG, _ARM))
-        found = shaped.joints
-        ends = {found[leg[joint]] for joint in ("ankle", "ball") if leg[joint] in found}
-        if not all(leg[joint] in joints for joint in _LEG[:3]) and joints.get(leg["ankle"]) in ends:
-            joints = {joint: place for joint, place in joints.items() if joint not in leg.values()}
-            joints |= {joint: found[joint] for joint in leg.values() if joint in found}
-            for place, sole in enumerate(soles):
-                if sole.side.lower() == side:
-                    soles[place] = next(other for other in shaped.soles if other.name == sole.name)
-        missing = [joint for joint in arm.values() if joint not in joints]
-        if missing and joints.get(arm["shoulder"], found.get(arm["shoulder"])) == found.get(arm["shoulder"]):
-            joints |= {joint: found[joint] for joint in missing if joint in found}
-    joints |= {joint: place for joint, place in shaped.joints.items() if joint[-2] != "_" and joint not in joints}
-    return RigMapping(joints, tuple(soles), named.method)
+        leg, arm = ([f"{joint}_{side}" for joint in limb] for limb in (_LEG, _ARM))
+        if _is_part_of_leg(joints, found, side):
+            joints = {joint: place for joint, place in joints.items() if joint not in leg}
+            joints |= {joint: found[joint] for joint in leg if joint in found}
+            soles = tuple(shaped_soles.get(sole.name, sole) if sole.side.lower() == side else sole for sole in soles)
+        shoulder = f"shoulder_{side}"
+        if shoulder not in joints or joints[shoulder] == found.get(shoulder):
+            joints = _with_missing(joints, found, arm)
+    trunk = [joint for joint in found if not joint.endswith(("_l", "_r"))]
+    return RigMapping(_with_missing(joints, found, trunk), soles, named.method)
+
+
+def _is_part_of_leg(joints: Mapping[str, BoneEnd], found: Mapping[str, BoneEnd], side: str) -> bool:
+    """Whether a leg is named in part, and ends at a bone that is the end of a leg by its shape too."""
+    hip, knee, ankle, ball, _ = (f"{joint}_{side}" for joint in _LEG)
+    is_whole = {hip, knee, ankle} <= joints.keys()
+    return not is_whole and ankle in joints and joints[ankle] in (found.get(ankle), found.get(ball))
+
+
+def _with_missing(
+    joints: Mapping[str, BoneEnd], found: Mapping[str, BoneEnd], wanted: Iterable[str]
+) -> dict[str, BoneEnd]:
+    """The joints, and those of the wanted ones that only the others have."""
+    return {**joints, **{joint: found[joint] for joint in wanted if joint in found and joint not in joints}}
 
 
 def instances_armature(thing: bpy.types.Object) -> bool:
@@ -232,13 +172,13 @@ def require_armature(armature: bpy.types.Object | None) -> None:
 
 def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
     """The mapping that the names give, or None where they name no foot."""
-    readings = _read_names(bones)
+    names = read_names(bones)
     by_name = {bone.name: bone for bone in bones}
-    joints: dict[str, tuple[str, str]] = {}
+    joints: dict[str, BoneEnd] = {}
     soles = []
     for side, suffix in (("L", "_l"), ("R", "_r")):
-        limb = {segment: _best(readings, words, side) for segment, words in _LIMBS.items()}
-        _settle_ambiguities(limb, readings, by_name, side)
+        limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
+        _settle_ambiguities(limb, names, by_name, side)
         foot, toe = limb["foot"], limb["toe"]
         for joint, segment in _JOINT_HEADS.items():
             if bone := limb[segment]:
@@ -250,7 +190,7 @@ def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
             soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
     if not soles:
         return None
-    joints.update(_map_trunk(readings, by_name, joints))
+    joints.update(_map_trunk(names, by_name, joints))
     return RigMapping(joints=joints, soles=tuple(soles))
 
 
@@ -267,14 +207,14 @@ _JOINT_HEADS = {
 
 
 def _settle_ambiguities(
-    limb: dict[str, str], readings: list[_Reading], bones: Mapping[str, bpy.types.Bone], side: str
+    limb: dict[str, str], names: list[BoneName], bones: Mapping[str, bpy.types.Bone], side: str
 ) -> None:
     """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
-    knee, leg = (_best(readings, (word,), side) for word in ("knee", "leg"))
+    knee, leg = (best(names, (word,), side) for word in ("knee", "leg"))
     if knee and leg and _is_ancestor(bones, leg, knee):
         limb["shin"] = knee
         limb["thigh"] = limb["thigh"] if limb["thigh"] and _is_ancestor(bones, limb["thigh"], leg) else leg
-    ankle, foot = (_best(readings, (word,), side) for word in ("ankle", "foot"))
+    ankle, foot = (best(names, (word,), side) for word in ("ankle", "foot"))
     if ankle and foot and _is_ancestor(bones, ankle, foot):
         limb["foot"] = ankle
         limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
@@ -283,14 +223,18 @@ def _settle_ambiguities(
         limb["toe"] = ""
 
 
+_HIPS_OF_SOME = ("root", "cog", "spine")
+"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
+
+
 def _map_trunk(
-    readings: list[_Reading], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, tuple[str, str]]
-) -> dict[str, tuple[str, str]]:
+    names: list[BoneName], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, BoneEnd]
+) -> dict[str, BoneEnd]:
     """Hips, spine, neck and head; the hips may also be where the thighs meet."""
-    found = {joint: _best(readings, words, "") for joint, words in _TRUNK.items()}
+    found = {joint: best(names, words, "") for joint, words in TRUNK.items()}
     thighs = [bones[limbs[joint][0]] for joint in ("hip_l", "hip_r") if joint in limbs]
     if not found["hips"] or not bones[found["hips"]].use_deform:
-        candidates = [found["hips"], *(_best(readings, (word,), "") for word in _HIPS_OF_SOME)]
+        candidates = [found["hips"], *(best(names, (word,), "") for word in _HIPS_OF_SOME)]
         candidates.append(_common_ancestor([thigh.name for thigh in thighs], bones))
         found["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones)
     top = found["neck"] or found["head"]
@@ -298,93 +242,17 @@ def _map_trunk(
         chain = _ancestors(bones, top)
         if found["hips"] in chain:
             above = chain[: chain.index(found["hips"])]
-            words = {reading.bone: reading.word for reading in readings}
-            trunk = [bone for bone in above if words.get(bone) not in _TRUNK["neck"]]
+            words = {name.bone: name.word for name in names}
+            trunk = [bone for bone in above if words.get(bone) not in TRUNK["neck"]]
             found["spine"] = trunk[-1] if trunk else ""
     if found["spine"] == found["hips"]:
         spines = sorted(
-            (r.number, r.bone) for r in readings if r.word == "spine" and r.deforms and r.bone != found["hips"]
+            (name.number, name.bone)
+            for name in names
+            if name.word == "spine" and name.deforms and name.bone != found["hips"]
         )
         found["spine"] = spines[0][1] if spines else ""
     return {joint: (bone, "head") for joint, bone in found.items() if bone}
-
-
-def _best(readings: list[_Reading], words: tuple[str, ...], side: str) -> str:
-    """Name of the bone that fits best: deforming, most telling word, lowest number, least decoration; empty if none."""
-    rank = {word: place for place, word in enumerate(words)}
-    fits = []
-    for reading in readings:
-        if reading.side != side:
-            continue
-        numbered = f"{reading.word}{reading.number}"
-        if numbered in rank:
-            fits.append((not reading.deforms, rank[numbered], 0, reading.decoration, reading.depth, reading.bone))
-        elif reading.word in rank and reading.number <= _HIGHEST_NUMBER:
-            number = max(reading.number, 0)
-            fits.append(
-                (not reading.deforms, rank[reading.word], number, reading.decoration, reading.depth, reading.bone)
-            )
-    return min(fits)[-1] if fits else ""
-
-
-def _read_names(bones: Iterable[bpy.types.Bone]) -> list[_Reading]:
-    """The bones whose names can name a part of the body."""
-    split = {bone.name: _split(bone.name) for bone in bones}
-    first = Counter(words[0] for words in split.values() if len(words) > 1)
-    shared = {word for word, count in first.items() if count > _COMMON_PREFIX_SHARE * len(split) and len(split) > 4}
-    readings = []
-    for bone in bones:
-        words = split[bone.name]
-        if words and words[0] in shared:
-            words = words[1:]
-        reading = _read(bone, words)
-        if reading:
-            readings.append(reading)
-    return readings
-
-
-def _split(name: str) -> list[str]:
-    """Lower-case words and numbers of a name, without its namespace."""
-    return [word.lower() for word in _WORDS.findall(name.rsplit(":", 1)[-1])]
-
-
-def _read(bone: bpy.types.Bone, words: list[str]) -> _Reading | None:
-    if not words or bone.name.startswith("c_") or _DISTRACTIONS.intersection(words):
-        return None
-    side, decoration = "", 0
-    parts: list[str] = []
-    numbers: list[int] = []
-    for word in words:
-        if word in _SIDES and not side:
-            side = _SIDES[word]
-        elif word.isdigit():
-            if parts:
-                numbers.append(int(word))
-        elif word in _DECORATION:
-            decoration += 1
-        elif word not in ("c", "x", "m", "center", "centre", "mid"):
-            parts.append(word)
-    word = "".join(parts)
-    if not side:
-        side, word = _glued_side(word)
-    number = int("".join(map(str, numbers))) if numbers else -1
-    return _Reading(bone.name, side, word, number, decoration, bone.use_deform, len(bone.parent_recursive))
-
-
-_HIGHEST_NUMBER = 9
-"""Bones with larger numbers belong to series (fingers, toes, twists), not to the limb."""
-
-_BODY_WORDS = frozenset(word for words in _LIMBS.values() for word in words)
-
-
-def _glued_side(word: str) -> tuple[str, str]:
-    """Side and rest of a word such as `lhand` or `leftfoot`."""
-    for prefix in ("left", "right", "l", "r"):
-        if word.startswith(prefix) and word[len(prefix) :] in _BODY_WORDS:
-            return _SIDES[prefix], word[len(prefix) :]
-        if word.endswith(prefix) and word[: -len(prefix)] in _BODY_WORDS and len(prefix) > 1:
-            return _SIDES[prefix], word[: -len(prefix)]
-    return "", word
 
 
 def _ancestors(bones: Mapping[str, bpy.types.Bone], name: str) -> list[str]:
