@@ -21,6 +21,9 @@ SCHEMA_VERSION = 1
 
 STATUSES = ("done", "skipped", "refused", "failed", "crashed", "interrupted")
 
+PROGRESS_STYLES = ("plain", "json", "openjd", "none")
+"""Lines for people, a JSON object a line, OpenJD's messages, or nothing."""
+
 FIRST_ESTIMATE = 0.1
 """Share of a bake from which on its pace says something of the time left."""
 
@@ -51,9 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE.json", help="outcome of every shot (default: batch.json in the state)"
     )
-    parser.add_argument(
-        "--progress", choices=("plain", "json", "openjd", "none"), default="plain", help="how to show progress"
-    )
+    parser.add_argument("--progress", choices=PROGRESS_STYLES, default="plain", help="how to show progress")
 
 
 def bake_batch(options: argparse.Namespace) -> list[Outcome]:

@@ -1,4 +1,4 @@
-"""The command line: `softground bake` and `batch`, the same inside `blender --command` and with the bpy module."""
+"""The command line: `softground bake`, `export` and `batch`, in `blender --command` and with the bpy module alike."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import argparse
 import contextlib
 import json
 import os
-import re
 import signal
 import sys
 import threading
@@ -19,14 +18,12 @@ import bpy
 
 from ..core import files, presets, receipts, report
 from ..core.errors import BakeError, InputError, SoftGroundError
-from ..core.manifest import BatchShot, frame_range
-from . import bake_job, batch, export_formats, jobs, settings
+from ..core.manifest import BatchShot
+from . import bake_job, batch, cli_arguments, export_formats, jobs, settings
 from .character_setup import set_up_automatically
 from .preset_menu import user_folder
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
-
-Show = Callable[[jobs.Progress], None]
 
 PARENT_POLL = 0.5
 """Time between two looks at whether the parent process is there [s]."""
@@ -36,7 +33,7 @@ _INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 def run_in_blender(arguments: Sequence[str]) -> int:
     """Entry of `blender -b shot.blend --command softground ...`: acts on the open file."""
-    return _run(_parser(standalone=False), arguments)
+    return _run(arguments, standalone=False)
 
 
 def run_standalone(arguments: Sequence[str]) -> int:
@@ -45,16 +42,16 @@ def run_standalone(arguments: Sequence[str]) -> int:
 
     register()
     try:
-        return _run(_parser(standalone=True), arguments)
+        return _run(arguments, standalone=True)
     finally:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         unregister()
 
 
-def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
+def _run(arguments: Sequence[str], *, standalone: bool) -> int:
     previous = {number: signal.signal(number, _interrupt) for number in _INTERRUPTS}
     try:
-        options = parser.parse_args(_with_frames_joined(arguments))
+        options = cli_arguments.parse(arguments, standalone=standalone)
         if options.command == "batch":
             return _batch_code(batch.bake_batch(options))
         if options.command == "export":
@@ -80,17 +77,6 @@ def _run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     return EXIT_DONE
 
 
-def _with_frames_joined(arguments: Sequence[str]) -> list[str]:
-    """The arguments with negative frames given as `--frames=-20-5`: alone, they would be taken for an option."""
-    joined: list[str] = []
-    for argument in arguments:
-        if joined and joined[-1] == "--frames" and re.fullmatch(r"-\d+--?\d+", argument):
-            joined[-1] += f"={argument}"
-        else:
-            joined.append(argument)
-    return joined
-
-
 def _interrupt(_number: int, _frame: object) -> None:
     for number in _INTERRUPTS:
         signal.signal(number, signal.SIG_IGN)  # once is enough: what follows is the cleaning up
@@ -106,72 +92,6 @@ def _batch_code(outcomes: Sequence[batch.Outcome]) -> int:
     if statuses & {"crashed", "failed"}:
         return EXIT_FAILED_CHECK
     return EXIT_BAD_INPUT if "refused" in statuses else EXIT_DONE
-
-
-def _parser(*, standalone: bool) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="softground", description="Physically based footprints for animated characters."
-    )
-    commands = parser.add_subparsers(dest="command", required=True)
-    bake = commands.add_parser("bake", help="bake the footprints of a shot")
-    if standalone:
-        bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
-    bake.add_argument("--scene", metavar="NAME", help="scene to bake, if it is not the one that the file opens with")
-    bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
-    bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
-    bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
-    bake.add_argument(
-        "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",
-        help="a setting under scene.softground, e.g. material.youngs_modulus=4e5; may be repeated",
-    )  # fmt: skip
-    destination = bake.add_mutually_exclusive_group()
-    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
-    destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
-    bake.add_argument("--report", type=Path, metavar="FILE.json", help="write the report to this file")
-    bake.add_argument(
-        "--progress", choices=("plain", "json", "openjd", "none"), default="plain", help="how to show progress"
-    )
-    bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
-    bake.add_argument(
-        "--receipt", type=Path, metavar="FILE.json", help="write the checksums of what was read and written"
-    )
-    bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
-    bake.set_defaults(blend=None)
-    _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
-    batch.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
-    return parser
-
-
-def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
-    if standalone:
-        export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
-    export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
-    export.add_argument(
-        "--format", required=True, type=str.upper, choices=tuple(export_formats.FORMATS), help="kind of file"
-    )
-    export.add_argument(
-        "--output", type=Path, metavar="FILE",
-        help="the file; of images their folder and what their names begin with; beside the shot if left out",
-    )  # fmt: skip
-    export.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame; else those baked")
-    export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
-    export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
-    export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
-    export.set_defaults(blend=None)
-
-
-def _frame_range(text: str) -> tuple[int, int]:
-    try:
-        return frame_range(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _override(text: str) -> tuple[str, str]:
-    path, equals, value = text.partition("=")
-    if not equals or not path.strip():
-        raise argparse.ArgumentTypeError(f"'{text}' is not of the form PATH=VALUE")
-    return path.strip(), value.strip()
 
 
 def _bake(options: argparse.Namespace) -> None:
@@ -391,4 +311,9 @@ def _none(_progress: jobs.Progress) -> None:
     pass
 
 
-_PROGRESS: dict[str, Any] = {"plain": _Plain(), "json": _json, "openjd": _openjd, "none": _none}
+_PROGRESS: dict[str, Callable[[jobs.Progress], None]] = {
+    "plain": _Plain(),
+    "json": _json,
+    "openjd": _openjd,
+    "none": _none,
+}

@@ -59,7 +59,7 @@ class RigMapping:
     soles : tuple of SoleSource
         What prints, feet first.
     method : str
-        "names" or "rest pose", for the report.
+        How they were found: by "names" or "rest pose", or as the "settings" have them.
     """
 
     joints: Mapping[str, BoneEnd] = field(default_factory=dict)
