@@ -2,7 +2,7 @@
 
 A band of half-width K is block tridiagonal in blocks of K rows. Cyclic reduction takes every other block out at once,
 which leaves a block tridiagonal system of half the size (Golub and Van Loan 2013, "Matrix Computations", 4th edition,
-section 4.5.4): a dozen rounds of array operations instead of one for each row. The blocks run along the last axis.
+section 4.5): a dozen rounds of array operations instead of one for each row. The blocks run along the last axis.
 """
 
 from __future__ import annotations

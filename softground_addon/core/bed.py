@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .deformation import GroundMaterial
-from .heightfield import Surface, TerrainTiles, Window
+from .heightfield import Surface, Terrain, TerrainTiles, Window
 from .soft_ground import SoftGround
-from .variation import Factors, VariationTiles
+from .variation import Factors, Variation, VariationTiles
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,35 @@ class Timing:
     frame_step: float
 
 
-class Bed:
+class UndisturbedCells:
+    """The undisturbed ground in cells: its surface, and how it varies; looked up once per tile.
+
+    Parameters
+    ----------
+    terrain : Terrain
+    variation : Variation or None
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, terrain: Terrain, variation: Variation | None, cell_size: float) -> None:
+        self.cell_size = cell_size
+        self._terrain = terrain
+        self._tiles: dict[int, TerrainTiles] = {}
+        self._variation = VariationTiles(variation, cell_size) if variation else None
+
+    def surface(self, window: Window, divisions: int = 1) -> Surface:
+        """The ground under a window, its cells divided in so many parts along each side."""
+        if divisions not in self._tiles:
+            self._tiles[divisions] = TerrainTiles(self._terrain, self.cell_size / divisions)
+        return self._tiles[divisions].surface(window.refined(divisions))
+
+    def factors(self, window: Window) -> Factors | None:
+        """How the ground varies over a window; None where it does not."""
+        return self._variation.factors(window) if self._variation else None
+
+
+class Bed(UndisturbedCells):
     """The ground that soles are laid on, in cells, and how they press on it.
 
     Parameters
@@ -45,9 +73,8 @@ class Bed:
     """
 
     def __init__(self, ground: SoftGround, cell_size: float) -> None:
-        self.ground, self.cell_size = ground, cell_size
-        self.variation = VariationTiles(ground.variation, cell_size) if ground.variation else None
-        self._tiles: dict[int, TerrainTiles] = {}
+        super().__init__(ground.terrain, ground.variation, cell_size)
+        self.ground = ground
 
     @property
     def material(self) -> GroundMaterial:
@@ -58,12 +85,6 @@ class Bed:
     def rim_reach(self) -> float:
         """Reach of the rim in cells."""
         return self.material.rim_reach / self.cell_size
-
-    def surface(self, window: Window, divisions: int = 1) -> Surface:
-        """The undisturbed ground under a window, its cells divided in so many parts along each side."""
-        if divisions not in self._tiles:
-            self._tiles[divisions] = TerrainTiles(self.ground.terrain, self.cell_size / divisions)
-        return self._tiles[divisions].surface(window.refined(divisions))
 
 
 @dataclass(frozen=True)

@@ -81,13 +81,14 @@ def free_loads(
         from the speed of the fall to that of what follows, and the weight meanwhile.
     """
     assert motion.centre is not None, motion.name
+    velocity = np.diff(motion.centre, axis=0) / motion.time_step  # between frame i and i + 1
     approaches = [_approach(sole, terrain) for sole in motion.soles]
-    offset = np.array([_offset(approach, motion) for approach in approaches])
+    offset = np.array([_offset(approach, velocity, motion) for approach in approaches])
     normal = np.stack([approach.normal for approach in approaches], axis=1)
     clearance = np.stack([approach.clearance for approach in approaches], axis=1) - offset
     size = np.array([approach.size for approach in approaches])
     touching = hysteresis(clearance < TOUCH_HEIGHT * size, clearance > LEAVE_HEIGHT * size)
-    touching |= _bounces(clearance, motion) & ~_with_neighbours(touching)
+    touching |= _bounces(clearance, velocity, motion) & ~_with_neighbours(touching)
     seen = Contacts(touching, offset, normal, clearance)
 
     fine = motion.resampled(steps)
@@ -98,8 +99,9 @@ def free_loads(
         for start in runs(shown[:, number])[0]:
             shown[start : start + shortest, number] = True
     pushed = _pushed(
-        motion,
+        velocity,
         seen,
+        motion,
         steps=steps,
         shortest=shortest,
         lasting=max(1, round(characteristic_time / fine.time_step)),
@@ -121,25 +123,34 @@ def free_loads(
 
 
 def _pushed(
-    motion: CharacterMotion, seen: Contacts, *, steps: int, shortest: int, lasting: int, landing_only: bool
+    velocity: Array,
+    seen: Contacts,
+    motion: CharacterMotion,
+    *,
+    steps: int,
+    shortest: int,
+    lasting: int,
+    landing_only: bool,
 ) -> Array:
     """What the ground's push beyond the weight accelerates a body by at each of N steps, (N, 3) [m/s²].
 
     Parameters
     ----------
-    motion : CharacterMotion
+    velocity : (F - 1, 3) float array
+        Of the centre from each frame to the next [m/s].
     seen : Contacts
-        At its frames.
+        At the frames.
+    motion : CharacterMotion
     steps, shortest, lasting : int
         Steps in a frame, of the shortest contact, and over which a change of velocity acts.
     landing_only : bool
         Only what stops the fall, over that time even where the contact ends before.
     """
-    assert motion.centre is not None, motion.name
-    pushed = np.zeros(((len(motion.frames) - 1) * steps + 1, 3))
+    pushed = np.zeros((len(velocity) * steps + 1, 3))
     for first, last in zip(*runs(seen.touching.any(axis=1)), strict=True):
         end = min(max(int(last) * steps, int(first) * steps + shortest), len(pushed))
-        for frame, change in _velocity_changes(motion, seen, int(first), int(last), landing_only=landing_only).items():
+        changes = _velocity_changes(velocity, seen, int(first), int(last), motion, landing_only=landing_only)
+        for frame, change in changes.items():
             start = frame * steps
             over = lasting if landing_only else min(lasting, end - start)
             pushed[start : min(start + over, end)] += change * steps / (over * motion.time_step)
@@ -191,25 +202,22 @@ def _approach(sole: SoleMotion, terrain: Terrain) -> _Approach:
     return _Approach(np.concatenate(clearance), where, normal, size)
 
 
-def _offset(approach: _Approach, motion: CharacterMotion) -> float:
+def _offset(approach: _Approach, velocity: Array, motion: CharacterMotion) -> float:
     """The clearance at which a body that is carried stands [m], 0 when it never does."""
-    assert motion.centre is not None, motion.name
-    carried = np.zeros(len(motion.centre), bool)
+    carried = np.zeros(len(approach.clearance), bool)
     if len(carried) > 2:
-        excess = np.diff(motion.centre[:, 2], 2) / motion.time_step**2 / motion.gravity
+        excess = np.diff(velocity[:, 2]) / motion.time_step / motion.gravity
         carried[1:-1] = np.abs(excess) < FALLING
     standing = carried & (np.abs(approach.clearance) < FLOAT_LIMIT * approach.size)
     return float(np.percentile(approach.clearance[standing], FLOAT_PERCENTILE)) if standing.any() else 0.0
 
 
-def _bounces(clearance: Array, motion: CharacterMotion) -> Mask:
+def _bounces(clearance: Array, velocity: Array, motion: CharacterMotion) -> Mask:
     """Frames at which the nearest sole hits the ground between two frames, (F, S)."""
-    assert motion.centre is not None, motion.name
     hits = np.zeros(clearance.shape, bool)
     if len(clearance) < 3:
         return hits
-    velocity = np.diff(motion.centre[:, 2]) / motion.time_step
-    before, after = velocity[:-1], velocity[1:]
+    before, after = velocity[:-1, 2], velocity[1:, 2]
     lowest = clearance[1:-1].min(axis=1)
     back = (before < 0) & (after > 0) & (after - before > 2 * motion.gravity * motion.time_step)
     reach = np.maximum(np.abs(before), np.abs(after)) * motion.time_step
@@ -227,11 +235,9 @@ def _with_neighbours(mask: Mask) -> Mask:
 
 
 def _velocity_changes(
-    motion: CharacterMotion, seen: Contacts, first: int, last: int, *, landing_only: bool
+    velocity: Array, seen: Contacts, first: int, last: int, motion: CharacterMotion, *, landing_only: bool
 ) -> dict[int, Array]:
     """Changes of velocity beyond gravity's during a contact from frame `first` to before `last`, by frame [m/s]."""
-    assert motion.centre is not None, motion.name
-    velocity = np.diff(motion.centre, axis=0) / motion.time_step  # between frame i and i + 1
     changes: dict[int, Array] = {}
     if 0 < first < len(velocity):
         up = seen.normal[first, int(seen.clearance[first].argmin())]

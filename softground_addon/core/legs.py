@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .rigid import carried, displacement, rotation, turn_between, unit
+from .rigid import displacement, perpendicular, rotation, turn_between, unit
 
 Array = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ def _bend(leg: Leg, axis: Array, aside: Array) -> Array:
     distance = np.linalg.norm(offset, axis=-1)
     toes = unit(leg.toward_toes - np.sum(leg.toward_toes * axis, axis=-1, keepdims=True) * axis)
     settled = offset + _KNEE_HINT * leg.length[:, None] * toes
-    forward = unit(np.where(np.linalg.norm(settled, axis=-1, keepdims=True) > 0, settled, _across(axis)))
+    forward = unit(np.where(np.linalg.norm(settled, axis=-1, keepdims=True) > 0, settled, perpendicular(axis)))
     sideways = np.cross(axis, forward)
     deviation = np.arctan2(np.sum(offset * sideways, axis=-1), np.sum(offset * forward, axis=-1))
     kept = deviation * np.minimum(1.0, distance / np.maximum(aside, 1e-12))
@@ -141,12 +141,3 @@ def _bend(leg: Leg, axis: Array, aside: Array) -> Array:
 
 def _distance(start: Array, end: Array) -> Array:
     return np.asarray(np.linalg.norm(end - start, axis=-1))
-
-
-def _across(axis: Array) -> Array:
-    return np.cross(axis, np.where(np.abs(axis[..., :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
-
-
-def solved_joints(leg: Leg, solved: SolvedLeg) -> tuple[Array, Array, Array]:
-    """Hip, knee and ankle of a solved leg, each (F, 3) [m]."""
-    return carried(solved.thigh, leg.hip), carried(solved.thigh, leg.knee), carried(solved.shank, leg.ankle)

@@ -7,16 +7,17 @@ material then costs some milliseconds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .bed import UndisturbedCells
 from .contacts import runs
 from .deformation import GroundMaterial, compress, compression_rate, sink, target_compression, touching_fraction
 from .errors import InputError
-from .heightfield import Terrain, TerrainTiles, Window
+from .heightfield import Terrain, Window
 from .indentation import Springs, stress
 from .pressure import Pressure, pressure_field
 from .simulation import CharacterLoads
@@ -24,7 +25,7 @@ from .sole_points import contact_window, places, point_contact, sole_points
 from .solid_imprint import ground_under
 from .solids import posed
 from .stance import descent
-from .variation import Factors, Variation, VariationTiles
+from .variation import Factors, Variation
 
 Array = NDArray[np.float64]
 
@@ -167,80 +168,76 @@ def stance_loads(
     variation : Variation, optional
         How the ground varies from place to place.
     """
-    varying = VariationTiles(variation, cell_size) if variation else None
-    tiles: dict[int, TerrainTiles] = {}
+    cells = UndisturbedCells(terrain, variation, cell_size)
     stances: list[StanceLoad | SolidLoad] = []
     for character in loads:
-        motion, contacts = character.motion, character.contacts
-        for index, sole in enumerate(motion.soles):
-            if sole.sole.solid:
-                under = tiles.setdefault(1, TerrainTiles(terrain, cell_size))
-                stances += _solid_loads(character, index, under, varying)
-                continue
-            points = sole_points(sole.sole, sole.transforms)
-            divisions = points.cell_divisions(cell_size)
-            tiles.setdefault(divisions, TerrainTiles(terrain, cell_size / divisions))
-            for first, end in zip(*runs(contacts.touching[:, index]), strict=True):
-                steps = slice(max(int(first), 1), int(end))  # the first step of all is a state, it presses nothing
-                poses, normals = sole.transforms[steps], contacts.normal[steps, index]
-                if not len(poses):
-                    continue
-                window = contact_window(points, poses, cell_size)
-                contact = point_contact(points, poses, tiles[divisions].surface(window.refined(divisions)))
-                x, y = places(points, poses)
-                factors = None
-                if varying:
-                    cells = window.cells_under(x, y, cell_size)
-                    factors = Factors(*(factor[cells] for factor in varying.factors(window)))
-                landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
-                force = np.einsum("ni,ni->n", character.forces.forces[steps, index], normals)
-                stances.append(
-                    StanceLoad(
-                        motion.name,
-                        sole.sole.name,
-                        motion.frames[steps],
-                        contact.clearance,
-                        contact.area / normals[:, 2:],
-                        np.maximum(force, 0.0),
-                        x,
-                        y,
-                        character.forces.centre_of_pressure[steps, index, :2],
-                        factors,
-                        points.tolerance,
-                        motion.time_step,
-                        descent(sole.sole, landing, normals[0]) / motion.time_step,
-                    )
-                )
+        for index, sole in enumerate(character.motion.soles):
+            load = _solid_loads if sole.sole.solid else _sole_loads
+            stances += load(character, index, cells)
     return sorted(stances, key=lambda stance: float(stance.frames[0]))
 
 
-def _solid_loads(
-    character: CharacterLoads, index: int, tiles: TerrainTiles, varying: VariationTiles | None
-) -> list[StanceLoad | SolidLoad]:
+def _contacts_of(character: CharacterLoads, index: int) -> Iterator[slice]:
+    """The steps of each contact of a sole, without the first of all: that is a state, it presses nothing."""
+    for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
+        if end > max(first, 1):
+            yield slice(max(int(first), 1), int(end))
+
+
+def _sole_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[StanceLoad]:
+    """Every contact of a foot."""
+    motion = character.motion
+    sole = motion.soles[index]
+    points = sole_points(sole.sole, sole.transforms)
+    divisions = points.cell_divisions(cells.cell_size)
+    for steps in _contacts_of(character, index):
+        poses, normals = sole.transforms[steps], character.contacts.normal[steps, index]
+        window = contact_window(points, poses, cells.cell_size)
+        contact = point_contact(points, poses, cells.surface(window, divisions))
+        x, y = places(points, poses)
+        factors = cells.factors(window)
+        if factors:
+            under = window.cells_under(x, y, cells.cell_size)
+            factors = Factors(*(factor[under] for factor in factors))
+        landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
+        force = np.einsum("ni,ni->n", character.forces.forces[steps, index], normals)
+        yield StanceLoad(
+            character=motion.name,
+            sole=sole.sole.name,
+            frames=motion.frames[steps],
+            clearance=contact.clearance,
+            area=contact.area / normals[:, 2:],
+            force=np.maximum(force, 0.0),
+            x=x,
+            y=y,
+            centre=character.forces.centre_of_pressure[steps, index, :2],
+            factors=factors,
+            tolerance=points.tolerance,
+            step=motion.time_step,
+            landing_speed=descent(sole.sole, landing, normals[0]) / motion.time_step,
+        )
+
+
+def _solid_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[SolidLoad]:
     """Every contact of a body."""
     motion = character.motion
     sole, force = motion.soles[index], character.forces.forces[:, index]
     solid = sole.sole.solid
     assert solid is not None, sole.sole.name
     normal_force = np.maximum(np.einsum("ni,ni->n", force, character.contacts.normal[:, index]), 0.0)
-    found: list[StanceLoad | SolidLoad] = []
-    for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
-        steps = np.arange(max(int(first), 1), int(end))
-        if not len(steps):
-            continue
+    for contact in _contacts_of(character, index):
+        steps = np.arange(contact.start, contact.stop)
         chosen = np.unique([*np.linspace(steps[0], steps[-1], POSES).astype(int), steps[normal_force[steps].argmax()]])
         springs, pressing = [], []
         for step in chosen:
-            place = posed(solid.vertices, sole.transforms[step, 0])[:, :2]
-            window = Window.around(place.min(axis=0), place.max(axis=0), tiles.cell_size)
-            factors = varying.factors(window) if varying else None
-            under = ground_under(solid, sole.transforms[step, 0], tiles.surface(window), np.inf, factors)
+            pose = sole.transforms[step, 0]
+            place = posed(solid.vertices, pose)[:, :2]
+            window = Window.around(place.min(axis=0), place.max(axis=0), cells.cell_size)
+            under = ground_under(solid, pose, cells.surface(window), np.inf, cells.factors(window))
             if under is not None:
                 springs.append(under.springs)
                 pressing.append(normal_force[step])
-        frames = motion.frames[steps]
-        found.append(SolidLoad(motion.name, sole.sole.name, frames, tuple(springs), np.array(pressing)))
-    return found
+        yield SolidLoad(motion.name, sole.sole.name, motion.frames[steps], tuple(springs), np.array(pressing))
 
 
 def deepest(
@@ -257,7 +254,7 @@ def matching_modulus(
 
     Parameters
     ----------
-    stances : sequence of StanceLoad
+    stances : sequence of StanceLoad or SolidLoad
     material : GroundMaterial
     depth : float
         Wanted depth of the deepest print [m].

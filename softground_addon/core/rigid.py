@@ -37,10 +37,14 @@ def turn_between(start: Array, end: Array) -> Array:
     axis = np.cross(a, b)
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)
     cosine = np.sum(a * b, axis=-1, keepdims=True)
-    across = np.cross(a, np.where(np.abs(a[..., :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     opposite = (sine < 1e-9) & (cosine < 0)
-    direction = np.where(opposite, unit(across), axis / np.maximum(sine, 1e-300))
+    direction = np.where(opposite, unit(perpendicular(a)), axis / np.maximum(sine, 1e-300))
     return np.asarray(direction * np.arctan2(sine, cosine))
+
+
+def perpendicular(directions: Array) -> Array:
+    """A vector across each of some unit vectors (..., 3), of no particular length or side."""
+    return np.cross(directions, np.where(np.abs(directions[..., :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 
 def nearest_rotation(matrices: Array) -> Array:

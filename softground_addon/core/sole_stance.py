@@ -47,7 +47,7 @@ class SoleStance(Stance):
         ground = bed.surface(window, divisions) if divisions > 1 else cells
         over_ground = point_contact(points, poses, ground)
         area = over_ground.area / self._steps.normals[steps, 2, None]
-        factors = bed.variation.factors(window) if bed.variation else None
+        factors = bed.factors(window)
         sinking = sink(
             over_ground.clearance,
             area,

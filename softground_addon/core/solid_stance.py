@@ -76,7 +76,7 @@ class SolidStance(Stance):
         poses = self._between(start, end, parts)
         force = np.repeat(self._force[steps], parts)
         upright = np.repeat(self._steps.normals[steps, 2], parts)
-        factors = bed.variation.factors(window) if bed.variation else None
+        factors = bed.factors(window)
         coverage = np.zeros((len(poses), window.rows, window.columns), np.float32)
         target = np.zeros(coverage.shape)
         sinkage, area = np.zeros(len(poses)), np.zeros(len(poses))

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softground_addon.core.legs import Leg, solve, solved_joints
+from softground_addon.core.legs import Leg, solve
+from softground_addon.core.rigid import carried
 
 THIGH, SHANK = 0.45, 0.43
 
@@ -23,6 +24,11 @@ def bent_leg(flexion, count=1, heading=0.0):
 def flexion_of(hip, knee, ankle):
     thigh, shank = knee - hip, ankle - knee
     return np.arctan2(np.linalg.norm(np.cross(thigh, shank), axis=-1), np.sum(thigh * shank, axis=-1))
+
+
+def solved_joints(leg, solved):
+    """Hip, knee and ankle of a solved leg."""
+    return carried(solved.thigh, leg.hip), carried(solved.thigh, leg.knee), carried(solved.shank, leg.ankle)
 
 
 vectors = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
