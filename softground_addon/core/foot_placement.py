@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import runs
-from .motion import Sole, SoleMotion, SolePatch
+from .motion import CharacterMotion, Sole, SoleMotion, SolePatch
 from .rigid import carried, displacement, rotation
 from .slopes import fitted_slope, smoothed, upper_envelope
 
@@ -105,14 +105,12 @@ def lowest_clearance(points: Array, ground: PressedGround, frames: Array) -> Arr
 
 
 def place_sole(
-    motion: SoleMotion,
+    motion: CharacterMotion,
+    number: int,
     touching: Mask,
     ground: PressedGround,
     undisturbed: PressedGround,
-    frames: Array,
     *,
-    frame_rate: float,
-    time_scale: float = 1.0,
     align: float = 1.0,
     lock: float = 0.0,
     heel_rise: Array | None = None,
@@ -127,17 +125,14 @@ def place_sole(
 
     Parameters
     ----------
-    motion : SoleMotion
+    motion : CharacterMotion
         The source, at scene frames.
+    number : int
+        Which of its soles.
     touching : (F,) bool array
+        When that sole touches.
     ground, undisturbed : PressedGround
         As it stands at each frame, and before the bake.
-    frames : (F,) float array
-        Scene frames.
-    frame_rate : float
-        [Hz]
-    time_scale : float
-        How much slower than an adult's the motion is: sqrt(leg length / 0.9 m).
     align : float
         How much of the slope the foot takes on, 0 to 1.
     lock : float
@@ -154,28 +149,27 @@ def place_sole(
     Placement
         Without effect where the sole never touches.
     """
-    points = posed_points(motion)
+    sole, frames = motion.soles[number], motion.frames
+    points = posed_points(sole)
     if not touching.any():
         carry = np.broadcast_to(np.eye(4), (len(frames), 4, 4)).copy()
         return Placement(carry, np.zeros(len(frames)), np.zeros(len(frames)), np.full(len(frames), np.inf))
     pivot = np.einsum("fq,fqi->fi", _lowest(points, PIVOT_DEPTH), points)
-    per_second = frame_rate * time_scale
     slide = lock * slide_offset(points, touching) if lock else np.zeros_like(pivot)
-    turn = rotation(
-        align
-        * _alignment(motion, points + slide[:, None], touching, ground, undisturbed, frames, ALIGN_TIME * per_second)
-    )
+    width = ALIGN_TIME * motion.adult_second
+    alignment = _alignment(sole, points + slide[:, None], touching, ground, undisturbed, frames, width)
+    turn = rotation(align * alignment)
     carry = displacement(turn, pivot, pivot + slide)
     if heel_rise is not None:
-        across = (turn @ motion.transforms[:, 0, :3, 1, None])[..., 0]
-        toes = carried(carry, points[:, _foremost(motion, points)])
+        across = (turn @ sole.transforms[:, 0, :3, 1, None])[..., 0]
+        toes = carried(carry, points[:, _foremost(sole, points)])
         carry = displacement(rotation(heel_rise[:, None] * across), toes, toes) @ carry
     turned = carried(carry[:, None], points)
     needed = -lowest_clearance(turned, ground, frames)
     if clearance is not None:
         needed = np.where(touching, needed + clearance, needed)
     lift = _between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
-    lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * per_second)))
+    lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change

@@ -19,8 +19,6 @@ from .slopes import smoothed, upper_envelope
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ADULT_LEG = 0.9
-"""Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
 ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
 RIGID = 0.05
@@ -108,11 +106,6 @@ def leg_of(motion: CharacterMotion, side: str, sole: int) -> Leg:
     )
 
 
-def time_scale(motion: CharacterMotion) -> float:
-    """How much slower than an adult's a motion of the same kind is."""
-    return float(np.sqrt(motion.leg_length / ADULT_LEG))
-
-
 def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> Array:
     """Height that the hips gain (F,) [m]: what the standing soles gain on the whole, less the sinkage of the deeper.
 
@@ -125,15 +118,14 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
         By sole.
     touching : (F, S) bool array
     """
-    per_second = motion.frame_rate * time_scale(motion)
     if not placements:
         return np.zeros(len(motion.frames))
     stands = touching[:, list(placements)]
-    load = smoothed(stands.astype(float), LOAD_TIME * per_second) ** 2 * stands
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
     sinkage = np.stack([placement.sinkage for placement in placements.values()], axis=1)
     unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
     deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
-    width = HIPS_TIME * per_second
+    width = HIPS_TIME * motion.adult_second
     return _mean_over_time(unsunk, load, width) - _mean_over_time(sinkage, load * deeper, width)
 
 
@@ -176,7 +168,7 @@ def settle(
     for side, leg in legs.items():
         hip = carried(tilted, leg.hip) + raised
         short = np.maximum(short, touching[:, placements[side][0]] * _out_of_reach(leg, hip, ankles[side]))
-    reach = round(REACH_TIME * motion.frame_rate * time_scale(motion))
+    reach = round(REACH_TIME * motion.adult_second)
     raised[:, 2] -= upper_envelope(short, max(1, reach))
     if legs:
         relief = relieve(
@@ -192,7 +184,7 @@ def settle(
                 for (side, leg), (sole, placement) in zip(legs.items(), placements.values(), strict=True)
             },
             step=motion.time_step,
-            time_scale=time_scale(motion),
+            time_scale=motion.time_scale,
             leg_length=motion.leg_length,
         )
         raised[:, 2] += relief.hips
@@ -219,7 +211,7 @@ def heel_rises(
     """How far each foot that trails rolls over its toes to stay in reach (F,) [rad], by side; see `settle`."""
     tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
     trial = np.linspace(0.0, HEEL_RISE, 8)
-    width = round(HEEL_TIME * motion.frame_rate * time_scale(motion))
+    width = round(HEEL_TIME * motion.adult_second)
     rises = {}
     for side, (sole, placement) in placements.items():
         leg = leg_of(motion, side, sole)

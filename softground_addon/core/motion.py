@@ -24,6 +24,9 @@ SIMULATION_RATE = 120.0
 STILL = 1e-6
 """What moves less does not move, in leg lengths: positions come in single precision."""
 
+ADULT_LEG = 0.9
+"""Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
+
 _LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
 
 JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
@@ -216,6 +219,16 @@ class CharacterMotion:
     def froude_speed(self) -> float:
         """sqrt(gravity·leg length) [m/s], 3 m/s for an adult: the speed at a Froude number of 1."""
         return float(np.sqrt(self.gravity * self.leg_length))
+
+    @property
+    def time_scale(self) -> float:
+        """How much slower than an adult's a motion of the same kind is."""
+        return float(np.sqrt(self.leg_length / ADULT_LEG))
+
+    @property
+    def adult_second(self) -> float:
+        """Scene frames in which this body does what an adult does in a second."""
+        return self.frame_rate * self.time_scale
 
     @property
     def on_frames(self) -> NDArray[np.bool_]:

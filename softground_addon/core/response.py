@@ -12,7 +12,7 @@ from .contacts import detect_contacts
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
 from .footprints import Footprint
 from .ground_history import GroundHistory
-from .grounding import Response, heel_rises, leg_soles, responding, settle, time_scale
+from .grounding import Response, heel_rises, leg_soles, responding, settle
 from .heightfield import FlatTerrain, Terrain
 from .motion import CharacterMotion
 from .performance import (
@@ -130,13 +130,11 @@ def respond(
     def placed(side: str, heel_rise: Array | None = None, change: Array | None = None) -> tuple[int, Placement]:
         sole = feet[side]
         return sole, place_sole(
-            motion.soles[sole],
+            motion,
+            sole,
             touching[:, sole],
             history,
             undisturbed,
-            motion.frames,
-            frame_rate=motion.frame_rate,
-            time_scale=time_scale(motion),
             align=grounding.align,
             lock=grounding.lock,
             heel_rise=heel_rise,
@@ -160,7 +158,7 @@ def _acted(
     depths = {
         side: sinkage_over_time(placement.sinkage, touching[:, sole]) for side, (sole, placement) in placements.items()
     }
-    depth = body_depth(depths, DEPTH_TIME * motion.frame_rate * time_scale(motion))
+    depth = body_depth(depths, DEPTH_TIME * motion.adult_second)
     feet = {
         side: swing_change(motion.joints[f"ankle_{side}"], depths[side], touching[:, sole], acting, motion.leg_length)
         for side, (sole, _) in placements.items()
@@ -188,7 +186,7 @@ def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt:
 
 def _support(motion: CharacterMotion, touching: Mask) -> Array:
     """How far something holds the body (F,), from 0 to 1."""
-    width = SUPPORT_TIME * motion.frame_rate * time_scale(motion)
+    width = SUPPORT_TIME * motion.adult_second
     return smoothed(touching.any(axis=1).astype(float), width)
 
 
@@ -206,7 +204,7 @@ def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) 
 
 def _heading(motion: CharacterMotion) -> Array:
     """Level direction in which the body walks (F, 2), where its feet point while it stands."""
-    width = HEADING_TIME * motion.frame_rate * time_scale(motion)
+    width = HEADING_TIME * motion.adult_second
     path = smoothed(motion.hips[:, :2], width)
     velocity = np.gradient(path, axis=0) * motion.frame_rate if len(path) > 1 else np.zeros_like(path)
     feet = np.mean([sole.transforms[:, 0, :2, 0] for sole in motion.soles], axis=0)
@@ -247,13 +245,11 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
         placements[side] = (
             sole,
             place_sole(
-                motion.soles[sole],
+                motion,
+                sole,
                 made_for.touching[:, sole],
                 ground,
                 ground,
-                motion.frames,
-                frame_rate=motion.frame_rate,
-                time_scale=time_scale(motion),
                 clearance=np.where(np.isfinite(as_made), as_made, 0.0),
             ),
         )

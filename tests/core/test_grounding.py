@@ -76,12 +76,11 @@ def placed(motion, touching, ground, undisturbed=None, **options):
         side: (
             sole,
             place_sole(
-                motion.soles[sole],
+                motion,
+                sole,
                 touching[:, sole],
                 ground,
                 undisturbed or ground,
-                motion.frames,
-                frame_rate=RATE,
                 **options,
             ),
         )
@@ -196,14 +195,15 @@ def test_locking_takes_the_slide_out_of_each_contact_and_jumps_nowhere():
         assert np.ptp(held[part], axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
     assert np.linalg.norm(np.diff(offset, axis=0), axis=1).max() < 0.06
     flat = Ground(lambda x, y, t: 0.0)
-    unlocked = place_sole(sole, touching, flat, flat, np.arange(frames) + 1.0, frame_rate=RATE)
+    motion = CharacterMotion("walker", 75.0, LEG, np.arange(frames) + 1.0, RATE, (sole,))
+    unlocked = place_sole(motion, 0, touching, flat, flat)
     assert unlocked.carry[:, :2, 3] == pytest.approx(np.zeros((frames, 2)), abs=1e-9)
 
 
 def test_a_sole_that_never_touches_is_left_alone():
     motion, touching = walk()
     flat = Ground(lambda x, y, t: 1.0)
-    placement = place_sole(motion.soles[0], np.zeros_like(touching[:, 0]), flat, flat, motion.frames, frame_rate=RATE)
+    placement = place_sole(motion, 0, np.zeros_like(touching[:, 0]), flat, flat)
     assert placement.carry == pytest.approx(np.broadcast_to(np.eye(4), placement.carry.shape))
 
 
@@ -255,15 +255,7 @@ def test_characters_of_all_sizes_respond_alike(size):
     placements = {
         side: (
             index,
-            place_sole(
-                big.soles[index],
-                touching[:, index],
-                ground,
-                ground,
-                big.frames,
-                frame_rate=big.frame_rate,
-                time_scale=float(np.sqrt(big.leg_length / 0.9)),
-            ),
+            place_sole(big, index, touching[:, index], ground, ground),
         )
         for side, index in leg_soles(big).items()
     }
