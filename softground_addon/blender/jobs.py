@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -48,6 +49,9 @@ class Progress:
 
 Job = Generator[Progress, None, Result]
 
+_waited_for: ContextVar[bool] = ContextVar("waited_for", default=False)
+"""Whether jobs are driven by someone who has nothing else to do before their end."""
+
 
 class _Watched(Generic[State, Result]):
     """A generator that a loop can go through and that tells its result afterwards."""
@@ -62,11 +66,15 @@ class _Watched(Generic[State, Result]):
 
 
 def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Result:
-    """Drive a job to its end."""
+    """Drive a job to its end, in this thread alone."""
     watched = _Watched(job)
-    for progress in watched:
-        if show:
-            show(progress)
+    before = _waited_for.set(True)
+    try:
+        for progress in watched:
+            if show:
+                show(progress)
+    finally:
+        _waited_for.reset(before)
     return watched.result
 
 
@@ -94,12 +102,18 @@ def counted(
 
 
 def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
-    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering."""
+    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering.
+
+    Where the driver is `run`, nobody waits for an answer: it is computed in place.
+    """
     return (yield from meanwhile(Progress(stage, fraction), function, *arguments))
 
 
 def meanwhile(state: State, function: Callable[..., Result], *arguments: object) -> Generator[State, None, Result]:
     """What `aside` does, for generators that yield something else than their progress: the same over and over."""
+    if _waited_for.get():  # memory that one thread frees is of little use to another
+        yield state
+        return function(*arguments)
     patience = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH)
     try:
