@@ -25,7 +25,7 @@ from .sole_points import contact_window, places, point_contact, sole_points
 from .solid_imprint import ground_under
 from .solids import posed
 from .stance import descent
-from .variation import Factors, Variation
+from .variation import Factors, Variation, layer_factors
 
 Array = NDArray[np.float64]
 
@@ -107,8 +107,7 @@ class StanceLoad:
             field = pressure_field(self.x, self.y, self.area * touching, self.centre, self.tolerance)
             normal_stress = normal_stress * field.at(self.x, self.y)
         if pressure == "CENTRE_OF_PRESSURE" or self.factors:
-            varying = {"stiffness": self.factors.stiffness, "depth": self.factors.depth} if self.factors else {}
-            target = target_compression(normal_stress, material, **varying)
+            target = target_compression(normal_stress, material, **layer_factors(self.factors))
         holds = np.broadcast_to(normal_stress < material.crust_stress, touching.shape)
         compression = np.zeros(self.clearance.shape[1])
         for step in np.flatnonzero(sinking.target):

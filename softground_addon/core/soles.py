@@ -238,9 +238,8 @@ def _assemble(
     """Cut the flat sole at the ball, give each piece its own frame, and mark heel, ball and toe tip."""
     distance = signed_distance(grid.nodes, loops)
     x = grid.nodes[..., 0]
-    back, front = (
-        float(end) for end in (min(loop[:, 0].min() for loop in loops), max(loop[:, 0].max() for loop in loops))
-    )
+    back = float(min(loop[:, 0].min() for loop in loops))
+    front = float(max(loop[:, 0].max() for loop in loops))
     length = front - back
     split = split and back + 0.3 * length < ball < front - 0.05 * length
     half_seam = _SEAM * length / 2
@@ -250,11 +249,35 @@ def _assemble(
         else [distance]
     )
 
-    patches, placements = [], []
-    for piece in pieces:
+    patches, placements = _patches(grid, heights, pieces)
+    inset = _LANDMARK_INSET * length
+    stations = np.array([back + inset, np.clip(ball, back + 2 * inset, front - 2 * inset), front - inset])
+    landmark_patch = np.array([0, 0, len(patches) - 1])
+    middle = [_middle(grid, distance, station) for station in stations]
+    flat = np.column_stack([stations, middle])
+    z = sample_map(heights, flat, grid.origin, grid.spacing) - placements[landmark_patch, 2, 3]
+    return PlacedSole(
+        sole=Sole(
+            name=name,
+            side=side,
+            patches=patches,
+            landmarks=np.column_stack([flat, z]),
+            landmark_patch=landmark_patch,
+            outline=as_one_polygon(loops),
+        ),
+        placements=placements,
+    )
+
+
+def _patches(grid: _Grid, heights: Array, pieces: Sequence[Array]) -> tuple[tuple[SolePatch, ...], Array]:
+    """Pieces of a sole, by the distance from their outline, each in a frame of its own; where those are, (P, 4, 4)."""
+    patches = []
+    placements = np.tile(np.eye(4), (len(pieces), 1, 1))
+    for piece, placement in zip(pieces, placements, strict=True):
         rows, columns = _window(piece < 2 * grid.spacing)
         inside = piece < 0
         lowest = float(heights[inside].min()) if inside.any() else float(heights.min())
+        placement[2, 3] = lowest
         patches.append(
             SolePatch(
                 heights=heights[rows, columns] - lowest,
@@ -263,27 +286,7 @@ def _assemble(
                 spacing=grid.spacing,
             )
         )
-        placement = np.eye(4)
-        placement[2, 3] = lowest
-        placements.append(placement)
-
-    inset = _LANDMARK_INSET * length
-    stations = np.array([back + inset, np.clip(ball, back + 2 * inset, front - 2 * inset), front - inset])
-    landmark_patch = np.array([0, 0, len(patches) - 1])
-    middle = [_middle(grid, distance, station) for station in stations]
-    flat = np.column_stack([stations, middle])
-    z = sample_map(heights, flat, grid.origin, grid.spacing) - np.array([placements[p][2, 3] for p in landmark_patch])
-    return PlacedSole(
-        sole=Sole(
-            name=name,
-            side=side,
-            patches=tuple(patches),
-            landmarks=np.column_stack([flat, z]),
-            landmark_patch=landmark_patch,
-            outline=as_one_polygon(loops),
-        ),
-        placements=np.stack(placements),
-    )
+    return tuple(patches), placements
 
 
 def _window(mask: NDArray[np.bool_]) -> tuple[slice, slice]:

@@ -18,7 +18,7 @@ from .rim import in_contact, rim_weights, whole_reach
 from .solid_imprint import ground_under
 from .solids import Solid
 from .stance import Stance, Steps
-from .variation import Factors
+from .variation import Factors, layer_factors
 
 Array = NDArray[np.float64]
 
@@ -103,8 +103,7 @@ class SolidStance(Stance):
         rate = np.broadcast_to(compression_rate(step / parts, material, sinkage, self._descent / step), sinkage.shape)
         holds = None
         if material.crust_stress:
-            varying = {"stiffness": factors.stiffness, "depth": factors.depth} if factors else {}
-            holds = stress(target, material, **varying) < material.crust_stress
+            holds = stress(target, material, **layer_factors(factors)) < material.crust_stress
         return Imprints(
             start, parts, window, coverage, contact, rim, pressing, target, rate, holds, factors, sinkage[::parts]
         )

@@ -101,27 +101,9 @@ class MeshTerrain:
             raise InputError(
                 "The ground has no face under the character's path that could be stood on: move it under the feet."
             )
-        low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-        origin = low.min(axis=0)
-        extent = high.max(axis=0) - origin
-        bins_along = max(1.0, np.sqrt(len(corners) / 2))
-        size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
-        while True:
-            shape = np.floor(extent / size).astype(np.intp) + 1
-            from_bin = np.floor((low - origin) / size).astype(np.intp)
-            span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
-            members = span.prod(axis=1).sum()
-            if members <= CROWDED * shape.prod() or members > LARGEST_TABLE / 4:  # half the size: up to four times
-                break
-            size = size / 2
-        triangle, within = enumerated(span.prod(axis=1))
-        bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
-        bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
-        bin_index = bin_y * shape[0] + bin_x
-        order = np.argsort(bin_index, kind="stable")
-        first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
+        bins = _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
-        return cls(corners, origin, size, shape, first, triangle[order], of_corners)
+        return cls(corners, *bins, of_corners)
 
     def heights(self, x: Array, y: Array) -> Array:
         """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
@@ -166,6 +148,30 @@ class MeshTerrain:
         u, v, hit = barycentric(corners[..., :2], place[point])
         a, b, c = corners[..., 2].T
         return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
+
+
+def _bins(corners: Array) -> tuple[Array, Array, Indices, Indices, Indices]:
+    """Bins over the triangles (T, 3, 2): origin, size, shape, first and members, as in `MeshTerrain`."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    origin = low.min(axis=0)
+    extent = high.max(axis=0) - origin
+    bins_along = max(1.0, np.sqrt(len(corners) / 2))
+    size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
+    while True:
+        shape = np.floor(extent / size).astype(np.intp) + 1
+        from_bin = np.floor((low - origin) / size).astype(np.intp)
+        span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
+        members = span.prod(axis=1).sum()
+        if members <= CROWDED * shape.prod() or members > LARGEST_TABLE / 4:  # half the size: up to four times
+            break
+        size = size / 2
+    triangle, within = enumerated(span.prod(axis=1))
+    bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
+    bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
+    bin_index = bin_y * shape[0] + bin_x
+    order = np.argsort(bin_index, kind="stable")
+    first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
+    return origin, size, shape, first, triangle[order]
 
 
 class _Hits(NamedTuple):

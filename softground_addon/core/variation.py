@@ -57,6 +57,11 @@ class Factors(NamedTuple):
         return self.depth / self.stiffness
 
 
+def layer_factors(factors: Factors | None) -> dict[str, Array]:
+    """Factors on the loose layer as keywords of `deformation.target_compression`; none where the ground is even."""
+    return {"stiffness": factors.stiffness, "depth": factors.depth} if factors else {}
+
+
 class VariationTiles:
     """Factors at cell centres, looked up once per tile and kept within what is possible.
 
