@@ -112,7 +112,8 @@ def read(scene: bpy.types.Scene) -> Analysis:
 @contextmanager
 def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     """What is changed within leaves the shot as it was read: prints, response, and a ground that is made to fit it."""
-    _tell_of_changes(scene)
+    if scene.session_uid in _known:
+        _tell_of_changes(scene)  # of what others have changed until now, while it still counts
     analysis = known(scene)
     yield
     if analysis is None:

@@ -13,11 +13,14 @@ from .character_setup import characters_of
 from .operators import reports_errors
 from .translation import iface_, rpt_
 
-TICK = 0.03
+TICK = 0.02
 """Longest work between two looks at the user's events [s]; a single step of the bake may exceed it."""
 
-TIMER_STEP = 0.005
-"""Time left to the events between two ticks [s]."""
+TIMER_STEP = 0.001
+"""Time left to the events between two ticks [s]; what they and Blender's drawing need beyond, they take."""
+
+LONG_DRAWING = 0.02
+"""Time that Blender took for itself after which its user's events come before more work [s]."""
 
 SHOWN_FOR = 0.15
 """Time between two drawings of the progress [s]: they cost more than many a tick."""
@@ -75,6 +78,7 @@ class _Bake(bpy.types.Operator):
         scene = settings.scene_of(context)
         self._job, self._scene, self._needed = self._job_of(scene), scene.session_uid, _read_by_bake(scene)
         self._started = self._ticked = self._shown = time.perf_counter()
+        self._gave_way = False
         self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
         manager = context.window_manager
@@ -94,7 +98,10 @@ class _Bake(bpy.types.Operator):
             self.report({"INFO"}, rpt_("Bake cancelled: nothing was changed"))
             return {"CANCELLED"}
         if event.type == "TIMER":
-            return self._tick()
+            try:
+                return self._tick()
+            finally:
+                self._ticked = time.perf_counter()
         return {"PASS_THROUGH"} if _is_harmless(context, event) else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -103,14 +110,17 @@ class _Bake(bpy.types.Operator):
 
     def _tick(self) -> set[str]:
         now = time.perf_counter()
-        waited, self._ticked = now - self._ticked, now
+        waited = now - self._ticked
         if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
             self._started += waited
             if now - self._shown > SHOWN_FOR:
                 self._shown = now
                 self._show_status(session.current().progress, iface_("Waiting for the render"))
             return {"PASS_THROUGH"}
-        if self._progress and now - self._shown > SHOWN_FOR:  # a tick works or draws: both take their time
+        self._gave_way = waited > LONG_DRAWING and not self._gave_way
+        if self._gave_way:  # to the events that have come while Blender drew: they wait for its drawing or a tick
+            return {"PASS_THROUGH"}
+        if self._progress and now - self._shown > SHOWN_FOR:  # a tick works or has something drawn
             self._shown = now
             self._show_progress(self._progress)
             return {"PASS_THROUGH"}
@@ -133,10 +143,18 @@ class _Bake(bpy.types.Operator):
     def _work(self, until: float) -> bake_job.BakeResult | None:
         """Go on with the bake until a time; the result if it is done by then."""
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
+        blocks = _count_of_blocks()
+
+        def goes_on() -> bool:
+            if self._progress and self._progress.overall >= 1.0:
+                return True  # what is written is not cancelled
+            drawn_anew = _count_of_blocks() != blocks  # the whole window, as soon as the tick ends
+            return time.perf_counter() < until and not drawn_anew
+
         with analysis.own_changes(scene):
             try:
                 self._progress = next(self._job)
-                while time.perf_counter() < until or self._progress.overall >= 1.0:  # what is written is not cancelled
+                while goes_on():
                     self._progress = next(self._job)
             except StopIteration as finished:
                 result: bake_job.BakeResult = finished.value
@@ -257,6 +275,12 @@ def _read_by_bake(scene: bpy.types.Scene) -> dict[int, str]:
     soles = [sole.object for character in options.characters for sole in character.soles]
     blocks = (scene, options.ground, *(character.armature for character in options.characters), *soles)
     return {block.session_uid: block.name for block in blocks if block}
+
+
+def _count_of_blocks() -> int:
+    """Number of the file's data-blocks of the kinds that a bake makes."""
+    data = bpy.data
+    return sum(len(kind) for kind in (data.scenes, data.objects, data.meshes, data.materials, data.node_groups))
 
 
 def _check_still_there(needed: dict[int, str]) -> None:

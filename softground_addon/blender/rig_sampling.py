@@ -184,6 +184,7 @@ def _evaluate(
             for place, thing in enumerate(things):
                 thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1
+    yield len(frames)
 
     metre = scene.unit_settings.scale_length
     bone_matrices = armature_matrices[:, None] @ np.swapaxes(bone_matrices, -1, -2)  # foreach_get goes by columns

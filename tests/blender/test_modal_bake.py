@@ -1,5 +1,8 @@
 """A bake that is left in any of its states has changed nothing."""
 
+import time
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
@@ -120,3 +123,36 @@ def test_what_was_deleted_under_a_bake_is_named(scene):
     bpy.data.objects.remove(armature)
     with pytest.raises(InputError, match="'Walker' was deleted"):
         modal_bake._check_still_there(needed)
+
+
+def works_after(bake, seconds):
+    """Whether a tick works that comes some time after the last one [s]."""
+    before = bake.worked
+    bake._ticked = time.perf_counter() - seconds
+    modal_bake._Bake._tick(bake)
+    return bake.worked > before
+
+
+def test_events_come_before_more_work_where_blender_draws_for_long(scene):
+    bake = SimpleNamespace(worked=0, _gave_way=False, _progress=None, _shown=time.perf_counter(), _needed={})
+    bake._work = lambda until: setattr(bake, "worked", bake.worked + 1)
+    long = 10 * modal_bake.LONG_DRAWING
+    assert works_after(bake, 0.0)
+    assert [works_after(bake, long) for _ in range(4)] == [False, True, False, True]  # it goes on all the same
+    assert works_after(bake, 0.0)
+
+
+def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
+    def job():
+        for step in range(5):
+            if step == 2:
+                bpy.data.meshes.new("Ground")
+            yield jobs.Progress("write", step / 10)
+        yield jobs.Progress("write", 1.0)
+        return "written"
+
+    bake = SimpleNamespace(_scene=scene.session_uid, _job=job(), _progress=None)
+    forever = time.perf_counter() + 1e6
+    assert modal_bake._Bake._work(bake, forever) is None
+    assert bake._progress.fraction == 0.2
+    assert modal_bake._Bake._work(bake, forever) == "written"

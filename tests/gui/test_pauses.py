@@ -13,6 +13,10 @@ pytestmark = [pytest.mark.alone, pytest.mark.timeout(900)]
 LONGEST_PAUSE = 0.1
 """Longest time between two handled events while a bake of 250 frames runs [s]."""
 
+FEW_DRAWINGS = 8
+"""Blender draws its whole window where data-blocks come and go: as a bake begins, has read the rig, makes the ground
+and its playback, and as it ends; some more are the machine's."""
+
 
 @pytest.fixture
 def facts(tell):
@@ -33,21 +37,14 @@ def test_no_tick_of_a_bake_takes_long(facts):
 
 @pytest.mark.gui
 def test_a_bake_hardly_ever_has_the_scene_drawn(facts):
-    counts = [(bake["drawings"], bake["ticks"]) for bake in facts["bakes"]]
-    print("drawings of the scene and ticks of each bake:", counts)
-    assert min(drawings / ticks for drawings, ticks in counts) < 1 / 6
-
-
-@pytest.mark.benchmark
-def test_a_bake_lets_its_user_wait_no_longer_than_for_one_drawing_more(facts):
-    """Between two events Blender may draw its window, which takes long where no graphics card does it."""
-    drawing = median(facts["drawing the window"])
-    print("drawing a window of", facts["window"], "takes (s):", drawing)
-    assert longest(facts, "pauses") < LONGEST_PAUSE + drawing
+    drawings = [bake["drawings"] for bake in facts["bakes"]]
+    print("drawings of the scene:", drawings, "in ticks:", [bake["ticks"] for bake in facts["bakes"]])
+    assert min(drawings) <= FEW_DRAWINGS
 
 
 @pytest.mark.benchmark
 def test_blender_answers_within_a_tenth_of_a_second_while_it_bakes(facts):
+    print("drawing a window of", facts["window"], "alone takes (s):", median(facts["drawing the window"]))
     assert longest(facts, "pauses") < LONGEST_PAUSE
 
 
