@@ -5,7 +5,6 @@ import time
 import bpy
 import pytest
 
-import softground_addon
 from softground_addon.blender import bake_job, jobs
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
@@ -13,15 +12,6 @@ from tests.blender import shots
 pytestmark = pytest.mark.benchmark
 
 FRAMES = 250
-
-
-@pytest.fixture
-def scene():
-    softground_addon.register()
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    yield bpy.context.scene
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    softground_addon.unregister()
 
 
 def bare_frames(scene):

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 import pytest
 
-import softground_addon
 from softground_addon.blender import created_ground, live
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.heightfield import FlatTerrain
@@ -24,15 +23,6 @@ EXTENT = 10.0
 FRAMES = 96
 LARGEST_RATIO = 1.5
 TURNS = 4
-
-
-@pytest.fixture
-def scene():
-    softground_addon.register()
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    yield bpy.context.scene
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    softground_addon.unregister()
 
 
 def ground_of(scene):

@@ -11,7 +11,6 @@ import bpy
 import numpy as np
 import pytest
 
-import softground_addon
 from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, jobs, playback
 from tests.blender import shots
 
@@ -22,15 +21,6 @@ SIZE = 12.0
 SKIN_VERTICES = 28_000
 TURNS = 4
 TIMED = np.random.default_rng(0).permutation(np.arange(2, FRAMES))[:60]
-
-
-@pytest.fixture
-def scene():
-    softground_addon.register()
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    yield bpy.context.scene
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    softground_addon.unregister()
 
 
 def heavy_walker(scene, frames=FRAMES):
