@@ -37,7 +37,7 @@ from . import (
     trail_detail,
 )
 from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detail
-from .character_setup import characters_of, movers_of
+from .character_setup import characters_of
 from .jobs import Job, Progress, aside
 from .materials import drafted
 from .shots import Shot, estimate_shot, ground_of, read_shot
@@ -135,7 +135,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     )
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
-        staleness.store(bake_report.inputs_of(scene), written.ground, movers_of(scene))
+        staleness.store(bake_report.inputs_of(scene), scene)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 

@@ -15,7 +15,7 @@ from ..core.missed_steps import advice, missed_steps
 from ..core.simulation import CharacterLoads
 from ..core.sliding import treadmill_speed
 from . import ground_mesh, properties, response_job, settings, staleness
-from .character_setup import characters_of, mapping_of, movers_of, title_of
+from .character_setup import characters_of, mapping_of, title_of
 from .jobs import STAGES
 
 Array = NDArray[np.float64]
@@ -121,7 +121,7 @@ def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     options = scene.softground
     if options.ground is None:
         return ()
-    return staleness.reasons(inputs_of(scene), options.ground, movers_of(scene))
+    return staleness.reasons(inputs_of(scene), scene)
 
 
 def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:

@@ -301,13 +301,13 @@ def animated_frames(
                 ranges.append((frames[0], frames[1]))
     if not ranges:
         followers |= {armature}
-        ranges += [found for leader in _leaders(armature) - followers if (found := animated_frames(leader, followers))]
+        ranges += [found for leader in leaders(armature) - followers if (found := animated_frames(leader, followers))]
     if not ranges:
         return None
     return floor(min(start for start, _ in ranges)), ceil(max(end for _, end in ranges))
 
 
-def _leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+def leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
     """Objects that the constraints of an object and of its bones follow."""
     bones = thing.pose.bones if thing.pose else ()
     constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints if not one.mute]

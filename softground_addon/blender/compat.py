@@ -9,6 +9,9 @@ import bpy
 HAS_SLOTS = bpy.app.version >= (4, 4, 0)
 """Actions keep their curves in the channelbag of a slot instead of one list."""
 
+SERIES = "{}.{}".format(*bpy.app.version)
+"""The version, but for corrections."""
+
 
 def action_curves(action: bpy.types.Action, slot: Any = None) -> list[bpy.types.FCurve]:
     """The action's curves: those of one slot, of all slots if none is given, or the whole action before slots."""
@@ -60,6 +63,17 @@ def set_slot(owner: Any, slot: Any) -> None:
     """Let animation data or a strip use a slot; nothing before slots."""
     if HAS_SLOTS and slot is not None:
         owner.action_slot = slot
+
+
+def node_inputs(modifier: Any) -> list[tuple[str, Any]]:
+    """Identifiers and values of what is set in a Geometry Nodes modifier; early Blenders keep custom properties."""
+    tree = modifier.node_group
+    sockets = [] if tree is None else [item for item in tree.interface.items_tree if item.item_type == "SOCKET"]
+    names = [socket.identifier for socket in sockets if socket.in_out == "INPUT"]
+    if hasattr(modifier, "properties"):
+        held = [(name, getattr(modifier.properties.inputs, name, None)) for name in names]
+        return [(name, one.value) for name, one in held if hasattr(one, "value")]
+    return [(name, modifier[name]) for name in names if name in modifier.keys()]  # noqa: SIM118  (no mapping)
 
 
 def remove_scene(scene: bpy.types.Scene) -> None:

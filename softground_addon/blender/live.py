@@ -23,7 +23,7 @@ from ..core.pressed_ground import PressedGround
 from ..core.refinement import refine
 from . import analysis, bake_report, baked_ground, ground_mesh, jobs, session, settings, staleness, trail_detail
 from .bake_checks import expected_coverage, wants_detail
-from .character_setup import characters_of, movers_of
+from .character_setup import characters_of
 from .created_ground import create_ground, reach_for
 from .live_ground import LiveGround
 from .operators import reports_errors
@@ -143,7 +143,7 @@ class LiveMode:
         )
         carrier = jobs.run(writing)
         ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
-        staleness.store(inputs, scene.softground.ground, movers_of(scene))
+        staleness.store(inputs, scene)
 
     def discard(self) -> None:
         """Leave the ground as it was before."""

@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import InputError
 from . import bake_report, baked_ground, ground_mesh, response_job, staleness
 from .bake_job import BakeResult, bake
-from .character_setup import characters_of, movers_of
+from .character_setup import characters_of
 from .jobs import Job
 
 
@@ -57,4 +57,4 @@ def _note(scene: bpy.types.Scene, result: BakeResult, up_to_date: bool) -> None:
     was, now = ground_mesh.summary_of(baked_ground.carrier_of(ground)), bake_report.summary(result.report)
     mesh[ground_mesh.SUMMARY] = was | {bake_report.FLOATING: now[bake_report.FLOATING]}
     if up_to_date and all(was.get(key) == now[key] for key in ("steps", "max_depth_m", "peak_force_n")):
-        staleness.store(bake_report.inputs_of(scene), ground, movers_of(scene))
+        staleness.store(bake_report.inputs_of(scene), scene)

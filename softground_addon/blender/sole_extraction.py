@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.errors import InputError
 from ..core.foot_attitude import FlatFoot, FootSize
 from ..core.motion import Array
 from ..core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
@@ -148,20 +149,26 @@ def _find_meshes(
     groups: Mapping[str, tuple[frozenset[str], frozenset[str]]],
     rest_world: Array,
 ) -> dict[str, FootMesh]:
-    """The meshes on some families of bones."""
+    """The meshes on some families of bones.
+
+    Raises
+    ------
+    InputError
+        If one is being edited.
+    """
     pieces: dict[str, list[FootMesh]] = {}
     if not groups:
         return {}
-    for thing in scene.objects:
-        if thing.type != "MESH" or thing.hide_render:
-            continue
+    for thing in meshes_on(scene, armature):
+        if thing.mode == "EDIT":
+            raise InputError(
+                f"'{thing.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first."
+            )
         if _deformed_by(thing, armature):
             to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
             found = _weighted_parts(thing, armature, groups, rest_world, to_armature)
-        elif thing.parent == armature and thing.parent_type == "BONE":
-            found = _rigid_part(thing, armature, groups, rest_world)
         else:
-            continue
+            found = _rigid_part(thing, armature, groups, rest_world)
         for name, part in found.items():
             pieces.setdefault(name, []).append(part)
     return {
@@ -169,6 +176,17 @@ def _find_meshes(
         for name, parts in pieces.items()
         if sum(len(p.triangles) for p in parts) >= _FEWEST_TRIANGLES
     }
+
+
+def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """The rendered mesh objects that an armature deforms or that hang on its bones."""
+    return [
+        thing
+        for thing in scene.objects
+        if thing.type == "MESH"
+        and not thing.hide_render
+        and (_deformed_by(thing, armature) or (thing.parent == armature and thing.parent_type == "BONE"))
+    ]
 
 
 def _bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:

@@ -44,6 +44,8 @@ def check_things(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, 
             raise InputError(
                 f"'{thing.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'."
             )
+        if thing.mode == "EDIT":
+            raise InputError(f"'{thing.name}', which prints, is in Edit Mode: leave it with Tab first.")
         if thing == scene.softground.ground:
             raise InputError(
                 f"'{thing.name}' is the ground and cannot print on itself: choose another object for sole "

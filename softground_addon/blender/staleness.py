@@ -4,154 +4,159 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
 import bpy
 import numpy as np
 
 from ..core import report
-from . import ground_mesh, mesh_arrays, nla_layer
+from ..core.errors import InputError
+from . import digests, ground_mesh, painted_ground, playback
 from .baked_ground import carrier_of
-from .character_setup import ancestors
-from .compat import action_curves, slot_of
+from .character_setup import ancestors, characters_of, leaders, movers_of, title_of
+from .compat import SERIES
+from .properties import SoftGroundCharacter
+from .sole_extraction import meshes_on
 
 FINGERPRINTS = "softground_fingerprints"
 """Property of the mesh that carries a bake: what it was made from, as JSON."""
 
-SETTINGS, GROUND, PRINTS, ANIMATION, PLACE = "settings", "ground", "prints", "animation", "place"
+SETTINGS, WRITING, GROUND, SURFACE, PRINTS = "settings", "writing", "ground", "surface", "prints"
+ANIMATION, PLACE, MOVEMENT, BODY = "animation", "place", "movement", "body"
+VERSION = "version"
+_OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY)
+"""What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _NOT_INPUTS = ("file", "scene")
 """Entries of a bake's inputs that may change without the bake changing."""
 
-_CHANNELS = (
-    "location",
-    "rotation_euler",
-    "rotation_quaternion",
-    "rotation_axis_angle",
-    "scale",
-    "delta_location",
-    "delta_rotation_euler",
-    "delta_rotation_quaternion",
-    "delta_scale",
-)
-"""Properties that place, turn and scale an object."""
 
-_ANSWERS = (nla_layer.RESPONSE, nla_layer.EXTRA, nla_layer.STANDING)
-"""Tracks that hold the ground's answer to the rig, and not what the rig was animated to do."""
+def store(inputs: Mapping[str, object], scene: bpy.types.Scene) -> None:
+    """Note with the bake that was just written to the scene's ground what it was made from."""
+    mesh = ground_mesh.mesh_of(carrier_of(scene.softground.ground))
+    mesh[FINGERPRINTS] = json.dumps(_fingerprints(inputs, scene))
 
 
-def store(inputs: Mapping[str, object], ground: bpy.types.Object, armatures: Sequence[bpy.types.Object]) -> None:
-    """Note with the bake that was just written what it was made from."""
-    mesh = ground_mesh.mesh_of(carrier_of(ground))
-    mesh[FINGERPRINTS] = json.dumps(_fingerprints(inputs, ground, armatures))
-
-
-def reasons(
-    inputs: Mapping[str, object], ground: bpy.types.Object, armatures: Sequence[bpy.types.Object]
-) -> tuple[str, ...]:
-    """What has changed since the ground's bake, for the user to read; nothing if it is up to date or there is none.
+def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, ...]:
+    """What has changed since the bake on the scene's ground, for the user to read; nothing where there is none.
 
     Parameters
     ----------
     inputs : mapping
         What a bake would be made with now.
-    ground : bpy.types.Object
-    armatures : sequence of bpy.types.Object
-        Those whose animation a bake would read.
+    scene : bpy.types.Scene
+        Has a ground.
     """
+    ground = scene.softground.ground
     carrier = carrier_of(ground)
     if not ground_mesh.is_baked(carrier):
         return ()
+    if edited := next((thing for thing in (ground, carrier, *_bodies_of(scene)) if thing.mode == "EDIT"), None):
+        return (f"'{edited.name}' is in Edit Mode",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
-        now = _fingerprints(inputs, ground, armatures)
-        told = [key for key in now if key in then or not key.startswith(PLACE)]  # earlier bakes do not tell of places
-        changed = [key for key in dict.fromkeys((*then, *told)) if then.get(key) != now.get(key)]
+        now = _fingerprints(inputs, scene)
+        left_out = () if then.get(VERSION) == now[VERSION] else _OF_VERSION
+        told = (key for key in then if key.partition(":")[0] not in left_out)  # earlier bakes tell of less
+        changed = [key for key in told if then[key] != now.get(key)]
     except (KeyError, TypeError, ValueError, AttributeError):
         return ("The bake does not say what it was made from",)
     texts = {
         SETTINGS: "The settings have changed",
+        WRITING: "The settings have changed",
         GROUND: f"The mesh or the place of '{ground.name}' has changed",
+        SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{carrier.name}' has been edited",
     }
-    of_movers = {ANIMATION: "The animation of '{}' has changed", PLACE: "'{}' or a parent of it was moved"}
+    of_movers = {
+        ANIMATION: "The animation of '{}' has changed",
+        PLACE: "'{}' or a parent of it was moved",
+        MOVEMENT: "The rig of '{}', or what it follows, has changed",
+        BODY: "The mesh of '{}' that prints has changed",
+    }
     kinds = (key.partition(":") for key in changed)
-    return tuple(texts[kind] if kind in texts else of_movers[kind].format(name) for kind, _, name in kinds)
+    return tuple(
+        dict.fromkeys(texts[kind] if kind in texts else of_movers[kind].format(name) for kind, _, name in kinds)
+    )
 
 
-def _fingerprints(
-    inputs: Mapping[str, object], ground: bpy.types.Object, armatures: Sequence[bpy.types.Object]
-) -> dict[str, str]:
-    carrier = carrier_of(ground)
-    animations = {f"{ANIMATION}:{armature.name}": _of_animation(armature) for armature in armatures}
-    places = {f"{PLACE}:{armature.name}": _of_place(armature) for armature in armatures}
+def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene) -> dict[str, str]:
+    options, ground = scene.softground, scene.softground.ground
+    movers = movers_of(scene)
     return {
+        VERSION: SERIES,
         SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
+        WRITING: f"{options.detail} {options.shape_keys}",
         GROUND: _of_ground(ground),
-        PRINTS: _of_topology(ground_mesh.mesh_of(carrier)),
-        **animations,
-        **places,
+        SURFACE: _of_surface(scene),
+        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
+        **{f"{ANIMATION}:{mover.name}": digests.of_keys(mover) for mover in movers},
+        **{f"{PLACE}:{mover.name}": digests.of_place([mover, *ancestors(mover)]) for mover in movers},
+        **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
+        **{f"{BODY}:{title_of(one)}": _of_body(scene, one) for one in characters_of(scene)},
     }
 
 
 def _of_ground(ground: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(ground)
-    positions = ground_mesh.rest_positions(mesh)
     place = np.round(ground_mesh.to_world_of(ground, 1.0), 6) + 0.0  # no negative zeros
     modifiers = [modifier.type for modifier in ground.modifiers if modifier.show_viewport]
-    return f"{_of_topology(mesh)}-{zlib.crc32(positions.tobytes()):08x}-{zlib.crc32(place.tobytes()):08x}-{modifiers}"
+    return f"{digests.of_topology(mesh)}-{digests.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}-{modifiers}"
 
 
-def _of_topology(mesh: bpy.types.Mesh) -> str:
-    corners = mesh_arrays.corner_vertices(mesh)
-    return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.tobytes()):08x}"
+def _of_surface(scene: bpy.types.Scene) -> str:
+    """What the ground's modifiers do, and how its material varies."""
+    ground = scene.softground.ground
+    own = playback.modifier_of(ground)
+    told = [text for modifier in ground.modifiers if modifier != own for text in digests.of_settings(modifier)]
+    try:
+        painted = [name for name in painted_ground.names_of(scene) if name]
+    except InputError as error:
+        return str(error)
+    told += [digests.of_attribute(ground_mesh.mesh_of(ground), name) for name in painted]
+    return digests.joined([*told, digests.of_weights(ground, painted)])
 
 
-def _of_place(thing: bpy.types.Object) -> str:
-    """Where an object and its parents stand, but for what their own animation decides."""
-    values = []
-    for one in (thing, *ancestors(thing)):
-        animated = nla_layer.animated_paths(one)
-        values += [
-            value
-            for channel in _CHANNELS
-            for index, value in enumerate(getattr(one, channel))
-            if (channel, index) not in animated
-        ]
-        values += np.array(one.matrix_parent_inverse).ravel().tolist()
-    return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
-
-
-def _of_animation(armature: bpy.types.Object) -> str:
-    """All that the user's own actions and strips make the armature do."""
-    animation = armature.animation_data
-    if animation is None:
-        return ""
-    found = set()
-    action, slot = nla_layer.own_action(armature)
-    if action:
-        found.add(_of_action(action, slot))
-    for track in animation.nla_tracks:
-        if track.name in _ANSWERS or (track.mute and track.name != nla_layer.SOURCE):
+def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object) -> str:
+    """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
+    told = [digests.of_animation(mover)]
+    parents = ancestors(mover)
+    known = {mover, ground, carrier_of(ground)}
+    waiting = [*parents, *leaders(mover)]
+    while waiting:
+        one = waiting.pop()
+        if one in known:
             continue
-        for strip in track.strips:
-            if strip.action is None:
-                continue
-            digest = _of_action(strip.action, slot_of(strip))
-            if track.name != nla_layer.SOURCE:
-                placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, strip.influence)
-                digest += f"@{placed}"
-            found.add(digest)
-    return " ".join(sorted(found))
+        known.add(one)
+        told += [digests.of_keys(one), digests.of_animation(one)]
+        if one not in parents:
+            told.append(digests.of_place([one]))
+        waiting += [*([one.parent] if one.parent else []), *leaders(one)]
+    return digests.joined(sorted(told))
 
 
-def _of_action(action: bpy.types.Action, slot: Any) -> str:
-    digest = 0
-    for curve in sorted(action_curves(action, slot), key=lambda curve: (curve.data_path, curve.array_index)):
-        digest = zlib.crc32(f"{curve.data_path}[{curve.array_index}]{curve.mute}".encode(), digest)
-        for part in ("co", "handle_left", "handle_right"):
-            values = np.empty(len(curve.keyframe_points) * 2, dtype=np.float32)
-            curve.keyframe_points.foreach_get(part, values)
-            digest = zlib.crc32(values.tobytes(), digest)
-    return f"{digest:08x}"
+def _bodies_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The meshes whose undersides print."""
+    characters = characters_of(scene)
+    worn = [mesh for one in characters if one.armature for mesh in meshes_on(scene, one.armature)]
+    return [*worn, *(sole.object for one in characters for sole in one.soles if sole.object)]
+
+
+def _of_body(scene: bpy.types.Scene, character: SoftGroundCharacter) -> str:
+    """The meshes whose undersides print."""
+    bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
+    told = []
+    for thing in (sole.object for sole in character.soles if sole.object):
+        modifiers = (text for modifier in thing.modifiers for text in digests.of_settings(modifier))
+        told.append(f"{_of_mesh(thing)} {digests.joined(modifiers)}")
+    if character.armature:
+        told += [
+            f"{_of_mesh(worn)} {worn.parent_bone} {digests.of_weights(worn, bones)} {digests.of_place([worn])}"
+            for worn in meshes_on(scene, character.armature)
+        ]
+    return digests.joined(sorted(told))
+
+
+def _of_mesh(thing: bpy.types.Object) -> str:
+    mesh = ground_mesh.mesh_of(thing)
+    return f"{digests.of_topology(mesh)} {digests.of_positions(mesh)}"

@@ -174,7 +174,8 @@ def place_sole(
     if change is not None:
         carry[:, :3, 3] += change
     on_top = -lowest_clearance(turned, undisturbed, frames)
-    sinkage = np.maximum(np.where(touching & np.isfinite(on_top), on_top - needed, 0.0), 0.0)
+    stands = touching & np.isfinite(on_top)
+    sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
     room = np.where(touching, 0.0, np.maximum(lift - needed, 0.0))
     return Placement(carry, lift, sinkage, room)
 

@@ -65,6 +65,12 @@ def moving_ground(scene):
     ground.keyframe_insert("location", frame=1)
 
 
+def edited_body(scene):
+    armature = scene.softground.characters[0].armature
+    bpy.context.view_layer.objects.active = next(thing for thing in armature.children if thing.type == "MESH")
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
@@ -80,6 +86,7 @@ def moving_ground(scene):
         (far_below, "'Walker'.*touches 'Field'.*move"),
         (bridge, "'Field' has several layers.*separate"),
         (moving_ground, "'Field' moves"),
+        (edited_body, "'Walker Figure'.*Edit Mode: leave it"),
     ],
 )
 def test_bad_input_is_named_with_its_remedy_and_changes_nothing(walk, spoil, message):

@@ -1,9 +1,12 @@
 """A bake that no longer fits what it was made from says so."""
 
+import json
+
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, bake_report, baked_ground
+from softground_addon.blender import analysis, bake_report, baked_ground, staleness
+from softground_addon.blender.compat import action_curves
 from tests.blender import shots
 from tests.blender.grounds import plane
 
@@ -61,11 +64,12 @@ def delete_vertex(scene):
         edited.free()
 
 
+def curves_of(thing):
+    return action_curves(thing.animation_data.action)
+
+
 def move_key(scene):
-    animation = scene.softground.characters[0].armature.animation_data
-    bag = animation.action.fcurves if hasattr(animation.action, "fcurves") else None
-    curve = bag[0] if bag else animation.action.layers[0].strips[0].channelbags[0].fcurves[0]
-    curve.keyframe_points[3].co.y += 0.001
+    curves_of(scene.softground.characters[0].armature)[0].keyframe_points[3].co.y += 0.001
 
 
 def remap_time(scene):
@@ -151,3 +155,192 @@ def test_a_cleared_ground_is_not_stale(baked):
     bpy.ops.softground.clear_bake()
     change_setting(baked)
     assert bake_report.stale_reasons(baked) == ()
+
+
+@pytest.fixture(scope="module")
+def rigged_file(addon, tmp_path_factory):
+    """A bake of a rig with a moving parent, constraints, strips and drivers, on a ground with a modifier and paint."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    armature = shots.walker(scene, frames=40)
+    for name in ("Parent", "Target"):
+        scene.collection.objects.link(bpy.data.objects.new(name, None))
+    armature.parent = bpy.data.objects["Parent"]
+    key(armature.parent, "location", (0.0, 0.1))
+    follows = armature.pose.bones["head"].constraints.new("COPY_ROTATION")
+    follows.target = bpy.data.objects["Target"]
+    key(follows, "influence", (0.1, 0.2))
+    driver = follows.target.driver_add("location", 0).driver
+    driver.expression = "lean"
+    driver.variables.new().name = "lean"
+    driver.variables[0].targets[0].id, driver.variables[0].targets[0].data_path = armature, '["lean"]'
+    armature["lean"] = 0.1
+    animation = armature.animation_data
+    strip = animation.nla_tracks.new().strips.new("walk", 1, animation.action)
+    animation.action = None
+    strip.use_animated_influence = True
+    key(strip, "influence", (0.9, 1.0))
+
+    ground = scene.softground.ground = plane(scene)
+    ground.modifiers.new("Bumps", "DISPLACE").texture = bpy.data.textures.new("Bumps", "CLOUDS")
+    ground.modifiers["Bumps"].strength = 0.01
+    ground.vertex_groups.new(name="softground_stiffness").add(range(len(ground.data.vertices)), 0.9, "REPLACE")
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    scene.softground.frame_end, scene.softground.cell_size = 40, 0.02
+    bpy.ops.softground.bake()
+    path = tmp_path_factory.mktemp("rigged") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def key(owner, path, values):
+    for frame, value in zip((1, 40), values, strict=True):
+        setattr(owner, path, (value,) * 3 if path == "location" else value)
+        owner.keyframe_insert(path, frame=frame)
+
+
+@pytest.fixture
+def rigged(rigged_file):
+    bpy.ops.wm.open_mainfile(filepath=str(rigged_file))
+    return bpy.context.scene
+
+
+def armature_of(scene):
+    return scene.softground.characters[0].armature
+
+
+def strip_of(scene):
+    return armature_of(scene).animation_data.nla_tracks[0].strips[0]
+
+
+def step_between_keys(scene):
+    for curve in action_curves(strip_of(scene).action):
+        for point in curve.keyframe_points:
+            point.interpolation = "CONSTANT"
+
+
+def shake(scene):
+    action_curves(strip_of(scene).action)[0].modifiers.new("NOISE")
+
+
+def reverse_strip(scene):
+    strip_of(scene).use_reverse = True
+
+
+def let_parent_go_farther(_scene):
+    for curve in curves_of(bpy.data.objects["Parent"]):
+        curve.keyframe_points[1].co.y += 0.1
+
+
+def turn_target(_scene):
+    bpy.data.objects["Target"].rotation_euler.x = 0.1
+
+
+def set_driven(scene):
+    armature_of(scene)["lean"] = 0.2
+
+
+def stretch_foot(scene):
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature_of(scene).data.edit_bones["foot.L"].tail.z -= 0.01
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def shape_body(scene):
+    body = next(thing for thing in armature_of(scene).children if thing.type == "MESH")
+    body.data.vertices[0].co.z += 0.01
+    body.data.update()
+
+
+def weigh_foot(scene):
+    body = next(thing for thing in armature_of(scene).children if thing.type == "MESH")
+    body.vertex_groups["foot.L"].add(range(len(body.data.vertices)), 0.5, "REPLACE")
+
+
+def heighten_bumps(scene):
+    scene.softground.ground.modifiers["Bumps"].strength = 0.02
+
+
+def coarsen_bumps(_scene):
+    bpy.data.textures["Bumps"].noise_scale = 1.0
+
+
+def paint_ground(scene):
+    ground = scene.softground.ground
+    ground.vertex_groups["softground_stiffness"].add(range(len(ground.data.vertices)), 0.5, "REPLACE")
+
+
+def ask_for_detail(scene):
+    scene.softground.detail = "ALWAYS"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (step_between_keys, "The rig of 'Walker', or what it follows, has changed"),
+        (shake, "The rig of 'Walker', or what it follows, has changed"),
+        (reverse_strip, "The rig of 'Walker', or what it follows, has changed"),
+        (let_parent_go_farther, "The rig of 'Walker', or what it follows, has changed"),
+        (turn_target, "The rig of 'Walker', or what it follows, has changed"),
+        (set_driven, "The rig of 'Walker', or what it follows, has changed"),
+        (stretch_foot, "The rig of 'Walker', or what it follows, has changed"),
+        (shape_body, "The mesh of 'Walker' that prints has changed"),
+        (weigh_foot, "The mesh of 'Walker' that prints has changed"),
+        (heighten_bumps, "The modifiers of 'Field', or what is painted on it, have changed"),
+        (coarsen_bumps, "The modifiers of 'Field', or what is painted on it, have changed"),
+        (paint_ground, "The modifiers of 'Field', or what is painted on it, have changed"),
+        (ask_for_detail, "The settings have changed"),
+    ],
+)
+def test_every_change_of_the_rig_or_of_the_ground_is_told_and_nothing_else(rigged, change, message):
+    change(rigged)
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(rigged) == (message,)
+
+
+def test_a_pose_without_keys_is_part_of_the_rig(rigged):
+    track = armature_of(rigged).animation_data.nla_tracks[0]
+    bone = armature_of(rigged).pose.bones.get("hand.L")
+    animated = {curve.data_path for curve in action_curves(track.strips[0].action)}
+    assert f"{bone.path_from_id()}.location" not in animated
+    bone.location.x = 0.05
+    assert bake_report.stale_reasons(rigged) == ("The rig of 'Walker', or what it follows, has changed",)
+
+
+def test_what_is_animated_is_no_change_at_any_frame(rigged):
+    for frame in (1, 17, 40):
+        rigged.frame_set(frame)
+        assert bake_report.stale_reasons(rigged) == ()
+
+
+@pytest.mark.parametrize("uses_nla", [True, False])
+def test_the_response_to_the_ground_is_no_change_at_any_frame(scene, uses_nla):
+    armature = shots.walker(scene, frames=40)
+    armature.animation_data.use_nla = uses_nla
+    bpy.ops.softground.add_character()
+    scene.softground.tilt.use = scene.softground.grounding.use = True
+    scene.softground.output, scene.softground.cell_size = "BOTH", 0.02
+    bpy.ops.softground.bake()
+    for frame in (1, 17, 40):
+        scene.frame_set(frame)
+        assert bake_report.stale_reasons(scene) == ()
+
+
+def test_another_blender_compares_what_it_knows_as_the_one_that_baked(rigged):
+    mesh = baked_ground.carrier_of(rigged.softground.ground).data
+    noted = json.loads(mesh[staleness.FINGERPRINTS])
+    mesh[staleness.FINGERPRINTS] = json.dumps(noted | {"version": "4.1", "surface": "0", "movement:Walker": "0"})
+    assert bake_report.stale_reasons(rigged) == ()
+    change_mass(rigged)
+    assert bake_report.stale_reasons(rigged) == ("The settings have changed",)
+
+
+def test_a_mesh_in_edit_mode_is_told_as_long_as_it_is(rigged):
+    body = next(thing for thing in armature_of(rigged).children if thing.type == "MESH")
+    for edited in (body, rigged.softground.ground):
+        bpy.context.view_layer.objects.active = edited
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert bake_report.stale_reasons(rigged) == (f"'{edited.name}' is in Edit Mode",)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert bake_report.stale_reasons(rigged) == ()
