@@ -35,6 +35,16 @@ def reports_errors(execute: Callable[[Operator, bpy.types.Context], set[str]]) -
     return guarded
 
 
+class OnShot:
+    """Operators that need somebody who leaves prints."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is any character in the scene."""
+        cast("Any", cls).poll_message_set("Add a character first")
+        return bool(character_setup.characters_of(settings.scene_of(context)))
+
+
 class OnBake:
     """Operators that need a bake on the ground."""
 

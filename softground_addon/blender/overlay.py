@@ -16,8 +16,7 @@ from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
 from . import analysis, baked_ground, forecast, live, overlay_shapes, session, settings
-from .character_setup import characters_of
-from .operators import reports_errors
+from .operators import OnShot, reports_errors
 from .overlay_shapes import Cells, Outline
 
 Array = NDArray[np.float64]
@@ -200,17 +199,11 @@ def _faded(colour: Sequence[float], alpha: float) -> Colour:
     return (colour[0], colour[1], colour[2], colour[3] * alpha)
 
 
-class SOFTGROUND_OT_overlay(bpy.types.Operator):
+class SOFTGROUND_OT_overlay(OnShot, bpy.types.Operator):
     """Show predicted footfalls, soles, forces and the cells of the frame in the viewport"""
 
     bl_idname = "softground.overlay"
     bl_label = "Footfall Overlay"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is anybody whose steps could be shown."""
-        cls.poll_message_set("Add a character first")
-        return bool(characters_of(settings.scene_of(context)))
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:

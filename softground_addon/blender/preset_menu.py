@@ -12,7 +12,7 @@ from ..core import files, presets
 from ..core.errors import InputError
 from . import analysis, settings
 from .character_setup import characters_of, title_of
-from .operators import reports_errors
+from .operators import OnShot, reports_errors
 from .translation import iface_, rpt_
 
 USER_FOLDER = "presets/softground"
@@ -142,18 +142,12 @@ def _file_for(name: str) -> Path:
     return user_folder() / f"{bpy.path.clean_name(name).casefold()}.json"
 
 
-class SOFTGROUND_OT_predict_depth(bpy.types.Operator):
+class SOFTGROUND_OT_predict_depth(OnShot, bpy.types.Operator):
     """Read the animation and tell how deep the prints will be, before any bake"""
 
     bl_idname = "softground.predict_depth"
     bl_label = "Predict Depth"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is anybody to leave prints."""
-        cls.poll_message_set("Add a character first")
-        return bool(characters_of(settings.scene_of(context)))
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -164,7 +158,7 @@ class SOFTGROUND_OT_predict_depth(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_match_depth(bpy.types.Operator):
+class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
     """Set the stiffness of the ground so that the deepest print gets the depth that you type"""
 
     bl_idname = "softground.match_depth"
@@ -174,8 +168,6 @@ class SOFTGROUND_OT_match_depth(bpy.types.Operator):
     depth: FloatProperty(
         name="Depth (cm)", description="Depth of the deepest print", default=5.0, min=0.01, soft_max=30.0, precision=2
     )
-
-    poll = SOFTGROUND_OT_predict_depth.poll
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
         depth = analysis.expected_depth(settings.scene_of(context))

@@ -11,7 +11,6 @@ from contextlib import contextmanager, nullcontext
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.errors import InputError
 from ..core.motion import CharacterMotion
@@ -47,9 +46,7 @@ def sample_character(
     mapping: RigMapping,
     *,
     mass: float,
-    frame_start: int,
-    frame_end: int,
-    frame_step: int = 1,
+    frames: range,
 ) -> Sampling:
     """Read a character frame by frame.
 
@@ -63,8 +60,8 @@ def sample_character(
         From `rig_mapping.map_rig`, corrected by the user or not.
     mass : float
         [kg]
-    frame_start, frame_end, frame_step : int
-        Scene frames, the last one included.
+    frames : range
+        Scene frames.
 
     Yields
     ------
@@ -81,7 +78,7 @@ def sample_character(
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
     _check_input(scene, armature, mapping, mass)
-    frames = _frames(frame_start, frame_end, frame_step)
+    _check_frames(frames)
     bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
     things = dict.fromkeys(source.object for source in mapping.soles if source.object)
     recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
@@ -100,9 +97,7 @@ def sample_thing(
     mapping: RigMapping,
     *,
     mass: float,
-    frame_start: int,
-    frame_end: int,
-    frame_step: int = 1,
+    frames: range,
 ) -> Sampling:
     """Read frame by frame a thing without a rig: one or more objects that fall, roll or slide together.
 
@@ -112,13 +107,13 @@ def sample_thing(
         What the user calls it.
     mapping : RigMapping
         Its soles are objects.
-    scene, mass, frame_start, frame_end, frame_step
+    scene, mass, frames
         As for `sample_character`; and so is what it yields, returns and raises.
     """
     _check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
     check_things(scene, name, sources)
-    frames = _frames(frame_start, frame_end, frame_step)
+    _check_frames(frames)
     things = list(dict.fromkeys(source.object for source in sources))
     recording = yield from _evaluate(scene, "", frames, [], things)
     _check_finite(name, recording)
@@ -138,22 +133,12 @@ def sample_thing(
     )
 
 
-def _frames(first: int, last: int, step: int) -> NDArray[np.int_]:
-    frames = np.arange(first, last + 1, step) if step > 0 else np.empty(0, dtype=int)
-    if not len(frames):
-        raise InputError(
-            f"The frame range {first} to {last} in steps of {step} is empty: "
-            "set a start before the end and a positive step."
-        )
-    return frames
-
-
 def _bones(source: SoleSource) -> list[str]:
     return [bone for bone in (source.bone, source.toe_bone) if bone]
 
 
 def _evaluate(
-    scene: bpy.types.Scene, armature: str, frames: NDArray[np.int_], bones: Sequence[str], things: Sequence[str]
+    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], things: Sequence[str]
 ) -> Generator[int, None, Recording]:
     """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
     bone_matrices = np.empty((len(frames), len(bones), 4, 4))
@@ -162,14 +147,14 @@ def _evaluate(
     simulated = any(is_simulated(object_named(thing)) for thing in things)
     source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, things)
     with source as name:
-        for frame in _simulated_before(scene, int(frames[0])) if simulated else ():
+        for frame in _simulated_before(scene, frames.start) if simulated else ():
             with handlers_silent():
                 _still_there(name).frame_set(frame)
             yield 0
         for done, frame in enumerate(frames):
             temporary = _still_there(name)
             with handlers_silent(), without_layer(object_named(armature)) if armature else nullcontext():
-                temporary.frame_set(int(frame))
+                temporary.frame_set(frame)
                 depsgraph = temporary.view_layers[0].depsgraph
                 assert depsgraph is not None
                 if armature:
@@ -191,7 +176,7 @@ def _evaluate(
     for matrices in (bone_matrices, thing_matrices, armature_matrices):
         matrices[..., :3, :] *= metre
     return Recording(
-        frames=frames.astype(float),
+        frames=np.array(frames, dtype=float),
         bones={bone: bone_matrices[:, place] for place, bone in enumerate(bones)},
         things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
         armature=armature_matrices,
@@ -287,6 +272,11 @@ def handlers_silent() -> Iterator[None]:
     finally:
         for handlers, functions in zip(lists, saved, strict=True):
             handlers[:] = functions
+
+
+def _check_frames(frames: range) -> None:
+    if not frames or frames.step < 0:
+        raise InputError(f"The frame range {frames.start} to {frames.stop - 1} is empty: set a start before the end.")
 
 
 def _check_mass(name: str, mass: float) -> None:

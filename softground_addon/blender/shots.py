@@ -149,13 +149,12 @@ def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCha
     """The motion of each character."""
     motions = []
     options = scene.softground
-    count = options.frame_end - options.frame_start + 1
+    frames = range(options.frame_start, options.frame_end + 1)
     for number, character in enumerate(characters):
-        frames = {"frame_start": options.frame_start, "frame_end": options.frame_end}
         mapping, mass = mapping_of(character), settings.typed(character.mass)
         if character.armature:
-            job = sample_character(scene, character.armature, mapping, mass=mass, **frames)
+            job = sample_character(scene, character.armature, mapping, mass=mass, frames=frames)
         else:
-            job = sample_thing(scene, character.name, mapping, mass=mass, **frames)
-        motions.append((yield from counted(job, "sample", count, part=number, parts=len(characters))))
+            job = sample_thing(scene, character.name, mapping, mass=mass, frames=frames)
+        motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(characters))))
     return motions

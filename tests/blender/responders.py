@@ -165,8 +165,7 @@ def source_motion(scene, character=None):
             character.armature,
             mapping_of(character),
             mass=character.mass,
-            frame_start=options.frame_start,
-            frame_end=options.frame_end,
+            frames=range(options.frame_start, options.frame_end + 1),
         )
     )
 

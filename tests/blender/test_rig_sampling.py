@@ -18,18 +18,9 @@ from .bvh import Bvh, file_to_world
 BLENDER = rigs.FAMILIES["blender"]
 
 
-def sample(scene, armature, mapping=None, *, start=1, end=20, **options):
-    return run(
-        sample_character(
-            scene,
-            armature,
-            mapping or map_rig(armature),
-            mass=70.0,
-            frame_start=start,
-            frame_end=end,
-            **options,
-        )
-    )
+def sample(scene, armature, mapping=None, *, end=20, step=1):
+    mapping = mapping or map_rig(armature)
+    return run(sample_character(scene, armature, mapping, mass=70.0, frames=range(1, end + 1, step)))
 
 
 def moving_human(**options):
@@ -160,7 +151,7 @@ def test_sampling_leaves_the_file_as_it_was(scene, action):
     bpy.app.handlers.frame_change_post.append(on_frame)
     try:
         before = state(scene, armature)
-        sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frame_start=1, frame_end=30)
+        sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 31))
         next(sampling)
         if action == "finish":
             for _ in sampling:
@@ -197,9 +188,8 @@ def state(scene, armature):
 
 
 def test_sampling_takes_one_step_per_frame(scene):
-    sampling = sample_character(
-        scene, moving_human(), map_rig(bpy.data.objects["Human"]), mass=70.0, frame_start=1, frame_end=9
-    )
+    armature = moving_human()
+    sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 10))
     steps = list(sampling)
     assert steps[:9] == list(range(1, 10))
     assert set(steps[9:]) <= {9}  # the soles are read in steps of their own
@@ -242,7 +232,7 @@ def test_a_centimetre_rig_at_scale_001_equals_the_metre_rig(scene):
 def test_frame_rate_and_step_give_times_in_seconds(scene):
     armature = moving_human()
     scene.render.fps, scene.render.fps_base = 30, 1.001
-    motion = sample(scene, armature, frame_step=3)
+    motion = sample(scene, armature, step=3)
     np.testing.assert_array_equal(motion.frames, np.arange(1, 21, 3))
     assert motion.frame_rate == pytest.approx(29.97, rel=1e-4)
     assert motion.time_step == pytest.approx(3 * 1.001 / 30)
@@ -346,8 +336,8 @@ def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, mes
     [
         ({"mass": 0.0}, "positive mass"),
         ({"mass": float("nan")}, "positive mass"),
-        ({"frame_end": 0}, "frame range 1 to 0"),
-        ({"frame_step": 0}, "positive step"),
+        ({"frames": range(1, 1)}, "frame range 1 to 0"),
+        ({"frames": range(9, 1, -1)}, "start before the end"),
         ({"mapping": RigMapping()}, "has no soles"),
         ({"mapping": RigMapping(soles=(SoleSource("foot"),))}, "neither a bone nor an object"),
         ({"mapping": RigMapping(soles=(SoleSource("foot", object="Gone"),))}, "'Gone' is gone"),
@@ -355,7 +345,7 @@ def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, mes
 )
 def test_settings_that_cannot_be_used_are_refused(scene, change, message):
     armature = moving_human()
-    settings = {"mapping": map_rig(armature), "mass": 70.0, "frame_start": 1, "frame_end": 5, **change}
+    settings = {"mapping": map_rig(armature), "mass": 70.0, "frames": range(1, 6), **change}
     mapping = settings.pop("mapping")
     with pytest.raises(InputError, match=message):
         run(sample_character(scene, armature, mapping, **settings))

@@ -22,7 +22,7 @@ def standing(**options):
 
 
 def sample(armature):
-    return run(sample_character(bpy.context.scene, armature, map_rig(armature), mass=70.0, frame_start=1, frame_end=10))
+    return run(sample_character(bpy.context.scene, armature, map_rig(armature), mass=70.0, frames=range(1, 11)))
 
 
 def box(x, y, bottom=0.0, top=0.06):

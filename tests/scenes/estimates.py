@@ -23,11 +23,8 @@ def loads_in_blender(scene, body, motion, terrain=None):
     write_action(armature, motion, "Motion", first_frame=0)
     scene.render.fps = round(motion.frame_rate)
     scene.render.fps_base = round(motion.frame_rate) / motion.frame_rate
-    sampled = run(
-        sample_character(
-            scene, armature, map_rig(armature), mass=body.mass, frame_start=0, frame_end=len(motion.hips) - 1
-        )
-    )
+    frames = range(len(motion.hips))
+    sampled = run(sample_character(scene, armature, map_rig(armature), mass=body.mass, frames=frames))
     return estimate_loads(sampled, terrain or FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
 

@@ -159,7 +159,7 @@ class TestInBlender:
             SoleSource(f"{bone}.{side}", side, bone=f"{bone}.{side}") for bone in ("foot", "hand") for side in SIDES
         ]
         mapping = RigMapping(map_rig(armature).joints, tuple(soles))
-        sampled = run(sample_character(scene, armature, mapping, mass=dog.mass, frame_start=0, frame_end=119))
+        sampled = run(sample_character(scene, armature, mapping, mass=dog.mass, frames=range(120)))
         return estimate_loads(sampled, FlatTerrain(0.0), force_model="WHOLE_BODY", material=SNOW)
 
     def test_the_add_on_takes_it_for_an_animal(self, loads):

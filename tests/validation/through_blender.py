@@ -50,9 +50,8 @@ def motion_of_bvh(
         scene.render.fps_base = scene.render.fps / rate
     armature = bpy.context.view_layer.objects.active
     start, end = armature.animation_data.action.frame_range
-    sampling = sample_character(
-        scene, armature, map_rig(armature), mass=mass, frame_start=round(start), frame_end=round(end)
-    )
+    frames = range(round(start), round(end) + 1)
+    sampling = sample_character(scene, armature, map_rig(armature), mass=mass, frames=frames)
     while True:
         try:
             next(sampling)
