@@ -91,18 +91,21 @@ class LiveGround:
         self._up = ground_mesh.up_of(ground, unit_scale)
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
+        self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
         nothing = GroundSample(*np.empty((5, 0)))
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
         ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale, shape_keys=False)
         self.take_from(ground)
 
     def take_from(self, ground: bpy.types.Object) -> None:
-        """Start from the mesh as it is now."""
+        """Start from the mesh as it is now; it is written as a whole when it is shown next."""
         mesh = ground_mesh.mesh_of(ground)
         self._rest = ground_mesh.rest_positions(mesh)
         self._display = self._rest.copy()
         self._shading = np.zeros((2, len(self._rest)), dtype=np.float32)
         self._contact = np.full(len(self._rest), -np.inf, dtype=np.float32)
+        self._age = np.full(len(self._rest), NEVER, dtype=np.float32)
+        self._is_written = False
 
     def object(self) -> bpy.types.Object | None:
         """The ground, whatever its name has become; None if it is gone or no longer what live mode made of it."""
@@ -134,18 +137,28 @@ class LiveGround:
         """
         field = playhead.ground
         margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
-        for tile in _tiles_of(windows, margin):
+        tiles = _tiles_of(windows, margin)
+        for tile in tiles:
             vertices = self._vertices_of(tile, field.cell_size)
             if len(vertices.index):
-                self._update(field, tile, vertices, sigma)
-                place = field.cell_size * (np.array(tile) * TILE + vertices.cell + 0.5)
-                self._contact[vertices.index] = playhead.contact.nearest(*place.T)[0]
-        self._write(ground, playhead.frame, frame_rate)
+                window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE)
+                self._update(field, window, vertices, sigma)
+                column, row = vertices.cell.T
+                self._contact[vertices.index] = playhead.contact.read(window)[0, row, column]
+        mesh = ground_mesh.mesh_of(ground)
+        if tiles or not self._is_written:
+            for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
+                _write(mesh, name, values)
+            ground_mesh.write_positions(mesh, self._display)
+            self._is_written = True
+        since = (playhead.frame - self._contact[self._reached]) / frame_rate
+        self._age[self._reached] = np.where(np.isfinite(since), since, NEVER)
+        _write(mesh, ground_mesh.AGE, self._age)
 
     def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
         """The vertices over a tile, looked up once."""
         if self._by_tile is None:
-            self._by_tile = _grouped(np.floor(self._place / (TILE * cell_size)).astype(np.int64))
+            self._by_tile = _grouped(np.floor(self._place / cell_size).astype(np.int64) // TILE)
         if tile not in self._known:
             inside = self._by_tile.get(tile, np.empty(0, np.intp))
             at = self._place[inside] / cell_size - np.array(tile) * TILE + 0.5  # from the centre of the cell before it
@@ -154,25 +167,21 @@ class LiveGround:
             corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
             cell = np.floor(self._place[inside] / cell_size).astype(np.intp) - np.array(tile) * TILE
             self._known[tile] = _TileVertices(self._vertices[inside], corner, cell, *(at - corner).T)
+            self._reached = np.concatenate([self._reached, self._vertices[inside]])
         return self._known[tile]
 
-    def _update(self, field: HeightField, tile: Tile, vertices: _TileVertices, sigma: float) -> None:
+    def _update(self, field: HeightField, tile: Window, vertices: _TileVertices, sigma: float) -> None:
         # Whole tiles, so that the rounding of a height does not depend on what else has changed.
-        window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE).expanded(1)
-        compression, rim = vertices.interpolate(blurred_window(field, window, sigma))
+        compression, rim = vertices.interpolate(blurred_window(field, tile.expanded(1), sigma))
         index = vertices.index
         self._display[index] = self._rest[index] + (rim - compression)[:, None] * self._up
         self._shading[:, index] = compression, rim
 
-    def _write(self, ground: bpy.types.Object, frame: float, frame_rate: float) -> None:
-        mesh = ground_mesh.mesh_of(ground)
-        age = np.full(len(self._contact), NEVER, dtype=np.float32)
-        touched = np.flatnonzero(self._contact > -np.inf)
-        age[touched] = (frame - self._contact[touched]) / frame_rate
-        for name, values in zip(ground_mesh.SHADING_ATTRIBUTES, (*self._shading, age), strict=True):
-            attribute: Any = mesh.attributes[name]
-            attribute.data.foreach_set("value", values)
-        ground_mesh.write_positions(mesh, self._display)
+
+def _write(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
+    """Set an attribute of all vertices (V,)."""
+    attribute: Any = mesh.attributes[name]
+    attribute.data.foreach_set("value", values)
 
 
 def _grouped(tiles: NDArray[np.int64]) -> dict[Tile, Indices]:

@@ -85,7 +85,7 @@ def blurred(field: HeightField, sigma: float) -> HeightField:
 
 def _band(kernel: Array, size: int) -> Array:
     """Matrix (size, size + 2·margin) with the kernel along its diagonal."""
-    band = np.zeros((size, size + len(kernel) - 1))
-    for offset, weight in enumerate(kernel):
-        np.fill_diagonal(band[:, offset:], weight)
-    return band
+    width = size + len(kernel) - 1
+    skewed = np.zeros((size, width + 1))  # read in rows shorter by one, each lies one to the right of the one before
+    skewed[:, : len(kernel)] = kernel
+    return skewed.ravel()[: size * width].reshape(size, width)
