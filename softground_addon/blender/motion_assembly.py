@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,7 +22,7 @@ from ..core.foot_attitude import (
 )
 from ..core.motion import Array, CharacterMotion, SoleMotion
 from ..core.rigid import displacement, nearest_rotation, unit
-from ..core.soles import solid_sole
+from ..core.soles import PlacedSole, solid_sole
 from ..core.solids import capsule
 from .jobs import meanwhile
 from .rig_at_rest import RestPose
@@ -100,26 +100,17 @@ def assemble_motion(
     yield len(recording.frames)
     meshes = find_foot_meshes(scene, armature, sources, rest.world)
     yield len(recording.frames)
-    facing = rest.facing(mapping)
-    trust = [_REST_IS_FLAT if source.name in meshes else 0.0 for source in sources]
-    images = _mirror_images(feet)
-    flats = [
-        _stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, trust_rest_within=trust[place])
-        for place in range(len(feet))
-    ]
+    flats = _flat_feet(feet, planted, rest, facing=rest.facing(mapping), leg=leg, modelled=meshes.keys())
     sizes = [
         foot_size(flat, ankle_tip=foot.tip, ball=foot.ball, leg=leg) for foot, flat in zip(feet, flats, strict=True)
     ]
     sizes = _evened(sizes, feet, planted)
-
     motions: dict[str, SoleMotion] = {}
     for foot, flat, size in zip(feet, flats, sizes, strict=True):
         shape = partial(foot_sole, has_toes=foot.ball is not None, mirrored=rest.is_mirrored)
         mesh = meshes.get(foot.source.name)
         placed = yield from meanwhile(len(recording.frames), shape, foot.source, flat, size, mesh)
-        carriers = [foot.motion @ flat.foot_frame, foot.toe_motion @ flat.toe_frame]
-        transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
-        motions[foot.source.name] = SoleMotion(placed.sole, np.stack(transforms, axis=1))
+        motions[foot.source.name] = foot.motion_of(placed, flat)
     yield len(recording.frames)
     motions.update(_limb_motions(scene, mapping, recording, rest))
     motions.update(carried)
@@ -198,6 +189,12 @@ class _Foot:
     def ball(self) -> Array | None:
         return self.hinge if self.source.toe_bone else None
 
+    def motion_of(self, placed: PlacedSole, flat: FlatFoot) -> SoleMotion:
+        """A sole carried by the foot, its toes by the toe bone."""
+        carriers = [self.motion @ flat.foot_frame, self.toe_motion @ flat.toe_frame]
+        transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
+        return SoleMotion(placed.sole, np.stack(transforms, axis=1))
+
     @classmethod
     def of(cls, source: SoleSource, recording: Recording, rest: RestPose) -> _Foot:
         last = source.toe_bone or source.bone
@@ -220,6 +217,24 @@ class _Foot:
                 axis=1,
             ),
         )
+
+
+def _flat_feet(
+    feet: Sequence[_Foot],
+    planted: Sequence[NDArray[np.bool_]],
+    rest: RestPose,
+    *,
+    facing: Array,
+    leg: float,
+    modelled: Collection[str],
+) -> list[FlatFoot]:
+    """How each foot stands; `modelled` are the names of those that have a mesh."""
+    images = _mirror_images(feet)
+    flats = []
+    for place, foot in enumerate(feet):
+        trust = _REST_IS_FLAT if foot.source.name in modelled else 0.0
+        flats.append(_stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, trust_rest_within=trust))
+    return flats
 
 
 def _stand(
