@@ -86,6 +86,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     characters = characters_of(scene)
     moving = bake_report.ground_warnings(options.ground, options.frame_start)
     shot = yield from read_shot(scene)
+    movers = staleness.of_movers(scene)
+    yield Progress("sample", 1.0)
     sampled = time.perf_counter()
 
     loads, footprints, forces, answers = yield from _press(scene, shot)
@@ -135,7 +137,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     )
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
-        staleness.store(bake_report.inputs_of(scene), scene)
+        staleness.store(bake_report.inputs_of(scene), scene, movers)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 

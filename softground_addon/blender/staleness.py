@@ -31,10 +31,19 @@ _NOT_INPUTS = ("file", "scene")
 """Entries of a bake's inputs that may change without the bake changing."""
 
 
-def store(inputs: Mapping[str, object], scene: bpy.types.Scene) -> None:
-    """Note with the bake that was just written to the scene's ground what it was made from."""
+def store(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: Mapping[str, str] | None = None) -> None:
+    """Note with the bake that was just written to the scene's ground what it was made from.
+
+    Parameters
+    ----------
+    inputs : mapping
+        What it was made with.
+    scene : bpy.types.Scene
+    movers : mapping of str to str, optional
+        From `of_movers`, as they were when they were read; without, as they are now.
+    """
     mesh = ground_mesh.mesh_of(carrier_of(scene.softground.ground))
-    mesh[FINGERPRINTS] = json.dumps(_fingerprints(inputs, scene))
+    mesh[FINGERPRINTS] = json.dumps(_fingerprints(inputs, scene, of_movers(scene) if movers is None else movers))
 
 
 def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, ...]:
@@ -55,7 +64,7 @@ def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, 
         return (f"'{edited.name}' is in Edit Mode",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
-        now = _fingerprints(inputs, scene)
+        now = _fingerprints(inputs, scene, of_movers(scene))
         left_out = () if then.get(VERSION) == now[VERSION] else _OF_VERSION
         told = (key for key in then if key.partition(":")[0] not in left_out)  # earlier bakes tell of less
         changed = [key for key in told if then[key] != now.get(key)]
@@ -68,7 +77,7 @@ def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, 
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{carrier.name}' has been edited",
     }
-    of_movers = {
+    of_things = {
         ANIMATION: "The animation of '{}' has changed",
         PLACE: "'{}' or a parent of it was moved",
         MOVEMENT: "The rig of '{}', or what it follows, has changed",
@@ -76,24 +85,36 @@ def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, 
     }
     kinds = (key.partition(":") for key in changed)
     return tuple(
-        dict.fromkeys(texts[kind] if kind in texts else of_movers[kind].format(name) for kind, _, name in kinds)
+        dict.fromkeys(texts[kind] if kind in texts else of_things[kind].format(name) for kind, _, name in kinds)
     )
 
 
-def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene) -> dict[str, str]:
-    options, ground = scene.softground, scene.softground.ground
-    movers = movers_of(scene)
+def of_movers(scene: bpy.types.Scene) -> dict[str, str]:
+    """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
+    ground, movers = scene.softground.ground, movers_of(scene)
     return {
-        VERSION: SERIES,
-        SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
-        WRITING: f"{options.detail} {options.shape_keys}",
-        GROUND: _of_ground(ground),
-        SURFACE: _of_surface(scene),
-        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
         **{f"{ANIMATION}:{mover.name}": digests.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": digests.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{title_of(one)}": _of_body(scene, one) for one in characters_of(scene)},
+    }
+
+
+def of_ground(scene: bpy.types.Scene) -> dict[str, str]:
+    """Hashes of what the ground of a shot is read from, without a bake that may be on it; none where there is none."""
+    ground = scene.softground.ground
+    return {GROUND: _of_ground(ground), SURFACE: _of_surface(scene)} if ground else {}
+
+
+def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: Mapping[str, str]) -> dict[str, str]:
+    options = scene.softground
+    return {
+        VERSION: SERIES,
+        SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
+        WRITING: f"{options.detail} {options.shape_keys}",
+        **of_ground(scene),
+        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(options.ground))),
+        **movers,
     }
 
 
@@ -117,11 +138,11 @@ def _of_surface(scene: bpy.types.Scene) -> str:
     return digests.joined([*told, digests.of_weights(ground, painted)])
 
 
-def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object) -> str:
+def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
     """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
     told = [digests.of_animation(mover)]
     parents = ancestors(mover)
-    known = {mover, ground, carrier_of(ground)}
+    known = {mover, *((ground, carrier_of(ground)) if ground else ())}
     waiting = [*parents, *leaders(mover)]
     while waiting:
         one = waiting.pop()
