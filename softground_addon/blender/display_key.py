@@ -46,6 +46,8 @@ def positions(mesh: bpy.types.Mesh) -> Positions | None:
 
 def drop_all(mesh: bpy.types.Mesh) -> None:
     """Take the shape keys off a copy of a mesh: before 5.x their data stays, as a copy counts it twice."""
+    if not mesh.shape_keys:
+        return
     keys = mesh.shape_keys.session_uid
     holder = bpy.data.objects.new("SoftGround Evaluation", mesh)
     holder.shape_key_clear()

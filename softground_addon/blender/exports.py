@@ -9,13 +9,14 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ..core import point_cache
 from ..core.errors import InputError
 from ..core.files import replacing
 from ..core.histories import histories
-from . import baked_ground, ground_mesh, playback
+from . import baked_ground, display_key, ground_mesh, playback
 
 CACHE_MODIFIER = "SoftGround Cache"
 
@@ -113,16 +114,15 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     """
     carrier = baked_carrier(ground)
     mesh = ground_mesh.mesh_of(carrier).copy()
+    display_key.drop_all(mesh)
+    ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
-    shown = ground_mesh.displayed_positions(carrier)
-    still.shape_key_clear()
-    ground_mesh.write_positions(mesh, shown)
     for name in [attribute.name for attribute in mesh.attributes]:
         if name == ground_mesh.REST or playback.is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
     for key in ground_mesh.PROPERTIES:
         mesh.pop(key, None)
-    still.matrix_world = carrier.matrix_world
+    still.matrix_world = Matrix(ground_mesh.to_world_of(carrier, 1.0).tolist())
     scene.collection.objects.link(still)
     return still
 
@@ -161,21 +161,29 @@ def baked_carrier(ground: bpy.types.Object) -> bpy.types.Object:
 
 @contextmanager
 def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: int) -> Iterator[None]:
-    """An object as all that is selected, and the frames as the scene's; as it was before, afterwards."""
+    """An object as all that is selected, shown if it is hidden, and the frames as the scene's; then all as before."""
     layer = bpy.context.view_layer
     layer.update()
     if carrier.name not in layer.objects:
         raise InputError(f"'{carrier.name}' is not in the current view layer: include its collection first.")
+    hidden = carrier.hide_get(), carrier.hide_viewport, carrier.hide_render
     selected = [thing for thing in layer.objects if thing.select_get()]
     active, frames, frame = layer.objects.active, (scene.frame_start, scene.frame_end), scene.frame_current
     try:
         for thing in selected:
             thing.select_set(False)
+        carrier.hide_viewport = carrier.hide_render = False
+        layer.update()
+        carrier.hide_set(False)
         carrier.select_set(True)
+        if not carrier.select_get():
+            raise InputError(f"'{carrier.name}' is hidden with its collection: show the collection first.")
         scene.frame_start, scene.frame_end = start, end
         yield
     finally:
         carrier.select_set(False)
+        carrier.hide_set(hidden[0])
+        carrier.hide_viewport, carrier.hide_render = hidden[1:]
         for thing in selected:
             thing.select_set(True)
         layer.objects.active = active

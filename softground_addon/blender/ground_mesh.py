@@ -240,8 +240,7 @@ def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     mesh = mesh_of(ground).copy()
     try:
         rest = rest_positions(mesh)
-        if mesh.shape_keys:
-            display_key.drop_all(mesh)
+        display_key.drop_all(mesh)
         write_positions(mesh, rest)
         with _stand_in(ground, mesh) as evaluated:
             yield mesh_of(evaluated)

@@ -79,6 +79,7 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
     detail.name = f"{ground.name} Trail"
     detail.modifiers.clear()
     detail.data = mesh
+    _show_again(detail)
     try:
         yield detail
     finally:
@@ -107,14 +108,19 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
 
 def remove(ground: bpy.types.Object) -> None:
     """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
-    if hides(ground):
-        ground.hide_viewport, ground.hide_render = (bool(value) for value in ground[WAS_HIDDEN])
-        del ground[WAS_HIDDEN]
+    _show_again(ground)
     detail = detail_of(ground)
     if detail is None:
         return
     _choose_instead(ground, detail)
     ground_mesh.discard(detail)
+
+
+def _show_again(thing: bpy.types.Object) -> None:
+    """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
+    if hides(thing):
+        thing.hide_viewport, thing.hide_render = (bool(value) for value in thing[WAS_HIDDEN])
+        del thing[WAS_HIDDEN]
 
 
 def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:

@@ -126,7 +126,10 @@ def test_the_ground_is_shown_again_where_its_fine_copy_was_deleted(scene):
     bpy.ops.softground.bake()
     bpy.data.objects.remove(trail_detail.detail_of(field))
     bpy.ops.softground.bake()
-    bpy.data.objects.remove(trail_detail.detail_of(field))
+    copy = trail_detail.detail_of(field)
+    assert (copy.hide_viewport, copy.hide_render) == (False, True), "as the ground was before the first bake"
+    assert not trail_detail.hides(copy)
+    bpy.data.objects.remove(copy)
     assert (field.hide_viewport, field.hide_render) == (True, True)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
     assert (field.hide_viewport, field.hide_render) == (False, True)

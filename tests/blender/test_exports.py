@@ -137,6 +137,48 @@ def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_pa
     assert (scene.frame_start, scene.frame_end, scene.frame_current) == (*frames, 7)
 
 
+@pytest.mark.parametrize("kind", ["abc", "usdc"])
+def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, kind):
+    export, read = {
+        "abc": (exports.export_alembic, bpy.ops.wm.alembic_import),
+        "usdc": (exports.export_usd, bpy.ops.wm.usd_import),
+    }[kind]
+    carrier = baked_ground.carrier_of(ground)
+    carrier.hide_set(True)
+    carrier.hide_viewport = carrier.hide_render = True
+    export(scene, ground, tmp_path / f"ground.{kind}", 10, 12)
+    assert (carrier.hide_get(), carrier.hide_viewport, carrier.hide_render) == (True, True, True)
+    copy = import_and_select(read, tmp_path / f"ground.{kind}")
+    assert len(copy.data.vertices) == len(carrier.data.vertices)
+
+
+def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_written(scene, ground, tmp_path):
+    hidden = bpy.data.collections.new("Set")
+    scene.collection.children.link(hidden)
+    carrier = baked_ground.carrier_of(ground)
+    scene.collection.objects.unlink(carrier)
+    hidden.objects.link(carrier)
+    hidden.hide_viewport = True
+    with pytest.raises(InputError, match=r"Trail' is hidden with its collection: show"):
+        exports.export_alembic(scene, ground, tmp_path / "ground.abc", 10, 12)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_final_mesh_of_a_hidden_ground_is_where_the_ground_is(scene, ground):
+    carrier = baked_ground.carrier_of(ground)
+    carrier.hide_viewport = True
+    carrier.location.x = 2.0
+    bpy.context.view_layer.update()
+    assert exports.final_mesh(scene, ground).matrix_world.translation.x == pytest.approx(2.0)
+
+
+def test_the_final_mesh_leaves_no_shape_keys_behind(scene, ground, tmp_path):
+    keys = len(bpy.data.shape_keys)
+    exports.export_final(scene, ground, tmp_path / "ground.obj")
+    exports.final_mesh(scene, ground)
+    assert len(bpy.data.shape_keys) == keys
+
+
 def read_image(path):
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.name = "Non-Color"
