@@ -133,16 +133,19 @@ def write(
     shape_keys : bool
         See `ground_mesh.write`.
     """
-    lines = over_time.stretched(time_stretch)  # nodes are told the animation's frames
+    lines, frame_rate = (
+        over_time.stretched(time_stretch),
+        frame_rate * time_stretch,
+    )  # nodes count the animation's frames
     up = ground_mesh.up_of(place.carrier, unit_scale)
-    with playback.player(lines, up=up, frame_rate=frame_rate * time_stretch) as group:
+    with playback.timelines(lines, frame_rate) as table:
         yield Progress("write", 0.9)
         if not place.is_draft:
             place.publish()
         ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.9)
-        playback.attach(place.carrier, place.index[lines.point], group)
+        playback.attach(place.carrier, place.index[lines.point], lines, table, up=up, frame_rate=frame_rate)
         if place.is_draft:
             yield Progress("write", 0.9)
             place.publish()

@@ -10,7 +10,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.polylines import Polylines
+from ..core.footprints import NEVER
+from ..core.polylines import TICK, Polylines
+from ..core.timelines import NO_VISIT
 from . import playback_nodes as nodes
 from .compat import straighten
 
@@ -21,47 +23,78 @@ MODIFIER = "SoftGround Playback"
 
 TABLE = "SoftGround Timelines"
 
-_ATTRIBUTES = (nodes.MOVED, nodes.SPLINE, nodes.PRESSURE)
-_VALUE = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_COLOR": "color"}
+_ATTRIBUTES = (
+    nodes.MOVED,
+    nodes.START,
+    nodes.END,
+    nodes.SPLINE,
+    nodes.OFFSET,
+    nodes.LAST_HEIGHT,
+    nodes.LAST_CONTACT,
+    nodes.PRESSURE,
+)
+_TYPE = {"FLOAT": np.float32, "INT": np.int32, "BOOLEAN": np.bool_}
+
+FEW = 1 / 64
+"""Part of the vertices that is worth looking up whole: a look-up takes about as long as 60 comparisons."""
 
 
 @contextmanager
-def player(lines: Polylines, *, up: Array, frame_rate: float) -> Iterator[bpy.types.NodeTree]:
-    """The node group that plays timelines; it is taken away at the end if nothing has come to use it.
+def timelines(lines: Polylines, frame_rate: float) -> Iterator[bpy.types.Object]:
+    """An object that holds timelines as splines and is in no scene; it is taken away if nothing has come to use it.
 
     Parameters
     ----------
     lines : Polylines
-    up : (3,) float array
-        World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
-        Frames of the table per second [Hz].
+        Their frames per second [Hz].
     """
-    group = nodes.build(table=_table_object(lines), up=up.tolist(), frame_rate=frame_rate)
+    table = _table_object(lines, frame_rate)
     try:
-        yield group
+        yield table
     finally:
-        if not group.users:
-            _remove_group(group)
+        if not table.users:
+            _remove_table(table)
 
 
-def attach(ground: bpy.types.Object, vertices: Indices, group: bpy.types.NodeTree) -> bpy.types.Modifier:
-    """Let a group from `player` play a ground, in place of the one that may play it.
+def attach(
+    ground: bpy.types.Object,
+    vertices: Indices,
+    lines: Polylines,
+    table: bpy.types.Object,
+    *,
+    up: Array,
+    frame_rate: float,
+) -> bpy.types.Modifier:
+    """Let timelines play a ground, in place of those that may play it.
 
-    The ground must carry its undisturbed positions (`ground_mesh.write`). The modifier comes first, so that the
-    user's own modifiers work on the ground as it is at the time.
+    The ground must carry its undisturbed positions and stand finished (`ground_mesh.write`). The modifier comes first,
+    so that the user's own modifiers work on the ground as it is at the time.
 
     Parameters
     ----------
     ground : bpy.types.Object
     vertices : (P,) int array
-        Vertex of its mesh that each of the group's splines plays.
-    group : bpy.types.NodeTree
+        Vertex of its mesh that each of the polylines is of.
+    lines : Polylines
+    table : bpy.types.Object
+        The same as an object, from `timelines`.
+    up : (3,) float array
+        World up in the ground's own space and units, of the length of one metre.
+    frame_rate : float
+        Frames of the polylines per second [Hz].
     """
     remove(ground)
-    _write_splines(cast("bpy.types.Mesh", ground.data), vertices)
+    mesh = cast("bpy.types.Mesh", ground.data)
+    _write_attributes(mesh, vertices, lines)
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = group
+    modifier.node_group = nodes.build(
+        table=table,
+        up=up.tolist(),
+        frame_rate=frame_rate,
+        few=len(vertices) < FEW * len(mesh.vertices),
+        settled=mesh.shape_keys is None,
+    )
     modifier.show_in_editmode = False
     modifier.show_expanded = False
     ground.modifiers.move(len(ground.modifiers) - 1, 0)
@@ -94,9 +127,13 @@ def _remove_group(group: bpy.types.NodeTree) -> None:
     table = nodes.table_of(group)
     bpy.data.node_groups.remove(group)
     if table is not None and not table.users:
-        splines: Any = table.data
-        bpy.data.objects.remove(table)
-        bpy.data.hair_curves.remove(splines)
+        _remove_table(table)
+
+
+def _remove_table(table: bpy.types.Object) -> None:
+    splines: Any = table.data
+    bpy.data.objects.remove(table)
+    bpy.data.hair_curves.remove(splines)
 
 
 def is_playback_attribute(name: str) -> bool:
@@ -114,43 +151,55 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     return np.flatnonzero(moves)
 
 
-def _write_splines(mesh: bpy.types.Mesh, vertex: Indices) -> None:
-    """Store which vertices the bake moves, one per spline (P,)."""
-    moved = np.zeros(len(mesh.vertices), dtype=bool)
-    moved[vertex] = True
-    number = np.zeros(len(moved), dtype=np.int32)
-    number[vertex] = np.arange(len(vertex))
+def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, lines: Polylines) -> None:
+    """Store of which vertices (P,) the polylines are, and what is known of them without a look into these."""
+    spline, offset = lines.end_to_end()
+    last = lines.state[lines.first[1:] - 1]
     active = mesh.attributes.active_index
-    _store(mesh, nodes.MOVED, "BOOLEAN", moved)
-    _store(mesh, nodes.SPLINE, "INT", number)
-    # What is there is overwritten faster than made.
-    _store(mesh, nodes.PRESSURE, "FLOAT", np.zeros(len(moved), dtype=np.float32))
+    for name, kind, values, elsewhere in (
+        (nodes.MOVED, "BOOLEAN", np.ones(len(vertex), dtype=bool), False),
+        (nodes.START, "FLOAT", lines.start, -NO_VISIT),
+        (nodes.END, "FLOAT", lines.end, -NO_VISIT),
+        (nodes.SPLINE, "INT", spline, 0),
+        (nodes.OFFSET, "FLOAT", offset, 0.0),
+        (nodes.LAST_CONTACT, "FLOAT", last[:, 2], NO_VISIT),
+        # What is there is overwritten faster than made.
+        (nodes.PRESSURE, "FLOAT", last[:, 3], 0.0),
+        *([(nodes.LAST_HEIGHT, "FLOAT", last[:, 0], 0.0)] if mesh.shape_keys else []),
+    ):
+        whole = np.full(len(mesh.vertices), elsewhere, dtype=_TYPE[kind])
+        whole[vertex] = values
+        _store(mesh, name, kind, whole)
     mesh.attributes.active_index = active  # the one that the user has active stays so
 
 
-def _table_object(lines: Polylines) -> bpy.types.Object:
-    """The timelines as the splines of an object that is in no scene."""
+def _table_object(lines: Polylines, frame_rate: float) -> bpy.types.Object:
+    """The polylines as splines, laid end to end: fewer are looked up faster and take less memory."""
     splines = bpy.data.hair_curves.new(TABLE)
+    spline, offset = lines.end_to_end()
     size = np.diff(lines.first)
     if len(size):
-        splines.add_curves(size.tolist())
+        splines.add_curves(np.bincount(spline, size).astype(int).tolist())
         position = np.zeros((len(lines.frame), 3), dtype=np.float32)
-        position[:, 0] = lines.frame
+        along_string = lines.frame + np.repeat(offset, size)
+        position[:, 0] = np.round(along_string / TICK) * TICK
         along: Any = splines.attributes["position"]
         along.data.foreach_set("vector", position.ravel())
-    _store(splines, nodes.STATE, "FLOAT_COLOR", lines.state)
-    last = lines.state[lines.first[1:] - 1]
-    for name, kind, values in (
-        (nodes.STATE_NOW, "FLOAT_COLOR", last),
-        (nodes.START, "FLOAT", lines.start),
-        (nodes.END, "FLOAT", lines.end),
+    height, compression, contact_end, pressure = lines.state.T
+    since = lines.frame + np.repeat(lines.start, size) - contact_end
+    age = np.where(contact_end < NO_VISIT, np.maximum(since, 0.0) / frame_rate, NEVER)
+    for name, values in (
+        (nodes.HEIGHT, height),
+        (nodes.COMPRESSION, compression),
+        (nodes.AGE, age),
+        (nodes.PRESSURE, pressure),
     ):
-        _store(splines, name, kind, values, domain="CURVE")
+        _store(splines, name, "FLOAT", values.astype(np.float32))
     if len(size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
 
 
-def _store(geometry: Any, name: str, kind: str, values: NDArray[Any], *, domain: str = "POINT") -> None:
-    attribute: Any = geometry.attributes.new(name, kind, domain)
-    attribute.data.foreach_set(_VALUE[kind], values.ravel())
+def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:
+    attribute: Any = geometry.attributes.new(name, kind, "POINT")
+    attribute.data.foreach_set("value", values)

@@ -1,10 +1,9 @@
 """The node group that plays a bake: attributes and the time in, the ground at that time out.
 
-It is native Blender data and needs nothing of this add-on. The timelines are splines of an object of its own, one for
-each vertex that the bake moves: a vertex stands still most of the time, before its first movement where it was, after
-its last where that left it, and only the splines of vertices in between are sampled (see `core.polylines`). All of that
-happens on the splines, of which there are few beside the vertices of a dense ground; each vertex then takes its height
-from its spline. The group is the same for every bake. Positions start from the undisturbed ones.
+It is native Blender data and needs nothing of this add-on. A vertex stands still most of the time: before its first
+movement where it was, after its last where that left it, which is where the mesh has it. So only those that wait for
+theirs are put back, and only those under way are looked up, in timelines (see `core.polylines`): the splines of an
+object of its own, on each of which those of some vertices lie end to end.
 """
 
 from __future__ import annotations
@@ -14,32 +13,36 @@ from typing import Any
 
 import bpy
 
-from ..core.timelines import NO_VISIT
+from ..core.footprints import NEVER
 
 GROUP = "SoftGround Playback"
 
 REST = "softground_rest"
 MOVED = "softground_moved"
 """Whether the bake moves or touches the vertex at all."""
-SPLINE = "softground_spline"
-"""Number of the vertex's spline."""
+START, END = "softground_start", "softground_end"
+"""Frame from which on something happens to a vertex, and frame from which on nothing does."""
+SPLINE, OFFSET = "softground_spline", "softground_offset"
+"""Number of the spline that the vertex's timeline lies on, and where on it that begins."""
+LAST_HEIGHT, LAST_CONTACT = "softground_last_height", "softground_last_contact"
+"""Height at which a vertex comes to rest [m], and last frame of its last contact."""
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
-STATE = "softground_state"
-"""Of a point of a spline, whose position is the time since the spline's first frame: height, compression, last frame of
-the latest contact and pressure, as a colour."""
-STATE_NOW = "softground_state_now"
-"""The state of a spline at the frame that is shown; as it is stored, that after its last frame."""
-START, END = "softground_start", "softground_end"
-"""Frame from which on something happens to a spline's vertex, and frame from which on nothing does."""
-UNTOUCHED = (0.0, 0.0, NO_VISIT, 0.0)
-"""The state before the first frame of a spline."""
+HEIGHT = "softground_height"
+"""Of a point of a spline, beside compression, age and pressure; along the spline runs the time in frames."""
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
 
 
-def build(*, table: bpy.types.Object, up: Sequence[float], frame_rate: float) -> bpy.types.NodeTree:
+def build(
+    *,
+    table: bpy.types.Object,
+    up: Sequence[float],
+    frame_rate: float,
+    few: bool = False,
+    settled: bool = True,
+) -> bpy.types.NodeTree:
     """A new node group.
 
     Parameters
@@ -50,22 +53,43 @@ def build(*, table: bpy.types.Object, up: Sequence[float], frame_rate: float) ->
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
         Frames of the table per second [Hz].
+    few : bool
+        Whether so few of the vertices move that looking all of them up costs less than telling them apart.
+    settled : bool
+        Whether the positions that the group is given are those at which vertices come to rest, whatever the user does.
     """
     graph = _Graph(GROUP)
     geometry, frame = graph.inputs(up)
-    splines = _state_at(graph, table, frame)
+    start = graph.attribute(START)
+    waiting = graph.compare("LESS_THAN", frame, start)
+    looked_up = going = graph.compare("LESS_THAN", frame, graph.attribute(END))
+    if not few:
+        looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), going)
+    since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, start), 0.0)
+    timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
     graph.next_row()
-    height, compression, contact_end, pressure = graph.channels(graph.sample(splines, STATE_NOW, SPLINE))
-    geometry = graph.raise_from_rest(geometry, MOVED, height)
-    graph.next_row()
+    rest = graph.attribute(REST, "FLOAT_VECTOR")
+    height = timelines.now(HEIGHT)
+    if not settled:
+        begun = graph.compare("LESS_EQUAL", start, frame)
+        reached = graph.math("MULTIPLY", graph.attribute(LAST_HEIGHT), begun)
+        geometry = graph.put(geometry, graph.attribute(MOVED, "BOOLEAN"), rest, graph.scaled(graph.up, reached))
+    elif not few:
+        geometry = graph.put(geometry, waiting, rest)
+    geometry = graph.put(geometry, looked_up, rest, graph.scaled(graph.up, height))
+    compression = timelines.now(COMPRESSION)
     rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
-    since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, contact_end), 0.0)
-    touched = graph.compare("LESS_THAN", contact_end, NO_VISIT / 2)
-    age = graph.choose("FLOAT", touched, -1.0, graph.math("DIVIDE", since, frame_rate))
-    shaded = geometry
-    for name, value in ((COMPRESSION, compression), (RIM, rim), (AGE, age), (PRESSURE, pressure)):
+    age = graph.choose("FLOAT", waiting, timelines.now(AGE), NEVER)
+    last = graph.attribute(LAST_CONTACT)
+    aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
+    shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
+    for name, value, untouched in ((COMPRESSION, compression, 0.0), (RIM, rim, 0.0), (AGE, age, NEVER)):
         graph.next_row()
-        shaded = graph.store(shaded, name, value, graph.attribute(MOVED, "BOOLEAN"))
+        if not few:
+            shaded = graph.store(shaded, name, untouched, waiting)
+        shaded = graph.store(shaded, name, value, looked_up)
+    graph.next_row()
+    shaded = graph.store(shaded, PRESSURE, timelines.now(PRESSURE), looked_up)
     graph.next_row()
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
@@ -80,20 +104,17 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     return None
 
 
-def _state_at(graph: _Graph, table: bpy.types.Object, frame: Any) -> Any:
-    """The splines, each with its state at a frame."""
-    graph.next_row()
-    info = graph.node("GeometryNodeObjectInfo")
-    info.inputs["Object"].default_value = table
-    splines = info.outputs["Geometry"]
-    start, end = graph.attribute(START, "FLOAT"), graph.attribute(END, "FLOAT")
-    yet_to_begin = graph.compare("LESS_THAN", frame, start)
-    under_way = graph.both(graph.compare("LESS_EQUAL", start, frame), graph.compare("LESS_THAN", frame, end))
-    state = graph.sample_own_spline(splines, STATE, graph.math("SUBTRACT", frame, start))
-    graph.next_row()
-    for value, selection in ((UNTOUCHED, yet_to_begin), (state, under_way)):
-        splines = graph.store(splines, STATE_NOW, value, selection, kind="FLOAT_COLOR", domain="CURVE")
-    return splines
+class _Timelines:
+    """What the timelines of vertices say at a place along their splines."""
+
+    def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
+        info = graph.node("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value = table
+        self._graph, self._splines, self._length = graph, info.outputs["Geometry"], length
+        self._number = graph.attribute(SPLINE, "INT")
+
+    def now(self, name: str) -> Any:
+        return self._graph.sample(self._splines, name, self._number, self._length)
 
 
 class _Graph:
@@ -140,26 +161,25 @@ class _Graph:
         else:
             socket.default_value = source
 
-    def attribute(self, name: str, kind: str = "FLOAT_VECTOR") -> Any:
+    def attribute(self, name: str, kind: str = "FLOAT") -> Any:
         node = self.node("GeometryNodeInputNamedAttribute")
         node.data_type = kind
         node.inputs["Name"].default_value = name
         return node.outputs["Attribute"]
 
-    def raise_from_rest(self, geometry: Any, selection: str, height: Any) -> Any:
-        """Put the selected vertices so many metres above their undisturbed positions."""
+    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Put the selected vertices elsewhere."""
         node = self.node("GeometryNodeSetPosition")
         self.link(geometry, node.inputs["Geometry"])
-        self.link(self.attribute(selection, "BOOLEAN"), node.inputs["Selection"])
-        self.link(self.attribute(REST), node.inputs["Position"])
-        self.link(self.scaled(self.up, height), node.inputs["Offset"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(position, node.inputs["Position"])
+        self.link(offset, node.inputs["Offset"])
         return node.outputs["Geometry"]
 
-    def store(
-        self, geometry: Any, name: str, value: Any, selection: Any, *, kind: str = "FLOAT", domain: str = "POINT"
-    ) -> Any:
+    def store(self, geometry: Any, name: str, value: Any, selection: Any) -> Any:
+        """Give the selected vertices another number of that name."""
         node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = kind, domain
+        node.data_type, node.domain = "FLOAT", "POINT"
         node.inputs["Name"].default_value = name
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])
@@ -194,28 +214,14 @@ class _Graph:
         self.link(factor, node.inputs["Scale"])
         return node.outputs["Vector"]
 
-    def channels(self, colour: Any) -> tuple[Any, Any, Any, Any]:
-        node = self.node("FunctionNodeSeparateColor")
-        self.link(colour, node.inputs["Color"])
-        return node.outputs["Red"], node.outputs["Green"], node.outputs["Blue"], node.outputs["Alpha"]
-
-    def sample(self, splines: Any, name: str, number: str) -> Any:
-        """A colour of the spline whose number is in an attribute."""
-        node = self.node("GeometryNodeSampleIndex")
-        node.data_type, node.domain, node.clamp = "FLOAT_COLOR", "CURVE", True
-        self.link(splines, node.inputs["Geometry"])
-        self.link(self.attribute(name, "FLOAT_COLOR"), node.inputs["Value"])
-        self.link(self.attribute(number, "INT"), node.inputs["Index"])
-        return node.outputs["Value"]
-
-    def sample_own_spline(self, splines: Any, name: str, length: Any) -> Any:
-        """A colour of each spline's points, at a length along it."""
+    def sample(self, splines: Any, name: str, number: Any, length: Any) -> Any:
+        """A number of the points of a spline, at a length along it."""
         node = self.node("GeometryNodeSampleCurve")
-        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT_COLOR", False
+        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
         self.link(splines, node.inputs["Curves"])
-        self.link(self.attribute(name, "FLOAT_COLOR"), node.inputs["Value"])
+        self.link(self.attribute(name), node.inputs["Value"])
         self.link(length, node.inputs["Length"])
-        self.link(self.node("GeometryNodeInputIndex").outputs["Index"], node.inputs["Curve Index"])
+        self.link(number, node.inputs["Curve Index"])
         return node.outputs["Value"]
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:

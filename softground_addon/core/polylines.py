@@ -66,6 +66,22 @@ class Polylines:
         frame, start, end = (factor * frames for frames in (self.frame, self.start, self.end))
         return replace(self, frame=frame, start=start, end=end, state=state)
 
+    def end_to_end(self) -> tuple[Indices, Array]:
+        """Number of the string that each place is on if they are strung together, and where on it that begins [frames].
+
+        The gap behind each is at least a frame. Strings begin no place beyond `STRING`.
+        """
+        last = self.frame[self.first[1:] - 1].astype(np.float64)
+        begin = np.cumsum(np.ceil(last) + 1.0) - np.ceil(last) - 1.0
+        _, first, string = np.unique(begin // STRING, return_index=True, return_inverse=True)
+        return string, begin - begin[first[string]]
+
+
+STRING = 512.0
+"""Length up to which places are strung together [frames]: in single precision it is known to a `TICK`."""
+
+TICK = 2.0**-14
+"""Of the time along a string [frames]."""
 
 PLACES_AT_ONCE = 20_000
 """Places whose histories are worked out together: a few tens of megabytes."""

@@ -50,8 +50,8 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True
     ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
     lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma)
-    with playback.player(lines, up=up, frame_rate=30.0) as group:
-        playback.attach(ground, index[lines.point], group)
+    with playback.timelines(lines, 30.0) as table:
+        playback.attach(ground, index[lines.point], lines, table, up=up, frame_rate=30.0)
     return surface
 
 
@@ -85,31 +85,42 @@ def footprints():
 
 
 @pytest.fixture
-def scene():
+def scene(addon):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.fps = 30
     return bpy.context.scene
 
 
-def test_heights_are_those_of_the_record_in_any_order_and_between_frames(scene, footprints):
+@pytest.fixture(params=[0.0, 2.0], ids=["many", "few"])
+def share(request, monkeypatch):
+    """Both ways of looking vertices up, whatever part of them moves."""
+    monkeypatch.setattr(playback, "FEW", request.param)
+
+
+@pytest.mark.parametrize("shape_keys", [True, False])
+@pytest.mark.usefixtures("share")
+def test_heights_are_those_of_the_record_in_any_order_and_between_frames(scene, footprints, shape_keys):
     ground = ground_object(scene)
-    surface = bake_onto(ground, footprints)
+    surface = bake_onto(ground, footprints, shape_keys=shape_keys)
     for frame in (52, 9, 200, 1, 23.25, 77, 24, 38.5):
         moved = world_positions(evaluated(ground, scene, frame)) - surface.vertices
         assert np.abs(moved[:, 2] - recorded(footprints, frame, surface).display).max() <= TOLERANCE + 1e-6
         assert np.abs(moved[:, :2]).max() < 1e-6
 
 
-def test_shading_attributes_follow_the_same_time(scene, footprints):
+@pytest.mark.parametrize("shape_keys", [True, False])
+@pytest.mark.usefixtures("share")
+def test_shading_attributes_follow_the_same_time(scene, footprints, shape_keys):
     ground = ground_object(scene)
-    surface = bake_onto(ground, footprints)
-    for frame in FRAMES:
+    surface = bake_onto(ground, footprints, shape_keys=shape_keys)
+    for frame in (*FRAMES, 23.25, 10):
         shown, sample = evaluated(ground, scene, frame), recorded(footprints, frame, surface)
         assert np.abs(floats(shown, "softground_compression") - sample.compression).max() <= 1e-3
         assert np.abs(floats(shown, "softground_rim") - sample.rim).max() <= 1e-3 + TOLERANCE
         np.testing.assert_allclose(floats(shown, "softground_age"), sample.age, atol=1e-5)
 
 
+@pytest.mark.usefixtures("share")
 def test_pressure_is_there_only_during_the_contact(scene, footprints):
     ground = ground_object(scene)
     surface = bake_onto(ground, footprints)
@@ -144,6 +155,14 @@ def test_the_shape_key_does_not_move_the_ground_twice(scene, footprints, key_val
     touched = recorded(footprints, 1e9, surface).compression > 1e-5
     difference = moved[:, 2] - recorded(footprints, 52, surface).display
     assert np.abs(difference[touched]).max() <= TOLERANCE + 1e-6
+
+
+def test_where_nothing_moves_any_more_the_mesh_itself_is_seen(scene, footprints):
+    ground = ground_object(scene)
+    bake_onto(ground, footprints, shape_keys=False)
+    played = world_positions(evaluated(ground, scene, 200))
+    playback.modifier_of(ground).show_viewport = False
+    np.testing.assert_array_equal(played, world_positions(evaluated(ground, scene, 200)))
 
 
 def tilted_and_scaled():

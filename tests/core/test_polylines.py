@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.histories import Histories, Visits, histories
-from softground_addon.core.polylines import LOADING, polylines, polylines_at
+from softground_addon.core.polylines import LOADING, STRING, TICK, polylines, polylines_at
 from softground_addon.core.ramps import QUANTUM, Ramps
 from softground_addon.core.timelines import NO_VISIT, timelines
 from tests.core.walkers import pressed, walk
@@ -110,3 +110,21 @@ def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_
     assert slow.state[:, :2].tolist() == lines.state[:, :2].tolist()
     assert set(lines.state[:, 2].tolist()) == {6.0, NO_VISIT}
     assert set(slow.state[:, 2].tolist()) == {3.0, NO_VISIT}
+
+
+def test_strung_together_no_place_reaches_into_another_and_all_times_are_known_to_a_tick():
+    rng = np.random.default_rng(3)
+    start = rng.uniform(0, 2000, 600)
+    heights = Ramps(np.arange(600), start, start + rng.uniform(0.25, 90, 600), rng.integers(1, 9, 600) * QUANTUM)
+    lines = polylines(Histories(heights, NO_RAMPS, random_visits(rng, 0), 0.0))
+    string, offset = lines.end_to_end()
+    assert string.tolist() == sorted(string.tolist())
+    assert set(string.tolist()) == set(range(string[-1] + 1))
+    last = lines.frame[lines.first[1:] - 1]
+    for number in range(string[-1] + 1):
+        begin, end = offset[string == number], (offset + last)[string == number]
+        assert begin[0] == 0.0
+        assert (begin[1:] >= end[:-1] + 1.0).all()
+        assert begin[-1] <= STRING
+        assert (np.spacing(end) <= TICK).all()
+    assert string[-1] < len(start) * 46 / STRING + 2
