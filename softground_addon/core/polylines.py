@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .footprints import Footprint
+from .heightfield import SparseGrid
 from .histories import Histories, histories
 from .ramps import TOLERANCE
 from .timelines import NO_VISIT, Timelines, timelines
@@ -83,8 +84,8 @@ STRING = 512.0
 TICK = 2.0**-14
 """Of the time along a string [frames]."""
 
-PLACES_AT_ONCE = 20_000
-"""Places whose histories are worked out together: a few tens of megabytes."""
+VISITS_AT_ONCE = 40_000
+"""Footprints' cells over places whose histories are worked out together: about a hundred megabytes."""
 
 PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
@@ -94,21 +95,31 @@ def polylines_at(
     footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
 ) -> Polylines:
     """The record as polylines at given places; what it is given is what `histories.histories` takes."""
-    order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
-    parts = []
-    for number in range(0, max(len(order), 1), PLACES_AT_ONCE):
-        places = order[number : number + PLACES_AT_ONCE]
+    sizes, error = [np.zeros(0, dtype=np.intp)], 0.0
+    whole: dict[str, tuple[type, bytearray]] = {
+        "point": (np.intp, bytearray()),
+        **{name: (np.float32, bytearray()) for name in ("frame", "state", "start", "end")},
+    }  # grown in place: put together at the end, everything would be there twice
+    for places in _parts(footprints, x, y):
         part = polylines(histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance))
-        parts.append(replace(part, point=places[part.point]))
-    sizes = np.concatenate([np.diff(part.first) for part in parts])
-    return Polylines(
-        first=np.concatenate([[0], np.cumsum(sizes)]),
-        error=max(part.error for part in parts),
-        **{
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in ("point", "frame", "state", "start", "end")
-        },
-    )
+        part = replace(part, point=places[part.point])
+        for name, (_, grown) in whole.items():
+            grown.extend(getattr(part, name).tobytes())
+        sizes.append(np.diff(part.first))
+        error = max(error, part.error)
+    arrays = {name: np.frombuffer(grown, kind) for name, (kind, grown) in whole.items()}
+    arrays["state"] = arrays["state"].reshape(-1, 4)
+    return Polylines(first=np.concatenate([[0], np.cumsum(np.concatenate(sizes))]), error=error, **arrays)
+
+
+def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
+    """Places (K,) in parts that lie together, of which each takes about as much to work out."""
+    order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
+    visits = SparseGrid(footprints[0].cell_size if footprints else PART, channels=1)
+    for footprint in footprints:
+        visits.write(footprint.window, visits.read(footprint.window) + 1)
+    so_far = np.cumsum(visits.nearest(x[order], y[order])[0])
+    return np.split(order, np.flatnonzero(np.diff(so_far // VISITS_AT_ONCE)) + 1)
 
 
 def polylines(over_time: Histories) -> Polylines:

@@ -87,7 +87,7 @@ def test_made_part_by_part_they_are_the_same(monkeypatch):
     _, footprints = pressed(walk(steps=5), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
     x, y = np.random.default_rng(0).uniform((-0.3, -0.3), (2.5, 0.3), (3000, 2)).T
     whole = polylines(histories(footprints, x, y, blur_sigma=0.005))
-    monkeypatch.setattr("softground_addon.core.polylines.PLACES_AT_ONCE", 400)
+    monkeypatch.setattr("softground_addon.core.polylines.VISITS_AT_ONCE", 400)
     parts = polylines_at(footprints, x, y, blur_sigma=0.005)
     assert parts.error == pytest.approx(whole.error)
     order = np.argsort(parts.point)
