@@ -14,6 +14,7 @@ from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
 from ..core.heightfield import TILE, Terrain
+from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
 from ..core.simulation import CharacterLoads
 from ..core.terrain import MeshTerrain
@@ -113,12 +114,12 @@ def _coverage(vertices: Array, cells: Indices, vertices_in_cells: int, cell_size
 
 
 def wants_detail(
-    ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, loads: Sequence[CharacterLoads]
+    ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, motions: Sequence[CharacterMotion]
 ) -> bool:
     """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
     if detail == "ALWAYS" or (detail == "AUTO" and cover.is_coarse(cell_size)):
         return True
-    length = min(sole.sole.length for character in loads for sole in character.motion.soles)
+    length = min(sole.sole.length for motion in motions for sole in motion.soles)
     if cover.spacing > COARSEST_SPACING * length:
         raise InputError(
             f"Ground '{ground.name}' is too coarse: its vertices are more than {COARSEST_SPACING * length * 100:.0f} "

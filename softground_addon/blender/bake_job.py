@@ -98,11 +98,16 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
         gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
     layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
+    warnings = bake_report.warnings(
+        footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
+    )
+    offsets_mm = bake_report.offsets_mm(loads)
+    del loads  # they tell of every step of the simulation
     if shot.surface and shot.surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(shot.surface.factors.tobytes()):08x}"
     written: _Written | None = None
     if write and not response_only and options.output != "RESPONSE":
-        written = yield from _write(scene, shot, loads, footprints, inputs)
+        written = yield from _write(scene, shot, footprints, inputs)
     else:
         vertices = shot.surface.vertices if shot.surface else None
         input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
@@ -114,7 +119,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
         inputs=inputs,
         input_hash=written.input_hash if written else input_hash,
         footprints=footprints,
-        offsets_mm=bake_report.offsets_mm(loads),
+        offsets_mm=offsets_mm,
         timings={
             "sample": sampled - started,
             "simulate": simulated - sampled,
@@ -123,9 +128,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
         },
         playback_error_m=written.error if written else None,
         warnings=[
-            *bake_report.warnings(
-                footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
-            ),
+            *warnings,
             *moving,
             *(written.warnings if written else ()),
             *response_job.warnings(answers),
@@ -156,7 +159,6 @@ class _Written:
 def _write(
     scene: bpy.types.Scene,
     shot: Shot,
-    loads: Sequence[CharacterLoads],
     footprints: Sequence[Footprint],
     inputs: dict[str, object],
 ) -> Job[_Written]:
@@ -190,7 +192,7 @@ def _write(
             index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, pressed, shot.terrain)
             cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
             place = baked_ground.on_itself(ground, index, vertices)
-            if wants_detail(ground, cover, options.detail, cell_size, loads):
+            if wants_detail(ground, cover, options.detail, cell_size, shot.motions):
                 place = yield from _detail(drafts, ground, pressed, shot.terrain, cell_size, unit_scale)
             warnings += coverage_warnings(ground, cover, options.detail, cell_size)
         input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)

@@ -166,7 +166,7 @@ def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
     vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
     footfalls = shot.plan.footfalls
     if footfalls is not None and wants_detail(
-        ground, expected_coverage(vertices, footfalls, cell_size), options.detail, cell_size, known.loads
+        ground, expected_coverage(vertices, footfalls, cell_size), options.detail, cell_size, shot.motions
     ):
         surface = trail_detail.surface_of(ground, unit_scale)
         refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)

@@ -190,11 +190,14 @@ class SparseGrid:
 
     def sample(self, x: Array, y: Array) -> Array:
         """Values at world positions of any shape, bilinear between cell centres: (channels, ...)."""
+        return self._in_parts(self._between, x, y)
+
+    def _in_parts(self, look_up: Callable[[Array, Array], Array], x: Array, y: Array) -> Array:
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         values = np.empty((self.channels, x.size))
         for first in range(0, x.size, PLACES_AT_ONCE):
             part = slice(first, first + PLACES_AT_ONCE)
-            values[:, part] = self._between(x.ravel()[part], y.ravel()[part])
+            values[:, part] = look_up(x.ravel()[part], y.ravel()[part])
         return values.reshape(self.channels, *x.shape)
 
     def _between(self, x: Array, y: Array) -> Array:
@@ -210,9 +213,11 @@ class SparseGrid:
 
     def nearest(self, x: Array, y: Array) -> Array:
         """Values of the cells that hold the world positions of any shape: (channels, ...)."""
-        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        column, row = np.floor(x.ravel() / self.cell_size), np.floor(y.ravel() / self.cell_size)
-        return self._gather(column.astype(int), row.astype(int)).reshape(self.channels, *x.shape)
+        return self._in_parts(self._holding, x, y)
+
+    def _holding(self, x: Array, y: Array) -> Array:
+        column, row = np.floor(x / self.cell_size), np.floor(y / self.cell_size)
+        return self._gather(column.astype(int), row.astype(int))
 
     def _gather(self, column: NDArray[np.intp], row: NDArray[np.intp]) -> Array:
         """Values of single cells, (channels, N)."""

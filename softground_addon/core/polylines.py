@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +108,7 @@ def polylines_at(
             grown.extend(getattr(part, name).tobytes())
         sizes.append(np.diff(part.first))
         error = max(error, part.error)
-    arrays = {name: np.frombuffer(grown, kind) for name, (kind, grown) in whole.items()}
+    arrays: dict[str, NDArray[Any]] = {name: np.frombuffer(grown, kind) for name, (kind, grown) in whole.items()}
     arrays["state"] = arrays["state"].reshape(-1, 4)
     return Polylines(first=np.concatenate([[0], np.cumsum(np.concatenate(sizes))]), error=error, **arrays)
 
