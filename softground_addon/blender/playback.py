@@ -180,24 +180,31 @@ def _table_object(lines: Polylines, frame_rate: float) -> bpy.types.Object:
     size = np.diff(lines.first)
     if len(size):
         splines.add_curves(np.bincount(spline, size).astype(int).tolist())
-        position = np.zeros((len(lines.frame), 3), dtype=np.float32)
-        along_string = lines.frame + np.repeat(offset, size)
-        position[:, 0] = np.round(along_string / TICK) * TICK
         along: Any = splines.attributes["position"]
-        along.data.foreach_set("vector", position.ravel())
-    height, compression, contact_end, pressure = lines.state.T
-    since = lines.frame + np.repeat(lines.start, size) - contact_end
-    age = np.where(contact_end < NO_VISIT, np.maximum(since, 0.0) / frame_rate, NEVER)
-    for name, values in (
-        (nodes.HEIGHT, height),
-        (nodes.COMPRESSION, compression),
-        (nodes.AGE, age),
-        (nodes.PRESSURE, pressure),
-    ):
-        _store(splines, name, "FLOAT", values.astype(np.float32))
+        along.data.foreach_set("vector", _positions(lines.frame + np.repeat(offset, size)))
+    height, compression, _, pressure = lines.state.T
+    _store(splines, nodes.HEIGHT, "FLOAT", height.copy())
+    _store(splines, nodes.COMPRESSION, "FLOAT", compression.copy())
+    _store(splines, nodes.AGE, "FLOAT", _ages(lines, frame_rate))
+    _store(splines, nodes.PRESSURE, "FLOAT", pressure.copy())
     if len(size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
+
+
+def _positions(along: Array) -> NDArray[np.float32]:
+    """Coordinates of points (R,) along the splines, one after the other."""
+    position = np.zeros((len(along), 3), dtype=np.float32)
+    position[:, 0] = np.round(along / TICK) * TICK
+    return position.ravel()
+
+
+def _ages(lines: Polylines, frame_rate: float) -> NDArray[np.float32]:
+    """Time since the last contact at each point of the polylines, (R,) [s]."""
+    contact_end = lines.state[:, 2]
+    since = lines.frame + np.repeat(lines.start, np.diff(lines.first)) - contact_end
+    age: Array = np.where(contact_end < NO_VISIT, np.maximum(since, 0.0) / frame_rate, NEVER)
+    return age.astype(np.float32)
 
 
 def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:
