@@ -18,8 +18,6 @@ from ..core.files import replacing
 from ..core.histories import histories
 from . import baked_ground, display_key, ground_mesh, playback
 
-CACHE_MODIFIER = "SoftGround Cache"
-
 
 def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
     """Write the positions of the ground that carries the bake as a PC2 cache, one sample per frame.
@@ -54,7 +52,7 @@ def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stret
     The cache counts the scene's frames, its modifier the animation's; see `settings.time_stretch_of`.
     """
     carrier = baked_ground.carrier_of(ground)
-    modifier: Any = carrier.modifiers.get(CACHE_MODIFIER) or carrier.modifiers.new(CACHE_MODIFIER, "MESH_CACHE")
+    modifier: Any = carrier.modifiers.get(ground_mesh.CACHE) or carrier.modifiers.new(ground_mesh.CACHE, "MESH_CACHE")
     modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), start
     modifier.frame_scale = 1 / time_stretch
     modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"

@@ -39,6 +39,9 @@ SUMMARY = "softground_summary"
 PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
 """Properties of a mesh that carries a bake."""
 
+CACHE = "SoftGround Cache"
+"""Modifier that plays an exported cache of a bake in place of the native playback."""
+
 TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
 """Modifiers that change a mesh from frame to frame with nothing keyed."""
 
@@ -124,7 +127,13 @@ def check_usable(ground: bpy.types.Object) -> None:
 
 def changes_with_time(ground: bpy.types.Object) -> str:
     """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
-    return next((item.name for item in ground.modifiers if item.show_viewport and item.type in TIME_DEPENDENT), "")
+    theirs = (item for item in ground.modifiers if item not in own_modifiers(ground))
+    return next((item.name for item in theirs if item.show_viewport and item.type in TIME_DEPENDENT), "")
+
+
+def own_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """What plays a bake on the ground: the native playback, and a cache in its place."""
+    return [item for item in (playback.modifier_of(ground), ground.modifiers.get(CACHE)) if item]
 
 
 def _what_moves(ground: bpy.types.Object) -> str:
@@ -223,8 +232,8 @@ def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> I
             copy.modifiers.clear()
         else:
             copy.data = mesh
-            if played := playback.modifier_of(copy):
-                copy.modifiers.remove(played)
+            for own in own_modifiers(copy):
+                copy.modifiers.remove(own)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
         layer.update()
@@ -276,6 +285,7 @@ def write(
     shape_keys : bool
         Blender evaluates shape keys on the whole mesh at each frame that is played, which a dense ground feels.
     """
+    _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
     if REST not in mesh.attributes:
@@ -338,6 +348,7 @@ def restore(ground: bpy.types.Object) -> None:
     if not has_remains(ground):
         return
     playback.remove(ground)
+    _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
     display_key.take_off(ground, rest)
@@ -347,6 +358,12 @@ def restore(ground: bpy.types.Object) -> None:
     for key in PROPERTIES:
         mesh.pop(key, None)
     write_positions(mesh, rest)
+
+
+def _take_off_cache(ground: bpy.types.Object) -> None:
+    """Let no cache of an earlier bake play on the ground any more."""
+    if cache := ground.modifiers.get(CACHE):
+        ground.modifiers.remove(cache)
 
 
 def discard(ground: bpy.types.Object) -> None:

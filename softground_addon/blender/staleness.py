@@ -121,15 +121,17 @@ def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: 
 def _of_ground(ground: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(ground)
     place = np.round(ground_mesh.to_world_of(ground, 1.0), 6) + 0.0  # no negative zeros
-    modifiers = [modifier.type for modifier in ground.modifiers if modifier.show_viewport]
+    own, played = ground_mesh.own_modifiers(ground), playback.modifier_of(ground)
+    # The playback counts whether or not it is shown: a cache may play in its place.
+    modifiers = [item.type for item in ground.modifiers if item == played or (item.show_viewport and item not in own)]
     return f"{digests.of_topology(mesh)}-{digests.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}-{modifiers}"
 
 
 def _of_surface(scene: bpy.types.Scene) -> str:
     """What the ground's modifiers do, and how its material varies."""
     ground = scene.softground.ground
-    own = playback.modifier_of(ground)
-    told = [text for modifier in ground.modifiers if modifier != own for text in digests.of_settings(modifier)]
+    own = ground_mesh.own_modifiers(ground)
+    told = [text for modifier in ground.modifiers if modifier not in own for text in digests.of_settings(modifier)]
     try:
         painted = [name for name in painted_ground.names_of(scene) if name]
     except InputError as error:

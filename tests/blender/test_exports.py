@@ -4,7 +4,16 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, image_exports, jobs, playback
+from softground_addon.blender import (
+    bake_job,
+    bake_report,
+    baked_ground,
+    exports,
+    ground_mesh,
+    image_exports,
+    jobs,
+    playback,
+)
 from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround
@@ -100,6 +109,26 @@ def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, groun
     assert not playback.modifier_of(carrier).show_viewport
     for frame in (25, 40):
         np.testing.assert_allclose(played(carrier, frame), native[frame], atol=2e-6)
+
+
+def test_a_cache_that_plays_on_the_ground_leaves_the_bake_up_to_date_and_goes_with_it(scene, tmp_path):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    field = scene.softground.ground = plane(scene, vertices=150, size=5.0)
+    bpy.context.view_layer.update()
+    flat = played(field, 30)
+    bpy.ops.softground.bake()
+    deep = played(field, 30)[:, 2].min()
+    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2", use_cache=True)
+    assert bake_report.stale_reasons(scene) == ()
+    scene.softground.material.youngs_modulus *= 3
+    assert not jobs.run(bake_job.bake(scene)).report["warnings"]
+    assert deep < 2 * played(field, 30)[:, 2].min() < -0.01, "the new bake, and not the cache of the old one"
+    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2", use_cache=True)
+    bpy.ops.softground.clear_bake()
+    assert not field.modifiers
+    assert np.array_equal(played(field, 30), flat)
 
 
 def import_and_select(operator, path, **options):
