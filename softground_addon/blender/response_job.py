@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -223,8 +223,8 @@ def put_layers(
 
 
 def remove_layers(scene: bpy.types.Scene) -> bool:
-    """Take the layers off all characters; whether there was one."""
-    layered = [c.armature for c in scene.softground.characters if c.armature and nla_layer.has_layer(c.armature)]
+    """Take the layers off all armatures of the scene; whether there was one."""
+    layered = list(_layered(scene))
     for armature in layered:
         nla_layer.remove_layer(armature)
     for layer in scene.view_layers:
@@ -233,8 +233,14 @@ def remove_layers(scene: bpy.types.Scene) -> bool:
 
 
 def has_layers(scene: bpy.types.Scene) -> bool:
-    """Whether any character has a layer."""
-    return any(c.armature and nla_layer.has_layer(c.armature) for c in scene.softground.characters)
+    """Whether any armature of the scene has a layer."""
+    return any(_layered(scene))
+
+
+def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
+    """Armatures with a layer: of characters, and of what was one when it was baked."""
+    armatures = (thing for thing in scene.objects if thing.type == "ARMATURE" and thing.library is None)
+    return (armature for armature in armatures if nla_layer.has_layer(armature))
 
 
 def gap_table(answers: Sequence[Answer]) -> dict[str, object] | None:

@@ -104,6 +104,18 @@ def test_the_users_keys_pose_and_constraints_are_the_same_bytes_after_clearing(a
     assert fingerprints.of_file() == before
 
 
+def test_clearing_takes_the_response_off_a_character_that_has_left_the_list(scene):
+    armature = shots.walker(scene, frames=30)
+    scene.frame_set(1)
+    before = fingerprints.of_object(armature)
+    set_up(armature)
+    responders.bake(scene, output="RESPONSE")
+    bpy.ops.softground.remove_character()
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    scene.frame_set(1)
+    assert fingerprints.of_object(armature) == before
+
+
 def test_without_influence_every_bone_is_where_it_was_to_the_last_bit(scene):
     armature = shots.walker(scene)
     character = set_up(armature)
