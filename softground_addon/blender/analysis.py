@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 
 import bpy
 
+from ..core import report
 from ..core.cell_limits import pressed_area
 from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
 from ..core.prediction import TAKES_NO_PRINT, SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
 from ..core.pressure import Pressure
 from ..core.simulation import CharacterLoads, simulate
-from . import jobs, settings
+from . import jobs, settings, staleness
 from .character_setup import characters_of
 from .shots import Shot, estimate_shot, ground_of, read_shot
 
@@ -34,8 +35,10 @@ class Analysis:
 
     Attributes
     ----------
-    source : hashable
-        What it was read from.
+    sources : frozenset of hashable
+        What it was read from, as far as it is seen in the settings: several where the add-on itself changed them.
+    hashes : frozenset of str
+        Of the animation, the meshes and the ground that it was read from, likewise.
     terms : hashable
         What the loads depend on beside that.
     shot : Shot
@@ -45,7 +48,8 @@ class Analysis:
         That the soles cover on the ground, with each step counted [m²].
     """
 
-    source: Hashable
+    sources: frozenset[Hashable]
+    hashes: frozenset[str]
     terms: Hashable
     shot: Shot
     loads: list[CharacterLoads]
@@ -66,6 +70,15 @@ def forget() -> None:
     _depths.clear()
 
 
+def look_again() -> None:
+    """Forget the shots that were read from something else than what is there now, as after an undo."""
+    scenes = {scene.session_uid: scene for scene in bpy.data.scenes}
+    for uid, analysis in list(_known.items()):
+        scene = scenes.get(uid)
+        if scene is None or known(scene) is None or _hash_of(scene) not in analysis.hashes:
+            del _known[uid]
+
+
 def is_empty() -> bool:
     """Whether no shot is known."""
     return not _known
@@ -77,7 +90,7 @@ def known(scene: bpy.types.Scene) -> Analysis | None:
     Only looks; see `current`.
     """
     analysis = _known.get(scene.session_uid)
-    return analysis if analysis and analysis.source == _source(scene) else None
+    return analysis if analysis and _source(scene) in analysis.sources else None
 
 
 def current(scene: bpy.types.Scene) -> Analysis | None:
@@ -86,12 +99,10 @@ def current(scene: bpy.types.Scene) -> Analysis | None:
     if analysis is None or analysis.terms == _terms(scene):
         return analysis
     try:
-        analysis = _estimated(scene, analysis.shot)
+        return _keep(scene, analysis.shot, analysis.sources, analysis.hashes)
     except InputError:
         del _known[scene.session_uid]
         return None
-    _keep(scene, analysis)
-    return analysis
 
 
 def read(scene: bpy.types.Scene) -> Analysis:
@@ -104,8 +115,8 @@ def read(scene: bpy.types.Scene) -> Analysis:
     """
     analysis = current(scene)
     if analysis is None:
-        analysis = _estimated(scene, jobs.run(read_shot(scene)))
-        _keep(scene, analysis)
+        shot = jobs.run(read_shot(scene))
+        analysis = _keep(scene, shot, frozenset([_source(scene)]), frozenset([_hash_of(scene)]))
     return analysis
 
 
@@ -120,10 +131,11 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
         return
     _tell_of_changes(scene)
     source = _source(scene)
-    if analysis.source == source:
+    if source in analysis.sources:
         _known[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
-        _known[scene.session_uid] = replace(analysis, source=source)
+        sources, hashes = analysis.sources | {source}, analysis.hashes | {_hash_of(scene)}
+        _known[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
 def _tell_of_changes(scene: bpy.types.Scene) -> None:
@@ -187,19 +199,23 @@ def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: Groun
     return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
 
 
-def _estimated(scene: bpy.types.Scene, shot: Shot) -> Analysis:
+def _keep(scene: bpy.types.Scene, shot: Shot, sources: frozenset[Hashable], hashes: frozenset[str]) -> Analysis:
+    """Work the loads of a shot out and know it from now on."""
     loads = jobs.run(estimate_shot(scene, shot))
     stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene), shot.variation)
-    return Analysis(_source(scene), _terms(scene), shot, loads, stances, pressed_area(loads))
-
-
-def _keep(scene: bpy.types.Scene, analysis: Analysis) -> None:
+    analysis = Analysis(sources, hashes, _terms(scene), shot, loads, stances, pressed_area(loads))
     _known[scene.session_uid] = analysis
     _depths.clear()
+    return analysis
+
+
+def _hash_of(scene: bpy.types.Scene) -> str:
+    """What a shot is read from, as far as it is not seen in the settings."""
+    return report.hash_inputs(staleness.of_movers(scene), staleness.of_ground(scene))
 
 
 def _source(scene: bpy.types.Scene) -> Hashable:
-    """What a shot is read from, as far as it is seen in the settings; edits of actions are told by a handler."""
+    """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
     options = scene.softground
     return (
         (options.frame_start, options.frame_end, settings.frame_rate_of(scene), settings.time_stretch_of(scene)),

@@ -13,7 +13,7 @@ from .compat import remove_scene
 from .rig_sampling import TEMPORARY
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
-"""Kinds of data whose edits change what a character does."""
+"""Kinds of data whose edits change what a character does; edited meshes may be what it steps on, or what prints."""
 
 SETTLED = 0.3
 """Time without edits after which what takes a while is worked out anew [s]."""
@@ -28,26 +28,42 @@ def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
 
 @persistent
 def notice_edits(scene: Any, depsgraph: Any = None) -> None:
-    """An edited animation makes what was read from it worthless, and may leave a bake outdated."""
+    """An edited animation or mesh makes what was read from it worthless, and may leave a bake outdated."""
     if scene.softground.ground is not None and not bpy.app.background:
         _later(compare_bake)
-    if not analysis.is_empty() and depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in EDITED):
+    if analysis.is_empty() or depsgraph is None:
+        return
+    if any(depsgraph.id_type_updated(kind) for kind in EDITED):
         analysis.forget()
         if live.is_on() and not bpy.app.timers.is_registered(live.after_edit):
             bpy.app.timers.register(live.after_edit, first_interval=0.0)
         if session.current().show_overlay:
             _later(overlay.read_again)
+    elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
+        _later(compare_forecast)
 
 
-def compare_bake() -> None:
+def compare_bake() -> float | None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
+    if session.current().is_baking:
+        return SETTLED
     windows = bpy.context.window_manager.windows
     if windows:
         session.current().stale = "\n".join(bake_report.stale_reasons(windows[0].scene))
         session.redraw()
+    return None
 
 
-def _later(job: Callable[[], None]) -> None:
+def compare_forecast() -> float | None:
+    """Foretell nothing more of what has changed; for a timer, as it may take a while."""
+    if session.current().is_baking:
+        return SETTLED
+    analysis.look_again()
+    session.redraw()
+    return None
+
+
+def _later(job: Callable[[], float | None]) -> None:
     """Do something once the edits have settled."""
     if bpy.app.timers.is_registered(job):
         bpy.app.timers.unregister(job)
@@ -76,7 +92,7 @@ def before_undo(*_: Any) -> None:
 def after_undo(*_: Any) -> None:
     """Live mode shows its ground on what the undo brought back."""
     _remove_left_over_scenes()
-    analysis.forget()
+    analysis.look_again()
     live.after_undo()
 
 
@@ -130,6 +146,6 @@ def unregister() -> None:
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:
             handlers.remove(handler)
-    for job in (live.after_edit, compare_bake):
+    for job in (live.after_edit, compare_bake, compare_forecast):
         if bpy.app.timers.is_registered(job):
             bpy.app.timers.unregister(job)

@@ -101,19 +101,20 @@ def of_movers(scene: bpy.types.Scene) -> dict[str, str]:
 
 
 def of_ground(scene: bpy.types.Scene) -> dict[str, str]:
-    """Hashes of what the ground of a shot is read from, without a bake that may be on it; none where there is none."""
+    """Hashes of what the ground of a shot is read from, the same with and without a bake on it; none without ground."""
     ground = scene.softground.ground
     return {GROUND: _of_ground(ground), SURFACE: _of_surface(scene)} if ground else {}
 
 
 def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: Mapping[str, str]) -> dict[str, str]:
-    options = scene.softground
+    options, ground = scene.softground, scene.softground.ground
     return {
         VERSION: SERIES,
         SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
         WRITING: f"{options.detail} {options.shape_keys}",
-        **of_ground(scene),
-        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(options.ground))),
+        GROUND: f"{_of_ground(ground)}-{_modifiers_of(ground)}",
+        SURFACE: _of_surface(scene),
+        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
         **movers,
     }
 
@@ -121,10 +122,13 @@ def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: 
 def _of_ground(ground: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(ground)
     place = np.round(ground_mesh.to_world_of(ground, 1.0), 6) + 0.0  # no negative zeros
+    return f"{digests.of_topology(mesh)}-{digests.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}"
+
+
+def _modifiers_of(ground: bpy.types.Object) -> list[str]:
+    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, as a cache may play."""
     own, played = ground_mesh.own_modifiers(ground), playback.modifier_of(ground)
-    # The playback counts whether or not it is shown: a cache may play in its place.
-    modifiers = [item.type for item in ground.modifiers if item == played or (item.show_viewport and item not in own)]
-    return f"{digests.of_topology(mesh)}-{digests.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}-{modifiers}"
+    return [item.type for item in ground.modifiers if item == played or (item.show_viewport and item not in own)]
 
 
 def _of_surface(scene: bpy.types.Scene) -> str:

@@ -3,7 +3,7 @@
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, forecast, live
+from softground_addon.blender import analysis, compat, forecast, handlers, live, nla_layer
 from softground_addon.core.errors import InputError
 from tests.blender.shots import walker
 
@@ -75,7 +75,7 @@ def test_what_cannot_be_worked_out_is_known_no_more(shot, drawing, monkeypatch):
     heavier(shot)
     assert not drawing(shot).is_current
     with monkeypatch.context() as patch:
-        patch.setattr(analysis, "_estimated", refuse)
+        patch.setattr(analysis, "estimate_shot", refuse)
         forecast._work_out()
     assert drawing(shot) is None  # and not worked out at every drawing
 
@@ -92,3 +92,74 @@ def test_a_heavier_character_presses_deeper_in_live_mode_from_then_on(shot, draw
     drawing(shot)
     forecast._work_out()
     assert deepest() < 1.5 * before
+
+
+def sculpted_ground(scene):
+    scene.softground.ground.data.vertices[0].co.z += 0.3
+
+
+def sculpted_foot(scene):
+    scene.objects["Walker Figure"].data.vertices[0].co.z += 0.3
+
+
+def later_key(scene):
+    point = compat.action_curves(*nla_layer.own_action(scene.objects["Walker"]))[0].keyframe_points[5]
+    point.co.y += 0.1
+
+
+def another_range(scene):
+    scene.softground.frame_end -= 5
+
+
+def a_cube(_scene):
+    bpy.ops.mesh.primitive_cube_add()
+
+
+def another_frame(scene):
+    scene.frame_set(20)
+
+
+def the_view_of_the_ground(scene):
+    scene.softground.ground.display_type = "WIRE"
+
+
+@pytest.mark.parametrize("change", [sculpted_ground, sculpted_foot, later_key, another_range])
+def test_it_is_known_no_more_when_an_undo_has_brought_back_something_else(shot, change):
+    bpy.ops.softground.create_ground()
+    bpy.ops.softground.predict_depth()
+    change(shot)
+    handlers.after_undo()
+    assert forecast.of(shot) is None
+
+
+@pytest.mark.parametrize("change", [a_cube, another_frame, the_view_of_the_ground, softer])
+def test_it_survives_an_undo_of_something_else(shot, change):
+    bpy.ops.softground.create_ground()
+    bpy.ops.softground.predict_depth()
+    change(shot)
+    handlers.after_undo()
+    assert forecast.of(shot) is not None
+
+
+def test_it_survives_that_a_bake_and_its_ground_are_undone(shot):
+    bpy.ops.softground.predict_depth()
+    bpy.ops.softground.bake()
+    assert forecast.of(shot) is not None
+    bpy.data.objects.remove(shot.softground.ground)
+    handlers.after_undo()
+    assert forecast.of(shot) is not None
+
+
+def test_an_edit_of_the_grounds_mesh_ends_it_and_a_bake_does_not(shot):
+    bpy.ops.softground.create_ground()
+    bpy.ops.softground.predict_depth()
+    bpy.ops.softground.bake()
+    bpy.context.view_layer.update()
+    handlers.compare_forecast()
+    assert forecast.of(shot) is not None
+    bpy.ops.softground.clear_bake()
+    sculpted_ground(shot)
+    bpy.context.view_layer.update()
+    assert bpy.app.timers.is_registered(handlers.compare_forecast)
+    handlers.compare_forecast()
+    assert forecast.of(shot) is None
