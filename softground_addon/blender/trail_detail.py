@@ -31,7 +31,9 @@ FLOOR = 1e-4
 
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The copy that takes the prints in place of a ground."""
+    """The copy that takes the prints in place of a ground, which is hidden meanwhile."""
+    if not hides(ground):
+        return None  # a copy of the copy may still be there, as the user's own
     for candidate in bpy.data.objects:
         if candidate.get(DETAIL_OF) == ground and candidate.library == ground.library:
             return candidate
@@ -108,8 +110,8 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
 
 def remove(ground: bpy.types.Object) -> None:
     """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
-    _show_again(ground)
     detail = detail_of(ground)
+    _show_again(ground)
     if detail is None:
         return
     _choose_instead(ground, detail)

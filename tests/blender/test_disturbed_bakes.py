@@ -136,6 +136,24 @@ def test_the_ground_is_shown_again_where_its_fine_copy_was_deleted(scene):
     assert fingerprints.of_file()["objects"]["Field"] == before["objects"]["Field"]
 
 
+def test_a_duplicate_of_the_fine_copy_is_the_users_own(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    field = scene.softground.ground = plane(scene, vertices=2)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    copy = trail_detail.detail_of(field)
+    mine = copy.copy()
+    mine.data = copy.data.copy()
+    scene.collection.objects.link(mine)
+    bpy.ops.softground.clear_bake()
+    assert not bpy.ops.softground.clear_bake.poll()
+    vertices = len(mine.data.vertices)
+    bpy.ops.softground.bake()
+    assert trail_detail.detail_of(field) != mine
+    assert (len(mine.data.vertices), len(mine.modifiers)) == (vertices, 1)
+
+
 def test_a_ground_that_was_deleted_in_the_viewport_is_not_baked_on(scene, baked):
     activate(baked)
     bpy.ops.object.delete()
