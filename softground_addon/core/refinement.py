@@ -13,7 +13,10 @@ Mitchell, "Adaptive refinement for arbitrary finite-element spaces with hierarch
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,7 @@ from numpy.typing import NDArray
 from .cell_keys import Keys, among, keys_of, parents_of
 from .equal_parts import equal_parts
 from .triangles import enumerated
+from .z_order import along_curve
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -43,8 +47,8 @@ WEIGHT_BITS = 24
 LEAST_PART = 8.0
 """Smallest leg of an equal part, in cells: beside the trail, sizes still have some halvings to fall off in."""
 
-_CURVE_BITS = 24
-"""Bits of a coordinate along the curve by which vertices are ordered: 6 cm of 1,000 km."""
+AT_ONCE = 1 << 16
+"""Triangles that are looked at together."""
 
 
 class Region:
@@ -238,24 +242,20 @@ def _longest(points: Array, triangles: Indices) -> Array:
     return np.sqrt(longest)
 
 
-def _along_curve(place: Array) -> NDArray[np.int64]:
-    """Position of each place (N, 2) along a Z-order curve, so that neighbours lie near each other in memory."""
-    if not len(place):
-        return np.zeros(0, dtype=np.int64)
-    extent = max(float(np.ptp(place, axis=0).max()), 1e-9)
-    cell = ((place - place.min(axis=0)) * ((2**_CURVE_BITS - 1) / extent)).astype(np.int64)
-    code = np.zeros(len(place), dtype=np.int64)
-    for bit in range(_CURVE_BITS):
-        code |= ((cell[:, 0] >> bit & 1) << 2 * bit) | ((cell[:, 1] >> bit & 1) << (2 * bit + 1))
-    return code
-
-
 def _edges(corner: Numbers, points: int) -> tuple[Numbers, Numbers]:
     """Edges of triangles, (E, 2) in ascending order, and those opposite each triangle's corners, (T, 3)."""
     ends = np.sort(np.stack([np.roll(corner, -1, axis=1), np.roll(corner, 1, axis=1)], axis=-1), axis=-1)
     keys, edge = np.unique(ends.reshape(-1, 2) @ (points, 1), return_inverse=True)
     pairs = np.stack(np.divmod(keys, max(points, 1)), axis=-1)
     return pairs.astype(np.int32), edge.reshape(-1, 3).astype(np.int32)
+
+
+def _halved(values: NDArray[Any], triangles: Indices, *parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Values at the corners of triangles (T, 3) after some were cut in two: the first part in its place, the second
+    behind all."""
+    first, second = parts
+    values[triangles] = np.stack(first, axis=1)
+    return np.concatenate([values, np.stack(second, axis=1)])
 
 
 def _count(many: int, first: int = 0) -> Numbers:
@@ -265,7 +265,8 @@ def _count(many: int, first: int = 0) -> Numbers:
 class _Bisection:
     """Triangles that are cut in two across their base, which lies opposite their first corner.
 
-    Edge k of a triangle lies opposite its corner k. A cut edge has two halves; the first is at its first end.
+    Edge k of a triangle lies opposite its corner k. A cut edge has two halves, which end in its middle; the first is at
+    its first end. Of the weights there is an array for each corner of the surface's triangle.
     """
 
     def __init__(self, vertices: Array, triangles: Indices, parts: int = 1, grain: float = 1.0) -> None:
@@ -275,22 +276,22 @@ class _Bisection:
         self.ends, self.edge = _edges(self.corner, len(self.vertex))
         self.root = _count(len(self.ends))
         self.half = np.full(len(self.ends), -1, dtype=np.int32)
-        self.middle = np.full(len(self.ends), -1, dtype=np.int32)
         self.source = _count(len(triangles))
-        self.weight = np.tile(np.eye(3, dtype=np.float32), (len(triangles), 1, 1))
+        self.weight = [np.tile(share, (len(triangles), 1)) for share in np.eye(3, dtype=np.float32)]
         self._roots = self.ends
         if parts > 1:
             self._cut_evenly(parts, grain)
         side = self.points[np.roll(self.corner, -1, axis=1)] - self.points[np.roll(self.corner, 1, axis=1)]
         base = np.argmax(np.einsum("tki,tki->tk", side, side), axis=1)
         turn = (base[:, None] + np.arange(3)) % 3
-        self.corner, self.edge = (np.take_along_axis(of, turn, axis=1) for of in (self.corner, self.edge))
-        self.weight = np.take_along_axis(self.weight, turn[:, :, None], axis=1)
+        self.corner, self.edge, *self.weight = (
+            np.take_along_axis(of, turn, axis=1) for of in (self.corner, self.edge, *self.weight)
+        )
 
     def _cut_evenly(self, count: int, grain: float) -> None:
         """Cut all triangles into equal parts."""
         parts = equal_parts(self.points, self.corner, self.edge, self.ends, count, grain)
-        self.points, self.weight = parts.points, parts.weight
+        self.points, self.weight = parts.points, [parts.weight[:, :, corner] for corner in range(3)]
         self.corner, self.source = parts.corner.astype(np.int32), parts.source.astype(np.int32)
         ends, edge = _edges(self.corner, len(self.points))
         pieces = np.sort(parts.pieces.reshape(-1, 2), axis=1) @ (len(self.points), 1)
@@ -304,9 +305,8 @@ class _Bisection:
         """Cut until no triangle with a longer leg reaches into the region."""
         fresh = np.arange(len(self.corner))
         while True:
-            long = fresh[_longest(self.points, self.corner[fresh]) > leg * np.sqrt(2)]
-            place = self.points[self.corner[long], :2]
-            wanted = long[region.touches(place.min(axis=1), place.max(axis=1))] if len(long) else long
+            parts = [fresh[first : first + AT_ONCE] for first in range(0, len(fresh), AT_ONCE)]
+            wanted = np.concatenate([fresh[:0], *(self._wanted(part, region, leg) for part in parts)])
             if not len(wanted):
                 return
             marked = np.zeros(len(self.ends), dtype=bool)
@@ -314,6 +314,12 @@ class _Bisection:
             self._close(marked)
             self._cut_edges(np.flatnonzero(marked))
             fresh = self._cut_triangles()
+
+    def _wanted(self, triangles: Indices, region: Region, leg: float) -> Indices:
+        """Those triangles that are too large and reach into the region."""
+        long = triangles[_longest(self.points, self.corner[triangles]) > leg * np.sqrt(2)]
+        place = self.points[self.corner[long], :2]
+        return long[region.touches(place.min(axis=1), place.max(axis=1))]
 
     def _close(self, marked: Mask) -> None:
         """Mark the base of every triangle that has a marked edge."""
@@ -327,16 +333,14 @@ class _Bisection:
         ends = self.ends[edges]
         middle = _count(len(edges), len(self.points))
         self.points = np.concatenate([self.points, (self.points[ends[:, 0]] + self.points[ends[:, 1]]) / 2])
-        self.middle[edges] = middle
         halves = np.stack([ends, np.stack([middle, middle], axis=-1)], axis=-1).reshape(-1, 2)
         self.half[edges] = self._add_edges(halves, np.repeat(self.root[edges], 2))[::2]
 
     def _add_edges(self, ends: Numbers, root: Numbers) -> Numbers:
         added = _count(len(ends), len(self.ends))
-        none = np.full(len(ends), -1, dtype=np.int32)
         self.ends = np.concatenate([self.ends, ends])
         self.root = np.concatenate([self.root, root])
-        self.half, self.middle = (np.concatenate([of, none]) for of in (self.half, self.middle))
+        self.half = np.concatenate([self.half, np.full(len(ends), -1, dtype=np.int32)])
         return added
 
     def _cut_triangles(self) -> Indices:
@@ -354,18 +358,16 @@ class _Bisection:
     def _halve(self, triangles: Indices) -> None:
         apex, left, right = self.corner[triangles].T
         base, by_right, by_left = self.edge[triangles].T  # edges opposite apex, left and right
-        middle = self.middle[base]
+        middle = self.ends[self.half[base], 1]
         across = self._add_edges(np.stack([apex, middle], axis=-1), np.full(len(triangles), -1, dtype=np.int32))
         at_left = self.half[base] + (self.ends[base, 0] != left)
         at_right = self.half[base] + (self.ends[base, 0] != right)
-        weight = self.weight[triangles]
-        between = (weight[:, 1] + weight[:, 2]) / 2
-        self.corner[triangles] = np.stack([middle, apex, left], axis=-1)
-        self.edge[triangles] = np.stack([by_left, at_left, across], axis=-1)
-        self.weight[triangles] = np.stack([between, weight[:, 0], weight[:, 1]], axis=1)
-        self.corner = np.concatenate([self.corner, np.stack([middle, right, apex], axis=-1)])
-        self.edge = np.concatenate([self.edge, np.stack([by_right, across, at_right], axis=-1)])
-        self.weight = np.concatenate([self.weight, np.stack([between, weight[:, 2], weight[:, 0]], axis=1)])
+        self.corner = _halved(self.corner, triangles, (middle, apex, left), (middle, right, apex))
+        self.edge = _halved(self.edge, triangles, (by_left, at_left, across), (by_right, across, at_right))
+        for corner, weight in enumerate(self.weight):
+            apex, left, right = weight[triangles].T
+            between = (left + right) / 2
+            self.weight[corner] = _halved(weight, triangles, (between, apex, left), (between, right, apex))
         self.source = np.concatenate([self.source, self.source[triangles]])
 
     def cut_edges(self) -> Indices:
@@ -373,15 +375,17 @@ class _Bisection:
         return self.vertex[self._roots[self.half[: len(self._roots)] >= 0]]
 
     def result(self, surface: Surface, chosen: Indices) -> Refinement:
-        """The refinement, where the triangles were those of the surface that were chosen."""
+        """The refinement, where the triangles were those of the surface that were chosen; they are cut no more."""
+        del self.edge
         given = len(self.vertex)
         face = surface.triangle_face[chosen]
         parts = np.bincount(self.source, minlength=len(chosen))
         changed = np.zeros(len(surface.face_start) - 1, dtype=bool)
         changed[face[parts > 1]] = True
         ours = np.flatnonzero(changed[face[self.source]])
-        place = _along_curve(self.points[:, :2])
-        ours = ours[np.argsort(place[self.corner[ours]].min(axis=1), kind="stable")]
+        place = along_curve(self.points[:, :2])
+        begin = reduce(np.minimum, (place[self.corner[ours, number]] for number in range(3)))
+        ours = ours[np.argsort(begin, kind="stable")]
         corner = self.corner[ours]
         by_place = given + np.argsort(place[given:], kind="stable")
         vertex = np.empty(len(self.points), dtype=np.int32)
@@ -390,12 +394,15 @@ class _Bisection:
         first = np.zeros(len(self.points), dtype=np.int32)
         first[corner.ravel()[::-1]] = _count(corner.size)[::-1]
         leaf = np.flatnonzero((self.half < 0) & (self.root >= 0) & (np.arange(len(self.ends)) >= len(self._roots)))
+        weights = np.empty((len(ours), 3, 3), dtype=np.float32)
+        for number in (2, 1, 0):
+            weights[:, :, number] = self.weight.pop()[ours]
         return Refinement(
             kept_faces=np.flatnonzero(~changed),
             triangles=vertex[corner],
             face=face[self.source[ours]].astype(np.int32),
             corners=surface.triangle_corners[chosen].astype(np.int32)[self.source[ours]],
-            weights=self.weight[ours],
+            weights=weights,
             new_vertex=first[by_place],
             edges=vertex[self.ends[leaf]].astype(np.intp),
             edge_of=self.vertex[self._roots[self.root[leaf]]],
