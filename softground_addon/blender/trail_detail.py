@@ -137,9 +137,14 @@ def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:
 
 
 def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Give the copy a new mesh of the same name; what the user added to the object stays."""
+    """Give the copy a new mesh of the same name; its materials and what the user added to the object stay."""
     playback.remove(detail)
     old: Any = detail.data
+    for place, material in enumerate(old.materials):
+        if place < len(mesh.materials):
+            mesh.materials[place] = material
+        else:
+            mesh.materials.append(material)
     detail.data = mesh
     name = old.name
     if not old.users:

@@ -294,10 +294,14 @@ def test_another_trail_reuses_the_copy(scene):
     ground = coarse_ground(scene)
     detail = refined(ground)
     bevel = detail.modifiers.new("Mine", "BEVEL")
+    mine = [bpy.data.materials.new(name) for name in ("Ice", "Slush")]
+    for material in mine:
+        detail.data.materials.append(material)
     first = len(detail.data.vertices)
     again = refined(ground, 0.04, region(0.04))
     assert again == detail
     assert bevel.name in detail.modifiers
+    assert list(detail.data.materials) == mine
     assert len(detail.data.vertices) < first
     assert [mesh.name for mesh in bpy.data.meshes] == ["Field", "Field Trail"]
     assert (ground.hide_viewport, ground.hide_render) == (True, True)
