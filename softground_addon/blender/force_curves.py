@@ -63,17 +63,25 @@ def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float) -> 
 def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames: Array) -> list[bpy.types.Object]:
     """Give each character an empty whose custom properties are its forces, in place of the one it may have.
 
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    footprints : sequence of Footprint
+    frames : (N,) float array
+        Scene frames; the keys are where those are shown if the scene's time is remapped.
+
     Returns
     -------
     list of bpy.types.Object
         The empties, one per character.
     """
     empties: dict[str, bpy.types.Object] = {}
+    times = frames * settings.time_stretch_of(scene)
     for (character, sole), values in forces_over_time(footprints, frames).items():
         if character not in empties:
             empties[character] = _fresh_empty(scene, f"{character} Forces")
         for what, series in zip((FORCE, CONTACT), values, strict=True):
-            _animate(empties[character], f"{sole} {what}", frames, series, constant=what == CONTACT)
+            _animate(empties[character], f"{sole} {what}", times, series, constant=what == CONTACT)
     return list(empties.values())
 
 

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import force_curves
+from softground_addon.blender import baked_ground, force_curves
 from softground_addon.blender.compat import action_curves
 from tests.blender import fingerprints
 from tests.blender.shots import walker
@@ -46,6 +46,24 @@ def test_contact_is_one_where_there_is_force_and_else_zero(baked):
             assert contact in (0.0, 1.0)
             assert force == 0 or contact == 1
     assert seen == {0.0, 1.0}
+
+
+def test_the_curves_play_in_the_scenes_frames_where_its_time_is_remapped(scene):
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    bpy.ops.softground.bake()
+    bpy.ops.softground.force_curves()
+    footprints, _ = baked_ground.load(scene.softground.ground)
+    frames = np.arange(scene.softground.frame_start, scene.softground.frame_end + 1, dtype=float)
+    force, contact = force_curves.forces_over_time(footprints, frames)["Walker", "foot.L"]
+    empty = bpy.data.objects["Walker Forces"]
+    for frame in range(5, 80, 6):
+        scene.frame_set(frame)
+        at = int(np.searchsorted(frames, frame))
+        assert empty["foot.L force"] == pytest.approx(force[at], abs=1.0)
+        assert empty["foot.L contact"] == contact[at]
 
 
 def test_a_driver_can_read_them(baked):
