@@ -133,10 +133,8 @@ def write(
     shape_keys : bool
         See `ground_mesh.write`.
     """
-    lines, frame_rate = (
-        over_time.stretched(time_stretch),
-        frame_rate * time_stretch,
-    )  # nodes count the animation's frames
+    # Nodes count the animation's frames.
+    lines, frame_rate = over_time.stretched(time_stretch), frame_rate * time_stretch
     up = ground_mesh.up_of(place.carrier, unit_scale)
     with playback.timelines(lines, frame_rate) as table:
         yield Progress("write", 0.9)
