@@ -14,7 +14,7 @@ from ..core.footprints import Footprint
 from ..core.missed_steps import advice, missed_steps
 from ..core.simulation import CharacterLoads
 from ..core.sliding import treadmill_speed
-from . import ground_mesh, properties, response_job, settings, staleness
+from . import ground_checks, properties, response_job, settings, staleness
 from .character_setup import characters_of, mapping_of, title_of
 from .jobs import STAGES
 
@@ -79,7 +79,7 @@ def warnings(
 
 def ground_warnings(ground: bpy.types.Object | None, frame: int) -> list[str]:
     """What the user should know of a ground that changes its shape over time, taken at a frame, with the remedy."""
-    modifier = ground_mesh.changes_with_time(ground) if ground else ""
+    modifier = ground_checks.changes_with_time(ground) if ground else ""
     if not (ground and modifier):
         return []
     return [

@@ -16,7 +16,7 @@ from ..core.errors import InputError
 from ..core.footprints import Footprint
 from ..core.polylines import Polylines
 from ..core.pressed_ground import GroundSample, PressedGround
-from . import created_ground, ground_mesh, playback, trail_detail
+from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
 from .created_ground import Layout
 from .jobs import Job, Progress
 
@@ -73,7 +73,7 @@ def clear(ground: bpy.types.Object) -> None:
         If the ground or the copy that carries the bake cannot be changed.
     """
     for thing in dict.fromkeys((ground, carrier_of(ground))):
-        ground_mesh.check_writable(thing)
+        ground_checks.check_writable(thing)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
 

@@ -14,7 +14,19 @@ import bpy
 from ..core.errors import InputError, SoftGroundError
 from ..core.manifest import BatchShot
 from ..core.shell import command_line
-from . import analysis, baked_ground, batch, character_setup, ground_mesh, jobs, response_job, session, settings, shots
+from . import (
+    analysis,
+    baked_ground,
+    batch,
+    character_setup,
+    ground_checks,
+    ground_mesh,
+    jobs,
+    response_job,
+    session,
+    settings,
+    shots,
+)
 from .created_ground import create_ground
 from .translation import rpt_
 
@@ -108,7 +120,7 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         chosen = _selected_ground(context)
         if chosen is not None:
-            ground_mesh.check_usable(chosen)
+            ground_checks.check_usable(chosen)
             settings.scene_of(context).softground.ground = chosen
             self.report({"INFO"}, f"'{chosen.name}' is the ground")
             return {"FINISHED"}

@@ -18,7 +18,7 @@ from ..core.simulation import CharacterLoads, estimate_loads
 from ..core.soft_ground import SoftGround
 from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
-from . import ground_mesh, painted_ground, settings
+from . import ground_checks, ground_mesh, painted_ground, settings
 from .bake_checks import check_contacts
 from .character_setup import characters_of, mapping_of, title_of
 from .ground_mesh import GroundSurface
@@ -142,7 +142,7 @@ def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharac
             "panel."
         )
     if options.ground is not None:
-        ground_mesh.check_usable(options.ground)
+        ground_checks.check_usable(options.ground)
 
 
 def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> Job[list[CharacterMotion]]:
