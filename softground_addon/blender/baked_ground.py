@@ -135,6 +135,7 @@ def write(
     """
     # Nodes count the animation's frames.
     lines, frame_rate = over_time.stretched(time_stretch), frame_rate * time_stretch
+    sample = sample.moved_at(lines.point)  # what no line moves stays exactly where it is
     up = ground_mesh.up_of(place.carrier, unit_scale)
     with playback.timelines(lines, frame_rate) as table:
         yield Progress("write", 0.9)

@@ -59,7 +59,8 @@ def of_topology(mesh: bpy.types.Mesh) -> str:
 
 def of_positions(mesh: bpy.types.Mesh) -> str:
     """Where the vertices of a mesh are without any bake."""
-    return f"{zlib.crc32(ground_mesh.rest_positions(mesh).tobytes()):08x}"
+    rest = ground_mesh.rest_positions(mesh) + np.float32(0)  # Edit Mode makes negative zeros positive
+    return f"{zlib.crc32(rest.tobytes()):08x}"
 
 
 def of_weights(thing: bpy.types.Object, groups: Container[str]) -> str:

@@ -230,8 +230,8 @@ def write(
     _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    if REST not in mesh.attributes:
-        _add_attribute(mesh, REST, "FLOAT_VECTOR").data.foreach_set("vector", rest.ravel())
+    kept = mesh.attributes.get(REST) or _add_attribute(mesh, REST, "FLOAT_VECTOR")
+    kept.data.foreach_set("vector", rest.ravel())
     up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
     raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
@@ -277,7 +277,10 @@ def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
 
 def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
     """Positions of the finished ground as it is shown, (V, 3) in the object's own space and units."""
-    mesh = mesh_of(ground)
+    return _shown_positions(mesh_of(ground))
+
+
+def _shown_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     shown = display_key.positions(mesh)
     return mesh_arrays.positions(mesh) if shown is None else shown
 
@@ -289,10 +292,10 @@ def restore(ground: bpy.types.Object) -> None:
     """
     if not has_remains(ground):
         return
-    playback.remove(ground)
     _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
+    playback.remove(ground)
     display_key.take_off(ground, rest)
     for name in (REST, *SHADING_ATTRIBUTES, SOLE):
         if name in mesh.attributes:
@@ -327,13 +330,22 @@ def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOA
 
 
 def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
-    """Positions without the bake, (V, 3) in the object's own space and units."""
+    """Positions without the bake, (V, 3) in the object's own space and units.
+
+    Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
+    """
     attribute = mesh.attributes.get(REST)
     if attribute is None or len(attribute.data) != len(mesh.vertices):
         return mesh_arrays.positions(mesh)
-    rest = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    attribute.data.foreach_get("vector", rest)
-    return rest.reshape(-1, 3)
+    kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    attribute.data.foreach_get("vector", kept)
+    rest = kept.reshape(-1, 3)
+    moves = playback.moves(mesh)
+    if moves is not None:
+        shown = _shown_positions(mesh)
+        edited = ~moves & (shown != rest).any(axis=1)  # keeps the sign of zeros
+        rest[edited] = shown[edited]
+    return rest
 
 
 def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:

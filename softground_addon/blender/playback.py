@@ -141,14 +141,20 @@ def is_playback_attribute(name: str) -> bool:
     return name in _ATTRIBUTES
 
 
+def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
+    """Whether the playback moves each vertex, (V,); None where there is none."""
+    attribute: Any = mesh.attributes.get(nodes.MOVED)
+    if attribute is None or len(attribute.data) != len(mesh.vertices):
+        return None
+    moved = np.empty(len(attribute.data), dtype=bool)
+    attribute.data.foreach_get("value", moved)
+    return moved
+
+
 def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     """Vertices that the playback moves, (K,)."""
-    attribute: Any = mesh.attributes.get(nodes.MOVED)
-    if attribute is None:
-        return np.zeros(0, dtype=np.intp)
-    moves = np.empty(len(attribute.data), dtype=bool)
-    attribute.data.foreach_get("value", moves)
-    return np.flatnonzero(moves)
+    moved = moves(mesh)
+    return np.zeros(0, dtype=np.intp) if moved is None else np.flatnonzero(moved)
 
 
 def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, lines: Polylines) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,12 @@ class GroundSample:
     compression: Array
     rim: Array
     age: Array
+
+    def moved_at(self, points: NDArray[np.intp]) -> GroundSample:
+        """The same with heights that change at some of the places only."""
+        moves = np.zeros(len(self.raw), dtype=bool)
+        moves[points] = True
+        return replace(self, raw=np.where(moves, self.raw, 0.0), display=np.where(moves, self.display, 0.0))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_mesh, trail_detail
+from softground_addon.blender import bake_report, ground_mesh, mesh_arrays, trail_detail
 from softground_addon.blender.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -69,6 +69,53 @@ def test_a_key_that_the_user_sculpted_on_the_bake_stays_on_the_ground_under_it(s
     assert [key.name for key in mesh.shape_keys.key_blocks] == ["Basis", "Mine"]
     assert added() == pytest.approx(before, abs=1e-6)
     assert np.ptp(key_positions(mesh.shape_keys.reference_key)[:, 2]) == 0.0
+
+
+def add_cube_in_edit_mode(ground):
+    activate(ground)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.primitive_cube_add(location=(0.0, 2.0, 1.0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def join_cube(ground):
+    bpy.ops.mesh.primitive_cube_add(location=(0.0, 2.0, 1.0))
+    cube = bpy.context.object
+    activate(ground)
+    cube.select_set(True)
+    bpy.ops.object.join()
+
+
+def raise_far_corner(ground):
+    """A hill where nobody walks, in whatever holds the shape of the ground."""
+    mesh = ground.data
+    holder = mesh.shape_keys.key_blocks[DISPLAY_KEY].points if mesh.shape_keys else mesh.vertices
+    holder[0].co.z += 0.5
+    mesh.update()
+
+
+@pytest.mark.parametrize("shape_keys", [True, False])
+@pytest.mark.parametrize("model", [add_cube_in_edit_mode, join_cube, raise_far_corner])
+def test_what_was_modelled_beside_the_prints_stays(scene, model, shape_keys):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    ground = scene.softground.ground = plane(scene, size=6.0, vertices=150)
+    bpy.context.view_layer.update()
+    scene.softground.cell_size, scene.softground.shape_keys = 0.02, shape_keys
+    before = mesh_arrays.positions(ground.data).copy()
+    bpy.ops.softground.bake()
+
+    model(ground)
+    assert bake_report.stale_reasons(scene)
+    expected = np.concatenate([before, ground_mesh.displayed_positions(ground)[len(before) :]])
+    if model is raise_far_corner:
+        expected[0, 2] += 0.5
+    assert len(expected) > len(before) or not np.array_equal(expected, before)
+    assert np.abs(np.diff(expected[-8:], axis=0)).max() > 0  # nothing has fallen together
+    bpy.ops.softground.bake()
+    assert bake_report.stale_reasons(scene) == ()
+    bpy.ops.softground.clear_bake()
+    assert np.array_equal(mesh_arrays.positions(ground.data), expected)
 
 
 def test_clearing_in_edit_mode_is_refused_and_changes_nothing(baked):
