@@ -181,6 +181,8 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
         if options.ground is None:
             row = column.row()
             row.operator("softground.create_ground", icon="MESH_GRID")
+        else:
+            _changing_ground(column, options)
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
         column.prop(options, "shape_keys")
@@ -344,6 +346,16 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
     box.label(text="above their prints", icon="BLANK1")
     box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
+
+
+def _changing_ground(layout: Any, options: Any) -> None:
+    """Which frame's shape is taken of a ground that changes over time."""
+    modifier = ground_mesh.changes_with_time(options.ground)
+    if modifier:
+        box = layout.box().column(align=True)
+        box.label(text=iface_("'{modifier}' changes its shape").format(modifier=modifier), icon="INFO", translate=False)
+        taken = iface_("Taken as it is at frame {frame}").format(frame=options.frame_start)
+        box.label(text=taken, icon="BLANK1", translate=False)
 
 
 def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:

@@ -1,6 +1,7 @@
 """Panels, presets and the depth to expect, as far as they can be seen without a window."""
 
 import json
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -200,3 +201,19 @@ def test_characters_and_soles_can_be_corrected(shot):
     assert not shot.softground.characters
     assert not bpy.ops.softground.remove_character.poll()
     assert not bpy.ops.softground.bake.poll()
+
+
+def labels(draw, *arguments):
+    """The texts that a part of a panel shows."""
+    layout = MagicMock()
+    draw(layout, *arguments)
+    return [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith("label")]
+
+
+def test_a_ground_that_changes_over_time_is_told_of_before_any_bake(shot):
+    bpy.ops.softground.create_ground()
+    options = shot.softground
+    assert labels(panels._changing_ground, options) == []
+    options.ground.modifiers.new("Swell", "WAVE")
+    options.frame_start = 7
+    assert labels(panels._changing_ground, options) == ["'Swell' changes its shape", "Taken as it is at frame 7"]
