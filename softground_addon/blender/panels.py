@@ -8,7 +8,7 @@ import bpy
 
 from ..core.cell_limits import BYTES_PER_CELL
 from ..core.motion import JOINTS
-from . import bake_report, baked_ground, forecast, ground_mesh, response_job, session, settings
+from . import bake_report, baked_ground, forecast, ground_checks, ground_mesh, response_job, session, settings
 from .character_editing import active_character, active_sole
 from .character_setup import is_set_up, is_thing
 from .translation import iface_
@@ -350,7 +350,7 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
 
 def _changing_ground(layout: Any, options: Any) -> None:
     """Which frame's shape is taken of a ground that changes over time."""
-    modifier = ground_mesh.changes_with_time(options.ground)
+    modifier = ground_checks.changes_with_time(options.ground)
     if modifier:
         box = layout.box().column(align=True)
         box.label(text=iface_("'{modifier}' changes its shape").format(modifier=modifier), icon="INFO", translate=False)
