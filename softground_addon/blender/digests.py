@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Collection, Container, Iterable, Iterator
 from typing import Any
 
 import bpy
@@ -148,9 +148,10 @@ def of_animation(thing: bpy.types.Object) -> str:
     return joined(told)
 
 
-def of_settings(owner: Any, animated: Container[str] = ()) -> Iterator[str]:
+def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
     """What is set in a modifier, a constraint or the like, but for what is animated; each Blender has settings more."""
     yield owner.bl_rna.identifier
+    path = _path(owner) if animated else ""
     for setting in owner.bl_rna.properties:
         name = setting.identifier
         if name in _NO_INPUT or (name.startswith(("show_", "open_")) and name != "show_viewport"):
@@ -158,7 +159,7 @@ def of_settings(owner: Any, animated: Container[str] = ()) -> Iterator[str]:
         if name == "targets":
             for target in owner.targets:
                 yield from of_settings(target, animated)
-        elif setting.type != "COLLECTION" and not setting.is_readonly and _path(owner, name) not in animated:
+        elif setting.type != "COLLECTION" and not setting.is_readonly and f"{path}.{name}" not in animated:
             value = getattr(owner, name)
             if isinstance(value, bpy.types.Texture):
                 yield from of_settings(value)
@@ -168,9 +169,9 @@ def of_settings(owner: Any, animated: Container[str] = ()) -> Iterator[str]:
         yield from (f"{name} {_plain(value)}" for name, value in node_inputs(owner))
 
 
-def _path(owner: Any, name: str) -> str:
+def _path(owner: Any) -> str:
     try:
-        return str(owner.path_from_id(name))
+        return str(owner.path_from_id())
     except ValueError:  # of what has no path, nothing is animated
         return ""
 
@@ -225,7 +226,7 @@ def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
 
 def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
     """How a strip plays its action; by its own curves where these decide."""
-    own = {_path(strip, curve.data_path) for curve in strip.fcurves}
+    own = {f"{_path(strip)}.{curve.data_path}" for curve in strip.fcurves}
     yield from of_settings(strip, own)
     yield from _of_curves(strip.fcurves)
     for curve in strip.fcurves:
