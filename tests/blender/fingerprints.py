@@ -101,7 +101,10 @@ def _points(key: bpy.types.ShapeKey) -> bytes:
 
 
 def _properties(block: Any) -> dict[str, str]:
-    return {key: repr(block[key]) for key in block.keys()} if hasattr(block, "keys") else {}  # noqa: SIM118
+    if not hasattr(block, "keys"):
+        return {}
+    values = {key: block[key] for key in block.keys()}  # noqa: SIM118
+    return {key: repr(v.to_dict() if hasattr(v, "to_dict") else v) for key, v in values.items()}
 
 
 def _rna(block: Any) -> dict[str, str]:
