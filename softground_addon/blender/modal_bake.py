@@ -23,7 +23,10 @@ LONG_DRAWING = 0.02
 """Time that Blender took for itself after which its user's events come before more work [s]."""
 
 SHOWN_FOR = 0.15
-"""Time between two drawings of the progress [s]: they cost more than many a tick."""
+"""Shortest time between two drawings of the progress [s]: they cost more than many a tick."""
+
+WORK_PER_DRAWING = 4.0
+"""Least time for work, as a multiple of that for drawing, where drawing takes long."""
 
 STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
 
@@ -77,7 +80,7 @@ class _Bake(bpy.types.Operator):
     def _start(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         self._job, self._scene, self._needed = self._job_of(scene), scene.session_uid, _read_by_bake(scene)
-        self._started = self._ticked = self._shown = time.perf_counter()
+        self._started = self._ticked = self._show_at = time.perf_counter()
         self._gave_way = False
         self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
@@ -113,15 +116,16 @@ class _Bake(bpy.types.Operator):
         waited = now - self._ticked
         if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
             self._started += waited
-            if now - self._shown > SHOWN_FOR:
-                self._shown = now
+            if now > self._show_at:
+                self._show_at = now + SHOWN_FOR
                 self._show_status(session.current().progress, iface_("Waiting for the render"))
             return {"PASS_THROUGH"}
         self._gave_way = waited > LONG_DRAWING and not self._gave_way
         if self._gave_way:  # to the events that have come while Blender drew: they wait for its drawing or a tick
+            self._show_at = max(self._show_at, now + WORK_PER_DRAWING * waited)
             return {"PASS_THROUGH"}
-        if self._progress and now - self._shown > SHOWN_FOR:  # a tick works or has something drawn
-            self._shown = now
+        if self._progress and now > self._show_at:  # a tick works or has something drawn
+            self._show_at = now + SHOWN_FOR
             self._show_progress(self._progress)
             return {"PASS_THROUGH"}
         try:

@@ -134,12 +134,31 @@ def works_after(bake, seconds):
 
 
 def test_events_come_before_more_work_where_blender_draws_for_long(scene):
-    bake = SimpleNamespace(worked=0, _gave_way=False, _progress=None, _shown=time.perf_counter(), _needed={})
+    bake = SimpleNamespace(worked=0, _gave_way=False, _progress=None, _show_at=0.0, _needed={})
     bake._work = lambda until: setattr(bake, "worked", bake.worked + 1)
     long = 10 * modal_bake.LONG_DRAWING
     assert works_after(bake, 0.0)
     assert [works_after(bake, long) for _ in range(4)] == [False, True, False, True]  # it goes on all the same
     assert works_after(bake, 0.0)
+
+
+def test_drawing_the_progress_takes_a_small_part_of_the_time_however_long_it_takes(scene, monkeypatch):
+    clock, drawing, drawn = [0.0], 0.3, []
+    monkeypatch.setattr(modal_bake.time, "perf_counter", lambda: clock[0])
+    bake = SimpleNamespace(
+        _gave_way=False, _progress=jobs.Progress("sample", 0.5), _show_at=0.0, _ticked=0.0, _needed={}
+    )
+
+    def work(until):
+        clock[0] = until
+
+    bake._work, bake._show_progress = work, lambda _progress: drawn.append(clock[0])
+    while clock[0] < 30.0:
+        before = len(drawn)
+        modal_bake._Bake._tick(bake)
+        bake._ticked = clock[0]
+        clock[0] += modal_bake.TIMER_STEP + (drawing if len(drawn) > before else 0.0)
+    assert 15 < len(drawn) < 30.0 / (modal_bake.WORK_PER_DRAWING * drawing)
 
 
 def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
