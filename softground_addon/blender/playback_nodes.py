@@ -40,8 +40,8 @@ def build(
     table: bpy.types.Object,
     up: Sequence[float],
     frame_rate: float,
-    few: bool = False,
-    settled: bool = True,
+    few: bool,
+    settled: bool,
 ) -> bpy.types.NodeTree:
     """A new node group.
 
@@ -60,29 +60,30 @@ def build(
     """
     graph = _Graph(GROUP)
     geometry, frame = graph.inputs(up)
-    start = graph.attribute(START)
+    start, end = graph.attribute(START), graph.attribute(END)
     waiting = graph.compare("LESS_THAN", frame, start)
-    looked_up = going = graph.compare("LESS_THAN", frame, graph.attribute(END))
+    looked_up = graph.compare("LESS_THAN", frame, end)
     if not few:
-        looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), going)
+        looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), looked_up)
     since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, start), 0.0)
     timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
+
     graph.next_row()
-    rest = graph.attribute(REST, "FLOAT_VECTOR")
-    height = timelines.now(HEIGHT)
+    rest, height = graph.attribute(REST, "FLOAT_VECTOR"), timelines.now(HEIGHT)
     if not settled:
-        begun = graph.compare("LESS_EQUAL", start, frame)
-        reached = graph.math("MULTIPLY", graph.attribute(LAST_HEIGHT), begun)
-        geometry = graph.put(geometry, graph.attribute(MOVED, "BOOLEAN"), rest, graph.scaled(graph.up, reached))
-    elif not few:
+        at_rest = graph.both(graph.attribute(MOVED, "BOOLEAN"), graph.compare("LESS_EQUAL", end, frame))
+        geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
+    if not few:
         geometry = graph.put(geometry, waiting, rest)
     geometry = graph.put(geometry, looked_up, rest, graph.scaled(graph.up, height))
-    compression = timelines.now(COMPRESSION)
-    rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
-    age = graph.choose("FLOAT", waiting, timelines.now(AGE), NEVER)
+
+    graph.next_row()
     last = graph.attribute(LAST_CONTACT)
     aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
     shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
+    compression = timelines.now(COMPRESSION)
+    rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
+    age = graph.choose("FLOAT", waiting, timelines.now(AGE), NEVER)
     for name, value, untouched in ((COMPRESSION, compression, 0.0), (RIM, rim, 0.0), (AGE, age, NEVER)):
         graph.next_row()
         if not few:
@@ -90,7 +91,6 @@ def build(
         shaded = graph.store(shaded, name, value, looked_up)
     graph.next_row()
     shaded = graph.store(shaded, PRESSURE, timelines.now(PRESSURE), looked_up)
-    graph.next_row()
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
 
