@@ -141,6 +141,11 @@ class _Places:
         points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
         return points[_inside(window, cell_size, self.x[points], self.y[points])]
 
+    def window(self, points: Indices, cell_size: float) -> Window:
+        """The cells around some of the places."""
+        place = self.x[points], self.y[points]
+        return Window.around(np.min(place, axis=1), np.max(place, axis=1), cell_size)
+
 
 def _inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
     """Which places lie in the cells of a window."""
@@ -188,10 +193,11 @@ def _movements(footprint: Footprint, places: _Places, kernel: Array) -> Iterator
     moved : (T, N, 2) float array
         Change of height, and compression, by this footprint alone [m]; 0 at the first frame.
     """
-    for block in _blocks(footprint.window.expanded(_margin(kernel))):
-        points = places.within(block, footprint.cell_size)
+    for part in _blocks(footprint.window.expanded(_margin(kernel))):
+        points = places.within(part, footprint.cell_size)
         if not len(points):
             continue
+        block = places.window(points, footprint.cell_size)
         frames, changes = _changes(footprint, block.expanded(_margin(kernel)))
         if not len(frames):
             continue

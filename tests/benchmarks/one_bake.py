@@ -1,6 +1,7 @@
 """A bake in a process of its own, so that its memory can be told: prints what it took as JSON."""
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -25,11 +26,12 @@ def peak_memory() -> int:
     return int(line.split()[1]) * 1024
 
 
-def way(radius: float) -> Course:
-    """Straight on, or once around the origin."""
+def way(radius: float, length: float) -> Course:
+    """Straight on, or around the origin as often as it takes."""
     if not radius:
         return Course()
-    angle = np.linspace(0.0, 2 * np.pi, 25)
+    rounds = math.ceil(length / (2 * np.pi * radius))
+    angle = 2 * np.pi * np.linspace(0.0, rounds, 24 * rounds + 1)
     return Course(radius * np.stack([np.sin(angle), -np.cos(angle)], axis=-1))
 
 
@@ -40,7 +42,7 @@ def main(steps: int, size: float, cell_size: float, radius: float, blend: Path) 
     body, gait = Body(), Gait(speed=0.6)
     frames = round(steps * gait.stride_time(body) / 2 * RATE)
     armature = create_character("Walker", body, scene.collection)
-    write_action(armature, walk(body, gait, frames, RATE, course=way(radius)), "Walk")
+    write_action(armature, walk(body, gait, frames, RATE, course=way(radius, gait.speed * frames / RATE)), "Walk")
     scene.frame_end = frames
     bpy.ops.mesh.primitive_plane_add(size=size)
     options = scene.softground

@@ -1,5 +1,6 @@
 """The main job, end to end: from a rig to footprints on a ground, and back."""
 
+import gc
 from itertools import pairwise
 
 import bpy
@@ -13,6 +14,7 @@ from softground_addon.blender.display_key import DISPLAY_KEY
 from softground_addon.core import record
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import FOLDER
+from softground_addon.core.simulation import CharacterLoads
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights, plane, rest
 
@@ -351,3 +353,16 @@ def test_changing_the_choice_of_detail_moves_the_bake(walk):
     assert ground_mesh.is_baked(ground)
     assert not ground.hide_viewport
     assert "Field Trail" not in bpy.data.objects
+
+
+def test_what_is_known_of_every_step_is_let_go_before_the_ground_is_written(walk, monkeypatch):
+    kept = []
+    write = baked_ground.write
+
+    def watched(*given, **options):
+        kept.extend(thing for thing in gc.get_objects() if isinstance(thing, CharacterLoads))
+        return write(*given, **options)
+
+    monkeypatch.setattr(baked_ground, "write", watched)
+    bake(walk)
+    assert kept == []

@@ -1,5 +1,8 @@
 """The polylines that are played, against the ramps and contacts that they are made from."""
 
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,6 +101,39 @@ def test_made_part_by_part_they_are_the_same(monkeypatch):
         mine, theirs = (slice(*lines.first[k : k + 2]) for lines, k in ((parts, number), (whole, place)))
         np.testing.assert_array_equal(parts.frame[mine], whole.frame[theirs])
         np.testing.assert_allclose(parts.state[mine], whole.state[theirs], rtol=1e-6, atol=1e-6)
+
+
+def trodden(footprint, times):
+    """A footprint that is left again and again in the same place, ten frames apart."""
+
+    def later(number):
+        frames = {name: getattr(footprint, name) + 10.0 * number for name in ("contact_start", "contact_end")}
+        for name in ("compression", "rim"):
+            changes = getattr(footprint, name)
+            frames[name] = replace(changes, frames=changes.frames + 10.0 * number)
+        return replace(footprint, **frames)
+
+    return [later(number) for number in range(times)]
+
+
+def test_ground_that_is_stepped_on_again_and_again_takes_little_more_memory_than_what_is_played(monkeypatch):
+    monkeypatch.setattr("softground_addon.core.polylines.VISITS_AT_ONCE", 1000)
+    _, footprints = pressed(walk(steps=2), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
+    window, size = footprints[0].window, footprints[0].cell_size
+    x, y = (grid.ravel() for grid in np.meshgrid(*window.centres(size)))
+
+    def played_and_peak(times):
+        steps = trodden(footprints[0], times)
+        tracemalloc.start()
+        try:
+            lines = polylines_at(steps, x, y, blur_sigma=0.005)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        return lines.frame.nbytes + lines.state.nbytes, peak
+
+    (few, before), (many, after) = played_and_peak(6), played_and_peak(12)
+    assert after - before < 1.5 * (many - few)
 
 
 def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_stays_away():
