@@ -39,6 +39,8 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
             bpy.app.timers.register(live.after_edit, first_interval=0.0)
         if session.current().show_overlay:
             _later(overlay.read_again)
+    elif bpy.app.background:  # where a timer that waits would keep the bpy module from ending
+        return
     elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
         _later(compare_forecast)
 
