@@ -81,7 +81,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
 
     # a render begins while it bakes, though not by a key
     keep_render_busy()
-    scene().softground.cell_size = CELLS
+    scene().softground.cell_size = CELLS / 2
     yield from begin(hand)
     for place in (hand.middle(), in_panel(hand)):
         yield from hand.move(*place)
@@ -96,7 +96,6 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["render: bake waits"] = session().is_baking and session().progress == progress
     facts["render: status"] = session().status
     yield from hand.wait_for(lambda: not bpy.app.is_job_running("RENDER"), 60)
-    facts["render ended: baking"] = session().is_baking
     yield from hand.wait_for(lambda: not session().is_baking, 120)
     facts["render ended: steps"] = scene().softground.ground.data["softground_summary"]["steps"]
 
