@@ -13,11 +13,9 @@ from ..core.cell_keys import AROUND, among, cells_at, cells_of, keys_at, keys_of
 from ..core.deformation import GroundMaterial
 from ..core.errors import BakeError, InputError
 from ..core.footprints import QUANTUM, Footprint
-from ..core.heightfield import TILE, Terrain
+from ..core.heightfield import TILE
 from ..core.motion import CharacterMotion
 from ..core.pressed_ground import PressedGround
-from ..core.simulation import CharacterLoads
-from ..core.terrain import MeshTerrain
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -37,29 +35,6 @@ MOST_MISSED = 0.02
 
 RIM_TOLERANCE = 1e-6
 """Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
-
-
-def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
-    """Raise InputError if nothing touches the ground of that name, or where it has two layers under a foot."""
-    place = np.concatenate(
-        [
-            sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
-            for character in loads
-            for number, sole in enumerate(character.motion.soles)
-        ]
-    )
-    name = f"'{ground}'" if ground else "the ground"
-    if not len(place):
-        characters = ", ".join(f"'{character.motion.name}'" for character in loads)
-        raise InputError(
-            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
-            "feet in the Character panel."
-        )
-    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
-        raise InputError(
-            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own."
-        )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import InputError
 from . import character_setup, settings
 from .character_setup import ancestors
-from .operators import reports_errors
+from .operator_base import reports_errors
 
 
 def active_character(scene: bpy.types.Scene) -> Any:

@@ -21,7 +21,7 @@ from ..core.errors import BakeError, InputError, SoftGroundError
 from ..core.manifest import BatchShot
 from . import bake_job, batch, cli_arguments, export_formats, jobs, settings
 from .character_setup import set_up_automatically
-from .preset_menu import user_folder
+from .settings import user_folder
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 

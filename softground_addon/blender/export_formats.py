@@ -13,7 +13,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..core.errors import InputError
 from . import bake_report, exports, image_exports, settings
-from .operators import OnBake, beside_file, reports_errors
+from .operator_base import OnBake, beside_file, reports_errors
 from .translation import rpt_
 
 LARGEST_IMAGE = 16384

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core import files
 from ..core.footprints import Footprint
 from . import baked_ground, compat, settings
-from .operators import OnBake, beside_file, reports_errors
+from .operator_base import OnBake, beside_file, reports_errors
 from .translation import rpt_
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from .bake_checks import expected_coverage, wants_detail
 from .character_setup import characters_of
 from .created_ground import create_ground, reach_for
 from .live_ground import LiveGround
-from .operators import reports_errors
+from .operator_base import reports_errors
 from .shots import ground_of
 from .translation import rpt_
 

@@ -10,7 +10,7 @@ import bpy
 from ..core.errors import InputError, SoftGroundError
 from . import analysis, bake_job, jobs, session, settings, sink_feet
 from .character_setup import characters_of
-from .operators import reports_errors
+from .operator_base import reports_errors
 from .translation import iface_, rpt_
 
 TICK = 0.02

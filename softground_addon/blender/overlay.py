@@ -16,7 +16,7 @@ from ..core import record
 from ..core.errors import InputError
 from ..core.footprints import Footprint
 from . import analysis, baked_ground, forecast, live, overlay_shapes, session, settings
-from .operators import OnShot, reports_errors
+from .operator_base import OnShot, reports_errors
 from .overlay_shapes import Cells, Outline
 
 Array = NDArray[np.float64]

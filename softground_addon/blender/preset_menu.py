@@ -12,16 +12,9 @@ from ..core import files, presets
 from ..core.errors import InputError
 from . import analysis, settings
 from .character_setup import characters_of, title_of
-from .operators import OnShot, reports_errors
+from .operator_base import OnShot, reports_errors
+from .settings import user_folder
 from .translation import iface_, rpt_
-
-USER_FOLDER = "presets/softground"
-"""Where the user's presets are, below the folder of Blender's user scripts."""
-
-
-def user_folder() -> Path:
-    """Folder of the user's presets, which may not be there yet."""
-    return Path(bpy.utils.user_resource("SCRIPTS", path=USER_FOLDER))
 
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any, cast
 
 import bpy
@@ -15,6 +16,9 @@ MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
 STANDARD_GRAVITY = 9.81
 """For scenes whose gravity is switched off [m/s²]."""
+
+USER_FOLDER = "presets/softground"
+"""Where the user's presets are, below the folder of Blender's user scripts."""
 
 
 def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
@@ -65,6 +69,11 @@ def time_stretch_of(scene: bpy.types.Scene) -> float:
 def gravity_of(scene: bpy.types.Scene) -> float:
     """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
     return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
+
+
+def user_folder() -> Path:
+    """Folder of the user's presets, which may not be there yet."""
+    return Path(bpy.utils.user_resource("SCRIPTS", path=USER_FOLDER))
 
 
 def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:

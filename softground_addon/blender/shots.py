@@ -19,7 +19,6 @@ from ..core.soft_ground import SoftGround
 from ..core.terrain import MeshTerrain
 from ..core.variation import PaintedSurface
 from . import ground_checks, ground_mesh, painted_ground, settings
-from .bake_checks import check_contacts
 from .character_setup import characters_of, mapping_of, title_of
 from .ground_mesh import GroundSurface
 from .jobs import Job, Progress, aside, counted
@@ -103,6 +102,29 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
     ground = scene.softground.ground
     yield from aside("sample", 1.0, check_contacts, loads, shot.terrain, ground and ground.name)
     return loads
+
+
+def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
+    """Raise InputError if nothing touches the ground of that name, or where it has two layers under a foot."""
+    place = np.concatenate(
+        [
+            sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
+            for character in loads
+            for number, sole in enumerate(character.motion.soles)
+        ]
+    )
+    name = f"'{ground}'" if ground else "the ground"
+    if not len(place):
+        characters = ", ".join(f"'{character.motion.name}'" for character in loads)
+        raise InputError(
+            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
+            "feet in the Character panel."
+        )
+    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
+        raise InputError(
+            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
+            "separate the layer that is walked on into an object of its own."
+        )
 
 
 def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
