@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..core import point_cache
 from ..core.errors import InputError
-from ..core.files import replacing
+from ..core.files import check_not_full, check_room, replacing
 from ..core.histories import histories
 from . import baked_ground, display_key, ground_mesh, playback
 
@@ -72,7 +72,9 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
     InputError
         If there is no bake, or the file cannot be written.
     """
-    with _only(scene, baked_carrier(ground), start, end), replacing(path) as partial:
+    carrier = baked_carrier(ground)
+    check_room(path, size_of_alembic(ground_mesh.mesh_of(carrier), end - start + 1))  # else Blender ends
+    with _only(scene, carrier, start, end), replacing(path) as partial:
         options = {
             "selected": True,
             "start": start,
@@ -81,6 +83,15 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
             "export_custom_properties": False,
         }
         _run(bpy.ops.wm.alembic_export, partial, path, **options)
+
+
+def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
+    """Size of an Alembic file with the mesh's positions and normals at some frames, at most [bytes]."""
+    vertices, corners, maps = len(mesh.vertices), len(mesh.loops), len(mesh.uv_layers)
+    normals = vertices if mesh.normals_domain == "POINT" else corners
+    vector, number, rest_of_frame = 12, 4, 4096
+    once = vector * vertices + number * (corners + len(mesh.polygons)) + maps * 3 * number * corners
+    return once + frames * (vector * (vertices + normals) + rest_of_frame)
 
 
 def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
@@ -190,9 +201,30 @@ def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: in
 
 
 def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:
-    try:
+    result = set()
+    with written_by_blender(partial, path):
         result = export(filepath=str(partial), check_existing=False, **options)
-    except RuntimeError as error:
-        raise InputError(f"'{path}' could not be written: {str(error).strip()}") from None
     if "FINISHED" not in result or not partial.is_file():
         raise InputError(f"'{path}' could not be written by Blender's exporter: see its messages.")
+
+
+@contextmanager
+def written_by_blender(partial: Path, path: Path) -> Iterator[None]:
+    """Blender writes a file: say why it could not, also of a full disk, of which many of its writers tell nothing.
+
+    Raises
+    ------
+    InputError
+        If Blender reports an error.
+    OSError
+        If the disk is full.
+    """
+    failed = ""
+    try:
+        yield
+    except RuntimeError as error:
+        failed = str(error).strip()
+    if partial.is_file():
+        check_not_full(partial)
+    if failed:
+        raise InputError(f"'{path}' could not be written: {failed}")

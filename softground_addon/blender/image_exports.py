@@ -17,7 +17,7 @@ from ..core.footprints import NEVER, Footprint
 from ..core.histories import Histories, histories
 from ..core.uv_raster import Pixels, rasterise
 from . import baked_ground, ground_mesh, refined_mesh, settings
-from .exports import baked_carrier
+from .exports import baked_carrier, written_by_blender
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -156,7 +156,5 @@ def _save(
     image.pixels.foreach_set(pixels.ravel())
     with replacing(path) as partial:
         image.filepath_raw = str(partial)
-        try:
+        with written_by_blender(partial, path):
             image.save()
-        except RuntimeError as error:
-            raise InputError(f"'{path}' could not be written: {str(error).strip()}") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -49,6 +50,31 @@ def check_place(path: Path) -> None:
         partial.unlink()
     except OSError as error:
         raise _not_written(path, error) from error
+
+
+def check_room(path: Path, size: int) -> None:
+    """Raise InputError unless a file of that size [bytes] has room on its disk: for writers that a full one ends."""
+    free = shutil.disk_usage(path.parent).free
+    if size > free:
+        raise InputError(
+            f"'{path}' may take up to {size / 1e6:,.0f} MB, and {free / 1e6:,.0f} MB are free: choose another place, "
+            "or free disk space."
+        )
+
+
+def check_not_full(path: Path) -> None:
+    """Raise OSError where nothing can be added to a file: a writer that does not tell may then have lost its end."""
+    size = path.stat().st_size
+    with path.open("r+b") as written:
+        written.seek(size)
+        written.write(bytes(_LARGEST_BLOCK))
+        written.flush()
+        os.fsync(written.fileno())
+        written.truncate(size)
+
+
+_LARGEST_BLOCK = 2**20
+"""Of a disk [bytes]: what is added to a file may fit into its last block otherwise."""
 
 
 def remove_leftovers(path: Path) -> None:

@@ -1,6 +1,7 @@
 """Each test starts in an empty file with the add-on registered."""
 
 import shutil
+import subprocess
 
 import bpy
 import pytest
@@ -43,3 +44,17 @@ def rigify_file(addon, tmp_path_factory):
 def shot(scene, saved_walker, tmp_path):
     """A saved file with an animated character and nothing of ours in it; another file is open."""
     return shutil.copy(saved_walker, tmp_path / "shot.blend")
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 200 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=200k", "none", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("cannot mount a file system here")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)

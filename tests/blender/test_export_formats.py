@@ -154,6 +154,31 @@ def test_a_folder_that_is_missing_or_locked_is_named(scene, tmp_path, kind, monk
     assert files_in(tmp_path) == []
 
 
+@pytest.mark.parametrize("kind", export_formats.FORMATS)
+def test_a_full_disk_is_named_and_leaves_the_older_file(scene, small_disk, kind, capfd):
+    old = small_disk / f"ground{export_formats.FORMATS[kind].suffix}"
+    old.write_bytes(b"old")
+    with (small_disk / "filler").open("wb") as filler:
+        filler.write(bytes(100 * 1024))
+    assert cli.run_in_blender(["export", f"--format={kind}", f"--output={old}"]) == cli.EXIT_BAD_INPUT
+    said = capfd.readouterr().err
+    assert re.search(
+        r"softground: '.*/ground\S*' (could not be written \(No space left|may take up to).* disk space", said
+    )
+    assert {path.name: path.stat().st_size for path in small_disk.iterdir()} == {old.name: 3, "filler": 100 * 1024}
+
+
+def test_the_room_that_alembic_wants_is_what_it_takes_at_most(scene, tmp_path):
+    carrier = baked_ground.carrier_of(scene.softground.ground)
+    for smooth in (False, True):
+        carrier.data.polygons.foreach_set("use_smooth", np.full(len(carrier.data.polygons), smooth))
+        for end in (20, 40):
+            exports.export_alembic(scene, scene.softground.ground, tmp_path / "x.abc", 20, end)
+            taken = (tmp_path / "x.abc").stat().st_size
+            wanted = exports.size_of_alembic(carrier.data, end - 19)
+            assert taken <= wanted <= 2 * taken, (smooth, end)
+
+
 def test_the_button_waits_for_a_bake(scene):
     assert bpy.ops.softground.export.poll()
     bpy.ops.softground.clear_bake()

@@ -66,20 +66,6 @@ def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, 
     assert all(path.name.startswith(".") and ".partial" in path.name for path in left)
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 200 kB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=200k", "none", str(folder)], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("cannot mount a file system here")
-    yield folder
-    subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
 @posix
 def test_a_full_disk_is_named_and_leaves_no_trace(shot, small_disk, capfd):
     bpy.ops.wm.open_mainfile(filepath=str(shot))
