@@ -38,9 +38,9 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
 
     def samples() -> Iterator[NDArray[np.float32]]:
         for frame in range(start, end + 1):
-            height = over_time.heights.at(frame, len(moved))
+            height = over_time.movement.at(frame, len(moved))[:, :1]
             sample = rest.copy()
-            sample[moved] += (height[:, None] * up).astype(np.float32)
+            sample[moved] += (height * up).astype(np.float32)
             yield sample
 
     point_cache.write(path, samples(), start_frame=start, points=len(rest), count=end - start + 1)

@@ -74,8 +74,7 @@ def export_images(
     paths = []
     with _image(resolution) as image:
         for frame in range(start, end + 1):
-            height = over_time.heights.at(frame, len(pixels.index))
-            compression = over_time.compression.at(frame, len(pixels.index))
+            height, compression = over_time.movement.at(frame, len(pixels.index)).T
             age = _age(over_time, frame, len(pixels.index), scene)
             mask = np.stack([compression, np.maximum(height + compression, 0.0), age], axis=-1)
             for kind, channels, empty in (

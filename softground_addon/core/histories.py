@@ -7,7 +7,7 @@ the ground. Time and memory follow the number of footprints, not the length of t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,17 +53,15 @@ class Histories:
 
     Attributes
     ----------
-    heights : Ramps
-        Change of the displayed height [m].
-    compression : Ramps
-        Displayed compression [m], to `SHADING_TOLERANCE`; the rim is the sum of both.
+    movement : Ramps
+        Change of the displayed height, and displayed compression, this to `SHADING_TOLERANCE` [m]; the rim is the sum
+        of both.
     visits : Visits
     error : float
         Largest error of a displayed height, at any place and frame [m].
     """
 
-    heights: Ramps
-    compression: Ramps
+    movement: Ramps
     visits: Visits
     error: float
 
@@ -89,25 +87,20 @@ def histories(
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
-    heights: list[Ramps] = []
-    compressions: list[Ramps] = []
+    movements: list[Ramps] = []
     visits: list[Visits] = []
     error = 0.0
     for number, footprint in enumerate(footprints):
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
         for points, frames, moved in _movements(footprint, places, kernels[footprint.cell_size]):
-            shared = sum(_inside(reach[other], footprints[other].cell_size, x[points], y[points]) for other in together)
-            fitted = fit(frames, moved[..., 0], tolerance / shared)
-            heights.append(_at_points(fitted.ramps, points))
-            compressions.append(_at_points(fit(frames, moved[..., 1], SHADING_TOLERANCE / shared).ramps, points))
-            error = max(error, float((fitted.error * shared).max(initial=0.0)))
+            shared = np.zeros(len(points))
+            for other in together:
+                shared += _inside(reach[other], footprints[other].cell_size, x[points], y[points])
+            fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
+            movements.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
+            error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
         visits.append(_visits(footprint, places))
-    return Histories(Ramps.joined(heights), Ramps.joined(compressions), _joined(visits), error)
-
-
-def _at_points(ramps: Ramps, points: Indices) -> Ramps:
-    """Ramps of the points numbered 0, 1, ... as those of given ones."""
-    return Ramps(points[ramps.point], ramps.start, ramps.end, ramps.change)
+    return Histories(Ramps.joined(movements, 2), _joined(visits), error)
 
 
 class _Places:

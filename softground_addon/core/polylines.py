@@ -133,7 +133,7 @@ def polylines(over_time: Histories) -> Polylines:
     >>> from softground_addon.core.histories import Visits
     >>> from softground_addon.core.ramps import Ramps
     >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
-    >>> lines = polylines(Histories(Ramps.joined([]), Ramps.joined([]), visits, 0.0))
+    >>> lines = polylines(Histories(Ramps.joined([], 2), visits, 0.0))
     >>> lines.start.tolist(), lines.frame.tolist(), lines.state[:, 3].tolist()
     ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
     """
@@ -189,7 +189,7 @@ def _states(table: Timelines, row: Indices, frame: Array) -> Floats:
     loaded = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0)
     return np.stack(
         [
-            *(values[row] + share * (values[following] - values[row]) for values in (table.height, table.compression)),
+            *(values[row] + share * (values[following] - values[row]) for values in table.movement.T),
             end,
             loaded * table.pressure[row],
         ],

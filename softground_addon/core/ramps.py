@@ -21,6 +21,9 @@ TOLERANCE = 2e-4
 QUANTUM = 2.0**-20
 """Step of fitted values [m], about a micrometre: sums of its multiples below 16 m are exact in single precision."""
 
+REST = 12
+"""Frames for which a value stays the same if it is at rest and not just between two movements of one step."""
+
 
 @dataclass(frozen=True)
 class Ramps:
@@ -31,9 +34,9 @@ class Ramps:
     point : (R,) int array
         The point that each ramp belongs to, ascending; each point's ramps are in the order of their start.
     start, end : (R,) float arrays
-        Frames between which the value changes; start < end.
-    change : (R,) float array
-        By how much.
+        Frames between which the values change; start < end.
+    change : (R, C) float array
+        By how much, each of the C values that a point has.
     """
 
     point: Indices
@@ -42,9 +45,9 @@ class Ramps:
     change: Array
 
     @classmethod
-    def joined(cls, parts: Sequence[Ramps]) -> Ramps:
-        """All ramps of several sets, which may share points."""
-        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
+    def joined(cls, parts: Sequence[Ramps], channels: int) -> Ramps:
+        """All ramps of several sets, which may share points; how many values these have must be told for none."""
+        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels)))
         point, start, end, change = (
             np.concatenate([getattr(part, name) for part in (none, *parts)])
             for name in ("point", "start", "end", "change")
@@ -53,15 +56,12 @@ class Ramps:
         return cls(point[order], start[order], end[order], change[order])
 
     def at(self, frame: float, points: int) -> Array:
-        """Values of points 0 to `points` - 1 at a frame, (points,)."""
+        """Values of points 0 to `points` - 1 at a frame, (points, C)."""
         share = np.clip((frame - self.start) / (self.end - self.start), 0.0, 1.0)
-        values = np.zeros(points)
-        values += np.bincount(self.point, self.change * share, minlength=points)
+        values = np.zeros((points, self.change.shape[1]))
+        for channel, change in enumerate(self.change.T):
+            values[:, channel] += np.bincount(self.point, change * share, minlength=points)
         return values
-
-    def _without_rests(self) -> Ramps:
-        kept = self.change != 0
-        return Ramps(self.point[kept], self.start[kept], self.end[kept], self.change[kept])
 
 
 @dataclass(frozen=True)
@@ -71,97 +71,97 @@ class Fit:
     Attributes
     ----------
     ramps : Ramps
-    error : (K,) float array
-        Largest difference at each point, over time.
+    error : (K, C) float array
+        Largest difference of each value at each point, over time.
     """
 
     ramps: Ramps
     error: Array
 
 
-def fit(frames: Array, histories: Array, tolerance: Array | float = TOLERANCE) -> Fit:
+def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
     """Stand a few ramps in for histories that change now and then.
 
-    From the start of each movement the longest straight line that stays within the tolerance is taken, then the next
-    (a funnel of slopes that narrows frame by frame). The ends of a movement are met exactly, so that points at rest
-    are where they were, to half a `QUANTUM`.
+    Each movement begins as one straight line through its ends; where the values are farther from it than the tolerance,
+    it is bent to them where they are farthest, and so on [1]_. All values of a point bend at the same frames. Points at
+    rest for `REST` frames are where they were, to half a `QUANTUM`.
 
     Parameters
     ----------
     frames : (T,) float array
         Frame numbers, ascending.
-    histories : (T, K) float array
+    histories : (T, K, C) float array
         Values of K points, 0 at the first frame.
-    tolerance : float or (K,) float array
-        Largest error while a value moves.
+    tolerance : (C,) or (K, C) float array
+        Largest error of each value while it moves.
 
     Returns
     -------
     Fit
 
+    References
+    ----------
+    .. [1] Douglas, D., Peucker, T. (1973). Algorithms for the reduction of the number of points required to represent
+       a digitized line or its caricature. Cartographica 10(2), 112-122.
+
     Examples
     --------
     A print that is pressed between frames 2 and 4 takes one ramp:
 
-    >>> pressed = fit(np.arange(6.0), -np.array([0, 0, 0, 1, 2, 2])[:, None] / 128)
+    >>> pressed = fit(np.arange(6.0), -np.array([0, 0, 0, 1, 2, 2])[:, None, None] / 128, np.array([TOLERANCE]))
     >>> pressed.ramps.start, pressed.ramps.end, pressed.ramps.change
-    (array([2.]), array([4.]), array([-0.015625]))
+    (array([2.]), array([4.]), array([[-0.015625]]))
     """
+    count, points, channels = histories.shape
     values = np.round(histories / QUANTUM) * QUANTUM
-    count = values.shape[1]
-    margin = np.broadcast_to(np.maximum(np.asarray(tolerance) - QUANTUM, 0.0), count)
-    moves = np.diff(values, axis=0) != 0
-    rests = np.ones((len(frames), count), dtype=bool)
-    rests[1:-1] = ~(moves[:-1] & moves[1:])
+    # One point after the other, so that what lies between two knots lies together.
+    knot = _ends_of_movements(values).T.ravel()
+    values = values.transpose(1, 0, 2).reshape(-1, channels)
+    when = np.tile(frames, points)
+    margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), (points, channels))
+    error = np.zeros((points, channels))
 
-    begin = np.zeros(count, dtype=np.intp)
-    origin, low, high = np.zeros((3, count))
-    rising = np.zeros(count, dtype=bool)
-    parts: list[Ramps] = []
+    at = np.flatnonzero(knot)
+    begin, end = _with_frames_between(at[:-1], at[1:], count)
+    while len(begin):
+        inside = end - begin - 1
+        first = np.cumsum(inside) - inside
+        line = np.repeat(np.arange(len(begin)), inside)
+        sample = np.arange(len(line)) - first[line] + begin[line] + 1
+        share = (when[sample] - when[begin][line]) / (when[end] - when[begin])[line]
+        rise = values[end] - values[begin]
+        missed = np.abs(values[begin][line] + share[:, None] * rise[line] - values[sample])
+        excess = (missed / margin[begin // count][line]).max(axis=1)
+        worst = np.maximum.reduceat(excess, first)
+        fits = worst <= 1.0
+        np.maximum.at(error, begin[fits] // count, np.maximum.reduceat(missed, first)[fits])
+        farthest = np.flatnonzero(excess == worst[line])
+        bend = sample[farthest[np.searchsorted(line[farthest], np.flatnonzero(~fits))]]
+        knot[bend] = True
+        begin, end = _with_frames_between(
+            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
+        )
 
-    def close(points: Indices, at: int, value: Array) -> None:
-        parts.append(Ramps(points, frames[begin[points]], np.full(len(points), frames[at]), value - origin[points]))
-        begin[points], origin[points] = at, value
-        low[points], high[points] = -np.inf, np.inf
-
-    for at in range(1, len(frames)):
-        fresh = moves[at - 1] & ~rising
-        begin[fresh], origin[fresh] = at - 1, values[at - 1, fresh]
-        low[fresh], high[fresh] = -np.inf, np.inf
-        rising |= fresh
-        moving = np.flatnonzero(rising)
-        if not len(moving):
-            continue
-        slack = np.where(rests[at, moving], 0.0, margin[moving])
-        lower, upper = _slopes(values[at, moving] - origin[moving], slack, frames[at] - frames[begin[moving]])
-        missed = np.maximum(lower, low[moving]) > np.minimum(upper, high[moving])
-        if missed.any():
-            turning = moving[missed]
-            run = frames[at - 1] - frames[begin[turning]]
-            slope = np.clip((values[at - 1, turning] - origin[turning]) / run, low[turning], high[turning])
-            close(turning, at - 1, np.round((origin[turning] + slope * run) / QUANTUM) * QUANTUM)
-            rise, step = values[at, turning] - origin[turning], frames[at] - frames[at - 1]
-            lower[missed], upper[missed] = _slopes(rise, slack[missed], step)
-        low[moving], high[moving] = np.maximum(lower, low[moving]), np.minimum(upper, high[moving])
-        settled = moving[rests[at, moving]]
-        if len(settled):
-            close(settled, at, values[at, settled])
-            rising[settled] = False
-
-    ramps = Ramps.joined(parts)._without_rests()
-    return Fit(ramps, _largest_error(ramps, frames, values) + QUANTUM / 2)
+    at = np.flatnonzero(knot)
+    change = np.diff(values[at], axis=0)
+    ramp = np.flatnonzero((at[:-1] // count == at[1:] // count) & change.any(axis=1))
+    start, stop = at[:-1][ramp], at[1:][ramp]
+    return Fit(Ramps(start // count, when[start], when[stop], change[ramp]), error + QUANTUM / 2)
 
 
-def _slopes(rise: Array, slack: Array, run: Array | float) -> tuple[Array, Array]:
-    """Least and greatest slopes of lines that pass a rise after a run, within the slack."""
-    return (rise - slack) / run, (rise + slack) / run
+def _ends_of_movements(values: Array) -> NDArray[np.bool_]:
+    """Where movements of points begin and end, (T, K), from their values (T, K, C)."""
+    moves = (np.diff(values, axis=0) != 0).any(axis=-1)
+    step, never = np.arange(len(moves))[:, None], len(moves) + REST
+    before = np.maximum.accumulate(np.where(moves, step, -never), axis=0)
+    after = np.minimum.accumulate(np.where(moves, step, 2 * never)[::-1], axis=0)[::-1]
+    moving = np.zeros((len(values) + 1, values.shape[1]), dtype=bool)
+    moving[1:-1] = after - before <= REST
+    ends: NDArray[np.bool_] = moving[1:] != moving[:-1]
+    return ends
 
 
-def _largest_error(ramps: Ramps, frames: Array, values: Array) -> Array:
-    """Largest difference between the ramps' sum and the values, over the frames, (K,)."""
-    count = values.shape[1]
-    share = np.clip((frames[:, None] - ramps.start) / (ramps.end - ramps.start), 0.0, 1.0)
-    cell = (np.arange(len(frames))[:, None] * count + ramps.point).ravel()
-    fitted = np.bincount(cell, (share * ramps.change).ravel(), minlength=len(frames) * count)
-    error: Array = np.abs(fitted.reshape(len(frames), count) - values).max(axis=0)
-    return error
+def _with_frames_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
+    """Those of some lines between rows of points, `count` each, that have rows between their ends."""
+    kept = (end - begin > 1) & (begin // count == end // count)
+    return begin[kept], end[kept]

@@ -35,7 +35,7 @@ class Timelines:
         Where the rows of each begin, and of the last end.
     frame : (R,) float array
         Ascending within each place.
-    height, compression : (R,) float arrays
+    movement : (R, 2) float array
         Change of the displayed height, and displayed compression [m].
     visit_start, visit_end, pressure : (R,) float arrays
         Frames between which the latest contact that has begun at the row lasts, and its pressure [Pa];
@@ -45,8 +45,7 @@ class Timelines:
     point: Indices
     first: Indices
     frame: Array
-    height: Array
-    compression: Array
+    movement: Array
     visit_start: Array
     visit_end: Array
     pressure: Array
@@ -62,49 +61,41 @@ def timelines(over_time: Histories) -> Timelines:
     Two overlapping ramps of one place make four rows:
 
     >>> from softground_addon.core.histories import Visits
-    >>> ramps = Ramps(np.array([7, 7]), np.array([2.0, 3.0]), np.array([4.0, 5.0]), np.array([-0.5, -0.25]))
-    >>> still = Ramps.joined([])
+    >>> sinks = np.array([[-0.5, 0.5], [-0.25, 0.25]])
+    >>> ramps = Ramps(np.array([7, 7]), np.array([2.0, 3.0]), np.array([4.0, 5.0]), sinks)
     >>> nobody = Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
-    >>> table = timelines(Histories(ramps, still, nobody, 0.0))
-    >>> table.point, table.frame, table.height
+    >>> table = timelines(Histories(ramps, nobody, 0.0))
+    >>> table.point, table.frame, table.movement[:, 0]
     (array([7]), array([2., 3., 4., 5.]), array([ 0.   , -0.25 , -0.625, -0.75 ]))
     """
-    heights, compression, visits = over_time.heights, over_time.compression, over_time.visits
-    point = np.concatenate([heights.point, heights.point, compression.point, compression.point, *[visits.point] * 2])
-    frame = np.concatenate([heights.start, heights.end, compression.start, compression.end, visits.start, visits.end])
+    ramps, visits = over_time.movement, over_time.visits
+    point = np.concatenate([ramps.point, ramps.point, visits.point, visits.point])
+    frame = np.concatenate([ramps.start, ramps.end, visits.start, visits.end])
     order = np.lexsort((frame, point))
     new = np.ones(len(order), dtype=bool)
     new[1:] = (np.diff(point[order]) != 0) | (np.diff(frame[order]) != 0)
     row = np.empty(len(order), dtype=np.intp)
     row[order] = np.cumsum(new) - 1
     point, frame = point[order][new], frame[order][new]
-    sizes = [len(heights.point)] * 2 + [len(compression.point)] * 2 + [len(visits.point)]
-    parts = np.split(row, np.cumsum(sizes))
+    begin, end, touch = np.split(row, np.cumsum([len(ramps.point)] * 2 + [len(visits.point)]))[:3]
     places, first = np.unique(point, return_index=True)
     first = np.append(first, len(point))
-    start, end, pressure = _latest(visits.start, visits.end, visits.pressure, parts[4], first)
-    return Timelines(
-        places,
-        first,
-        frame,
-        _polyline(heights, parts[0], parts[1], frame, first),
-        _polyline(compression, parts[2], parts[3], frame, first),
-        start,
-        end,
-        pressure,
-    )
+    contact = _latest(visits.start, visits.end, visits.pressure, touch, first)
+    return Timelines(places, first, frame, _polyline(ramps, begin, end, frame, first), *contact)
 
 
 def _polyline(ramps: Ramps, start: Indices, end: Indices, frame: Array, first: Indices) -> Array:
-    """Sum of the ramps at each row; they begin and end at given rows."""
-    slope = ramps.change / (ramps.end - ramps.start)
+    """Sums of the ramps at each row, (R, C); they begin and end at given rows."""
     rows = len(frame)
-    bend = np.bincount(start, slope, minlength=rows) - np.bincount(end, slope, minlength=rows)
     run = np.diff(frame, append=0.0)
     run[first[1:] - 1] = 0.0
-    value = np.concatenate([[0.0], np.cumsum(np.cumsum(bend) * run)])[:-1]
-    value -= np.repeat(value[first[:-1]], np.diff(first))
-    rounded: Array = np.round(value / QUANTUM) * QUANTUM
+    values = np.zeros((rows, ramps.change.shape[1]))
+    for channel, change in enumerate(ramps.change.T):
+        slope = change / (ramps.end - ramps.start)
+        bend = np.bincount(start, slope, minlength=rows) - np.bincount(end, slope, minlength=rows)
+        values[1:, channel] = np.cumsum(np.cumsum(bend) * run)[:-1]
+    values -= np.repeat(values[first[:-1]], np.diff(first), axis=0)
+    rounded: Array = np.round(values / QUANTUM) * QUANTUM
     return rounded
 
 

@@ -35,8 +35,9 @@ def largest_difference(footprints, material, frames, x, y):
     height = compression = 0.0
     for frame in frames:
         sample = shown(footprints, frame, material, x, y)
-        height = max(height, np.abs(result.heights.at(frame, len(x)) - sample.display).max())
-        compression = max(compression, np.abs(result.compression.at(frame, len(x)) - sample.compression).max())
+        shown_height, shown_compression = result.movement.at(frame, len(x)).T
+        height = max(height, np.abs(shown_height - sample.display).max())
+        compression = max(compression, np.abs(shown_compression - sample.compression).max())
     return height, compression, result.error
 
 
@@ -111,11 +112,11 @@ def test_pressure_is_the_peak_force_over_the_area():
 def test_untouched_places_have_no_history():
     _, footprints = pressed(walk(steps=2), SNOW)
     result = histories(footprints, np.array([50.0, -50.0]), np.array([0.0, 7.0]), blur_sigma=0.005)
-    assert not len(result.heights.point)
+    assert not len(result.movement.point)
     assert not len(result.visits.point)
     assert result.error == 0.0
 
 
 def test_a_bake_without_footprints_has_no_history():
     result = histories([], np.zeros(3), np.zeros(3), blur_sigma=0.005)
-    assert result.heights.at(5.0, 3).tolist() == [0.0, 0.0, 0.0]
+    assert result.movement.at(5.0, 3).tolist() == [[0.0, 0.0]] * 3

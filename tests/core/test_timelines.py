@@ -11,7 +11,7 @@ from softground_addon.core.ramps import QUANTUM, Ramps
 from softground_addon.core.timelines import NO_VISIT, timelines
 from tests.core.walkers import pressed, walk
 
-NO_RAMPS = Ramps.joined([])
+NO_RAMPS = Ramps.joined([], 2)
 
 
 def visits_of(point, start, end, pressure):
@@ -33,7 +33,7 @@ def row_at(table, place, frame):
 def looked_up(table, values, place, frame):
     row = row_at(table, place, frame)
     if row is None:
-        return 0.0
+        return np.zeros(2)
     if row == table.first[place + 1] - 1:
         return values[row]
     share = (frame - table.frame[row]) / (table.frame[row + 1] - table.frame[row])
@@ -48,9 +48,10 @@ def random_ramps(rng, count, points):
                 np.sort(rng.integers(0, points, count)),
                 start,
                 start + rng.integers(1, 60, count) / 4,
-                rng.integers(-40000, 10000, count) * QUANTUM,
+                rng.integers(-40000, 10000, (count, 2)) * QUANTUM,
             )
-        ]
+        ],
+        2,
     )
 
 
@@ -58,15 +59,14 @@ def random_ramps(rng, count, points):
 @given(st.integers(0, 2**32 - 1), st.integers(0, 60), st.integers(1, 6))
 def test_it_holds_the_sum_of_all_ramps_at_any_time(seed, count, points):
     rng = np.random.default_rng(seed)
-    heights, compression = random_ramps(rng, count, points), random_ramps(rng, count // 2, points)
-    table = timelines(Histories(heights, compression, no_visits(), 0.0))
-    for frame in [*rng.uniform(-5, 130, 12), *rng.choice(np.append(heights.end, 0.0), 4)]:
-        for ramps, values in ((heights, table.height), (compression, table.compression)):
-            expected = ramps.at(frame, points)
-            for place, point in enumerate(table.point):
-                assert looked_up(table, values, place, frame) == pytest.approx(expected[point], abs=QUANTUM)
-    ended = heights.at(1e6, points)
-    assert table.height[table.first[1:] - 1].tolist() == ended[table.point].tolist(), "at rest it is exact"
+    ramps = random_ramps(rng, count, points)
+    table = timelines(Histories(ramps, no_visits(), 0.0))
+    for frame in [*rng.uniform(-5, 130, 12), *rng.choice(np.append(ramps.end, 0.0), 4)]:
+        expected = ramps.at(frame, points)
+        for place, point in enumerate(table.point):
+            assert looked_up(table, table.movement, place, frame) == pytest.approx(expected[point], abs=QUANTUM)
+    ended = ramps.at(1e6, points)
+    assert table.movement[table.first[1:] - 1].tolist() == ended[table.point].tolist(), "at rest it is exact"
     assert (np.diff(table.frame)[np.diff(np.repeat(table.point, np.diff(table.first))) == 0] > 0).all()
 
 
@@ -78,7 +78,7 @@ def test_it_tells_the_latest_contact_that_has_begun(seed, count):
     visits = visits_of(
         rng.integers(0, 4, count), start, start + rng.integers(0, 40, count) / 2, rng.uniform(1, 9, count)
     )
-    table = timelines(Histories(NO_RAMPS, NO_RAMPS, visits, 0.0))
+    table = timelines(Histories(NO_RAMPS, visits, 0.0))
     for frame in rng.uniform(-5, 130, 15):
         for place, point in enumerate(table.point):
             begun = (visits.point == point) & (visits.start <= frame)
@@ -97,10 +97,10 @@ def test_a_walk_takes_few_rows():
     x, y = np.random.default_rng(0).uniform((-0.3, -0.3), (2.5, 0.3), (4000, 2)).T
     over_time = histories(footprints, x, y, blur_sigma=0.005)
     table = timelines(over_time)
-    assert len(table.frame) <= 2 * (len(over_time.heights.point) + len(over_time.compression.point))
+    assert len(table.frame) <= 7 * len(table.point)
     assert np.diff(table.first).max() <= 40
 
 
 def test_nothing_makes_an_empty_table():
-    table = timelines(Histories(NO_RAMPS, NO_RAMPS, no_visits(), 0.0))
+    table = timelines(Histories(NO_RAMPS, no_visits(), 0.0))
     assert len(table.point) == len(table.frame) == 0
