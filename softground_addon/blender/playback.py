@@ -102,10 +102,10 @@ def attach(
 
 
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
-    """The ground's playback, whatever its name has become."""
+    """The ground's playback, whatever the names of the modifier and its node group have become."""
     for modifier in ground.modifiers:
         group = getattr(modifier, "node_group", None)
-        if group is not None and group.name.split(".")[0] == nodes.GROUP:
+        if group is not None and nodes.is_playback(group):
             return modifier
     return None
 

@@ -16,6 +16,8 @@ import bpy
 from ..core.footprints import NEVER
 
 GROUP = "SoftGround Playback"
+MARK = "softground_playback"
+"""Custom property of the group, whatever the user calls it."""
 
 REST = "softground_rest"
 MOVED = "softground_moved"
@@ -63,7 +65,11 @@ def build(
     start, end = graph.attribute(START), graph.attribute(END)
     waiting = graph.compare("LESS_THAN", frame, start)
     looked_up = graph.compare("LESS_THAN", frame, end)
-    if not few:
+    moved = graph.attribute(MOVED, "BOOLEAN")  # vertices that the user adds have 0 in all attributes
+    if few:
+        looked_up = graph.both(moved, looked_up)
+    else:
+        waiting = graph.both(moved, waiting)
         looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), looked_up)
     since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, start), 0.0)
     timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
@@ -71,7 +77,7 @@ def build(
     graph.next_row()
     rest, height = graph.attribute(REST, "FLOAT_VECTOR"), timelines.now(HEIGHT)
     if not settled:
-        at_rest = graph.both(graph.attribute(MOVED, "BOOLEAN"), graph.compare("LESS_EQUAL", end, frame))
+        at_rest = graph.both(moved, graph.compare("LESS_EQUAL", end, frame))
         geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
     if not few:
         geometry = graph.put(geometry, waiting, rest)
@@ -93,6 +99,11 @@ def build(
     shaded = graph.store(shaded, PRESSURE, timelines.now(PRESSURE), looked_up)
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
+
+
+def is_playback(tree: bpy.types.NodeTree) -> bool:
+    """Whether a node group is one that `build` made; before it was marked, only its name told."""
+    return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
 
 
 def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
@@ -123,6 +134,7 @@ class _Graph:
     def __init__(self, name: str) -> None:
         self.tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
         self.tree.is_modifier = True
+        self.tree[MARK] = True
         self._place = [0.0, 0.0]
 
     def inputs(self, up: Sequence[float]) -> tuple[Any, Any]:

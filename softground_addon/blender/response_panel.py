@@ -68,7 +68,8 @@ class SOFTGROUND_OT_show_frame(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_slow_down(bpy.types.Operator):
-    """Stretch the scene's time to the speed that people would choose on this ground. Bake again after it"""
+    """Stretch the scene's time (Output > Frame Range > Time Stretching) from the speed that you gave it to the one that
+    people would choose on this ground. Bake again after it"""
 
     bl_idname = "softground.slow_down"
     bl_label = "Slow Down"
@@ -77,6 +78,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a bake has told the speed."""
+        cls.poll_message_set("Bake with Grounding first: it tells the speed")
         character = active_character(settings.scene_of(context))
         return bool(character and character.armature and nla_layer.has_layer(character.armature))
 
@@ -84,8 +86,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
         scene = settings.scene_of(context)
         character = active_character(scene)
         assert character is not None
-        speed = float(nla_layer.notes_of(character.armature).get(response_job.SPEED, "1"))
-        scene.render.frame_map_old, scene.render.frame_map_new = 100, round(100 / speed)
+        settings.slow_down(scene, float(nla_layer.notes_of(character.armature).get(response_job.SPEED, "1")))
         return {"FINISHED"}
 
 

@@ -66,6 +66,30 @@ def time_stretch_of(scene: bpy.types.Scene) -> float:
     return float(scene.render.frame_map_old / scene.render.frame_map_new)
 
 
+LONGEST_MAP = 900
+"""Most that Blender takes for either number of a remapped time."""
+
+
+def slow_down(scene: bpy.types.Scene, speed: float) -> None:
+    """Play a scene at a part of the speed that the user has given it.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    speed : float
+        Of that which the scene has without this, however often it is asked for.
+    """
+    render, options = scene.render, scene.softground
+    now = (render.frame_map_old, render.frame_map_new)
+    if now != tuple(options.slowed_time):
+        options.own_time = now
+    old, new = options.own_time
+    stretch = new / old / speed
+    render.frame_map_old = 100 if stretch <= LONGEST_MAP / 100 else max(1, int(LONGEST_MAP / stretch))
+    render.frame_map_new = max(1, round(render.frame_map_old * stretch))
+    options.slowed_time = (render.frame_map_old, render.frame_map_new)
+
+
 def gravity_of(scene: bpy.types.Scene) -> float:
     """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
     return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 DETAIL_OF = "softground_detail_of"
 """Property of the copy: the ground that it stands in for."""
+NAMED = "softground_named"
+"""Property of the copy: the name that it was given. Duplicates of it get another one, and carry the same properties."""
 WAS_HIDDEN = "softground_was_hidden"
 """Property of the ground while it is hidden: whether it was in viewports and renders before."""
 
@@ -31,13 +33,14 @@ FLOOR = 1e-4
 
 
 def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The copy that takes the prints in place of a ground, which is hidden meanwhile."""
+    """The copy that takes the prints in place of a ground, which is hidden meanwhile; no duplicate of it."""
     if not hides(ground):
         return None  # a copy of the copy may still be there, as the user's own
-    for candidate in bpy.data.objects:
-        if candidate.get(DETAIL_OF) == ground and candidate.library == ground.library:
-            return candidate
-    return None
+    candidates = [
+        thing for thing in bpy.data.objects if thing.get(DETAIL_OF) == ground and thing.library == ground.library
+    ]
+    # If the user has renamed it, it is the one that was there first in this session.
+    return min(candidates, key=lambda thing: (thing.get(NAMED) != thing.name, thing.session_uid), default=None)
 
 
 def hides(ground: bpy.types.Object) -> bool:
@@ -98,7 +101,7 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
     if detail is not None:
         _exchange_mesh(detail, ground_mesh.mesh_of(draft))
         return detail
-    draft[DETAIL_OF] = ground
+    draft[DETAIL_OF], draft[NAMED] = ground, draft.name
     if not hides(ground):
         ground[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
     for collection in ground.users_collection:

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import nla_layer, response_job
+from softground_addon.blender import nla_layer, response_job, settings
 from softground_addon.blender.character_keys import controls_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.heightfield import FlatTerrain
@@ -335,6 +335,20 @@ def test_slowing_down_stretches_time_and_the_response_still_fits(scene):
     gaps = np.abs(responders.gaps_on_the_rig(scene, result, flat(scene))) * 1e3
     assert np.percentile(gaps, 95) < 2.0
     assert gaps.max() < 5.0
+
+
+@pytest.mark.parametrize("own", [(100, 100), (100, 200), (1, 2), (200, 100), (1, 12), (900, 1)])
+def test_slowing_down_keeps_the_users_own_time_and_is_the_same_twice(scene, own):
+    set_up(shots.walker(scene))
+    render = scene.render
+    render.frame_map_old, render.frame_map_new = own
+    for _ in range(2):
+        settings.slow_down(scene, 0.8)
+        slowed = render.frame_map_new / render.frame_map_old
+        assert slowed == pytest.approx(own[1] / own[0] / 0.8, rel=0.01, abs=0.01)
+    render.frame_map_old, render.frame_map_new = 100, 50  # the user's hand again
+    settings.slow_down(scene, 0.5)
+    assert render.frame_map_new / render.frame_map_old == pytest.approx(1.0)
 
 
 def test_cyclic_keys_go_on_beyond_their_end_as_before(scene):

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -207,6 +208,43 @@ def test_a_second_bake_replaces_the_first(scene, footprints):
     assert {attribute.name for attribute in ground.data.attributes} <= names
     moved = world_positions(evaluated(ground, scene, 200)) - surface.vertices
     np.testing.assert_allclose(moved[:, 2], recorded(footprints[:2], 1e9, surface).display, atol=2e-6)
+
+
+def test_a_renamed_playback_is_still_known(scene, footprints):
+    ground = ground_object(scene)
+    bake_onto(ground, footprints)
+    modifier = ground.modifiers[0]
+    modifier.name, modifier.node_group.name = "Trail", "Prints of the Hero"
+    assert playback.modifier_of(ground) == modifier
+    bake_onto(ground, footprints)
+    assert len(ground.modifiers) == 1
+    playback.remove(ground)
+    assert not ground.modifiers
+    assert not bpy.data.node_groups
+
+
+def test_a_playback_of_before_groups_were_marked_is_known_by_its_name(scene, footprints):
+    ground = ground_object(scene)
+    bake_onto(ground, footprints)
+    group = ground.modifiers[0].node_group
+    del group[playback.nodes.MARK]
+    group.name = "SoftGround Playback.012"
+    assert playback.modifier_of(ground) == ground.modifiers[0]
+
+
+@pytest.mark.parametrize("few", [0.0, 1.0])
+@pytest.mark.parametrize("shape_keys", [True, False])
+def test_vertices_that_the_user_adds_stay_where_they_are_put(scene, footprints, monkeypatch, few, shape_keys):
+    monkeypatch.setattr(playback, "FEW", few)
+    ground = ground_object(scene)
+    bake_onto(ground, footprints, shape_keys=shape_keys)
+    place, edited = (1.0, 2.0, 3.0), bmesh.new()
+    edited.from_mesh(ground.data)
+    edited.verts.new(place)
+    edited.to_mesh(ground.data)
+    edited.free()
+    for frame in (-30, -1, 0, 1, 40, 500):
+        assert world_positions(evaluated(ground, scene, frame))[-1] == pytest.approx(place), frame
 
 
 def test_removal_leaves_nothing_behind(scene, footprints):

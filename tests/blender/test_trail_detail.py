@@ -307,6 +307,22 @@ def test_another_trail_reuses_the_copy(scene):
     assert (ground.hide_viewport, ground.hide_render) == (True, True)
 
 
+@pytest.mark.parametrize("renamed", [False, True])
+def test_a_duplicate_of_the_copy_is_not_taken_for_it(scene, renamed):
+    ground = coarse_ground(scene)
+    detail = refined(ground)
+    if renamed:
+        detail.name = "Hero"
+    duplicate = detail.copy()
+    duplicate.data = detail.data.copy()
+    duplicate.name = "A Look of My Own"
+    scene.collection.objects.link(duplicate)
+    assert trail_detail.detail_of(ground) == detail
+    trail_detail.remove(ground)
+    assert duplicate.name in scene.objects
+    assert trail_detail.detail_of(ground) is None
+
+
 def test_a_second_bake_on_the_fine_copy_plays_like_the_first(scene):
     walker(scene, frames=30)
     bpy.ops.softground.add_character()

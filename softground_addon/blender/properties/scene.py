@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    IntVectorProperty,
+    PointerProperty,
+)
 
 from .character import SoftGroundCharacter
 from .fields import in_unit, is_mesh
@@ -100,6 +108,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    own_time: IntVectorProperty(
+        name="Own Time Stretching", description="As the user had it before Slow Down", size=2, options={"HIDDEN"}
+    )
+    slowed_time: IntVectorProperty(
+        name="Slowed Time Stretching", description="As Slow Down has set it; (0, 0) before", size=2, options={"HIDDEN"}
+    )
     keep_forces: BoolProperty(
         name="Forces in Report",
         description="Write the force under each sole at each frame into the report",
