@@ -46,7 +46,10 @@ def check_usable(ground: bpy.types.Object) -> None:
         raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")
     moved_by = _what_moves(ground)
     if moved_by:
-        raise InputError(f"Ground '{name}' moves: {moved_by} is animated. Only ground that stands still takes prints.")
+        raise InputError(
+            f"Ground '{name}' moves: {moved_by} is animated. Only ground that stands still takes prints: take the "
+            "keys and drivers off it, or choose a copy without them."
+        )
 
 
 def changes_with_time(ground: bpy.types.Object) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import session, settings
+from . import painted_ground, session, settings
 from .panels import CATEGORY
 
 
@@ -30,16 +30,16 @@ class _Panel:
 class SOFTGROUND_PT_behaviour(_Panel, bpy.types.Panel):
     """Rims that lean, sand that slides, snow that hardens: each is off at 0"""
 
-    bl_label = "Behaviour"
+    bl_label = "Behavior"
     bl_parent_id = "SOFTGROUND_PT_material"
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.column()
         options = settings.scene_of(context).softground
         column.prop(options, "pressure")
-        for field in ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress", "firm_depth"):
+        for field in ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress_kpa", "firm_depth_cm"):
             column.prop(options.material, field)
-        column.prop(options, "tread")
+        column.prop(options, "tread_mm")
 
 
 class SOFTGROUND_PT_painted(_Panel, bpy.types.Panel):
@@ -56,7 +56,9 @@ class SOFTGROUND_PT_painted(_Panel, bpy.types.Panel):
         column = self.column()
         options = settings.scene_of(context).softground
         for field in ("stiffness", "layer_depth", "rim"):
-            column.prop_search(options.painted, field, options.ground, "vertex_groups", icon="GROUP_VERTEX")
+            row = column.row()
+            row.active = painted_ground.is_there(options.ground, getattr(options.painted, field))
+            row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
 CLASSES = (SOFTGROUND_PT_behaviour, SOFTGROUND_PT_painted)

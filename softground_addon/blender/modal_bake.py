@@ -87,8 +87,8 @@ class _Bake(bpy.types.Operator):
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
-        session.show_bake(0.0, "")
         manager.progress_begin(0.0, 1.0)
+        self._show_status(0.0, iface_(STAGE_NAMES["sample"]))
         manager.modal_handler_add(self)
         _running.append(self)
         return {"RUNNING_MODAL"}
@@ -214,8 +214,14 @@ class SOFTGROUND_OT_bake(_Bake):
         warnings: Any = result.report["warnings"]
         for warning in warnings:
             self.report({"WARNING"}, warning)
-        text = rpt_("{steps} steps, deepest print {depth:.1f} cm")
-        self.report({"INFO"}, text.format(steps=totals["steps"], depth=totals["max_depth_m"] * 100))
+        text = rpt_("{steps} steps, deepest print {depth:.1f} cm").format(
+            steps=totals["steps"], depth=totals["max_depth_m"] * 100
+        )
+        steps: Any = result.report["steps"]
+        now = settings.scene_of(bpy.context).frame_current
+        if steps and all(now < step["frame_start"] for step in steps):  # the ground looks as it did before
+            text += rpt_(". Press Play to see them")
+        self.report({"INFO"}, text)
 
 
 class SOFTGROUND_OT_sink_feet(_Bake):

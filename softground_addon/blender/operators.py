@@ -30,7 +30,7 @@ from .translation import rpt_
 
 
 class SOFTGROUND_OT_add_character(bpy.types.Operator):
-    """Add the active armature: its feet, hips and limbs are recognised by their names or by the rest pose. Without an
+    """Add the active armature: its feet, hips and limbs are recognized by their names or by the rest pose. Without an
     armature, add the selected mesh objects as things that fall, roll or slide"""
 
     bl_idname = "softground.add_character"

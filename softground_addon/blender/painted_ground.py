@@ -38,7 +38,7 @@ def _name(ground: bpy.types.Object, painted: bpy.types.PropertyGroup, setting: s
             f"Attribute '{name}' of ground '{ground.name}' is no float on vertices: convert it in Object Data "
             "Properties > Attributes (domain Vertex, type Float)."
         )
-    if attribute or name in ground.vertex_groups:
+    if is_there(ground, name):
         return name
     if name and name != painted.bl_rna.properties[setting].default:
         raise InputError(
@@ -46,6 +46,11 @@ def _name(ground: bpy.types.Object, painted: bpy.types.PropertyGroup, setting: s
             "field in the Ground panel empty."
         )
     return ""
+
+
+def is_there(ground: bpy.types.Object, name: str) -> bool:
+    """Whether a ground has a vertex group or an attribute of that name."""
+    return bool(name) and (name in ground.data.attributes or name in ground.vertex_groups)
 
 
 def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Array | None:

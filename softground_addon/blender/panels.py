@@ -156,9 +156,20 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
         column = layout.column(align=True)
         order = {joint: place for place, joint in enumerate(JOINTS)}
         for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
-            row = column.row(align=True)
-            row.prop_search(joint, "bone", character.armature.data, "bones", text=_joint_label(joint.name))
-            row.prop(joint, "end", text="", expand=False)
+            split = column.split(factor=0.3, align=True)
+            name = split.row()
+            name.alignment = "RIGHT"
+            name.label(text=_joint_label(joint.name), translate=False)
+            row = split.row(align=True)
+            row.use_property_split = False
+            row.prop_search(joint, "bone", character.armature.data, "bones", text="")
+            end = row.row(align=True)
+            end.ui_units_x = _END_WIDTH
+            end.prop(joint, "end", text="")
+
+
+_END_WIDTH = 2.6
+"""Width of a bone's end, of which a few letters are enough, in units of the interface: the bone has the rest."""
 
 
 def _joint_label(joint: str) -> str:
@@ -328,7 +339,7 @@ def _result(layout: Any, summary: Any) -> None:
         ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
     ]
     if "seconds" in summary:  # live mode takes none
-        rows.append(("Time", f"{summary['seconds']:.1f} s"))
+        rows.append(("Bake Time", f"{summary['seconds']:.1f} s"))
     for label, value in rows:
         row = box.split(factor=0.5)
         row.alignment = "RIGHT"

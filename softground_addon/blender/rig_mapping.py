@@ -151,7 +151,10 @@ def instances_armature(thing: bpy.types.Object) -> bool:
 def require_armature(armature: bpy.types.Object | None) -> None:
     """Raise InputError unless the object is an armature with bones."""
     if armature is None:
-        raise InputError("No armature is chosen: select the character's armature and add it again.")
+        raise InputError(
+            "No armature is chosen: select the character's armature, or mesh objects that fall or roll, and press Add "
+            "Character."
+        )
     if armature.is_missing:
         raise InputError(
             f"'{armature.name}' is not in this file, and its library '{armature.library.filepath}' was not found: put "

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import analysis, bake_job, jobs, painted_ground, settings
+from softground_addon.blender.properties import material
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import MATERIAL_RANGES, find
@@ -177,3 +178,18 @@ def test_a_ground_that_changes_over_time_is_told_of_with_the_remedy(walk):
     (warning,) = bake(walk, ground=ground, output="PRINTS", detail="AUTO").report["warnings"]
     for part in ("'Field'", "'Swell'", "frame 3", "Apply the modifier"):
         assert part in warning
+
+
+def test_what_can_be_painted_is_offered_and_what_is_not_there_yet_is_told_apart(walk):
+    bpy.ops.softground.create_ground()
+    ground, painted = walk.softground.ground, walk.softground.painted
+    ground.vertex_groups.new(name="trodden")
+    ground.data.attributes.new("damp", "FLOAT", "POINT")
+    ground.data.attributes.new("colour", "FLOAT_COLOR", "POINT")
+    bpy.ops.softground.bake()  # its own attributes are none that one paints
+    assert material._paintable(painted, bpy.context, "") == ["trodden", "damp"]
+    assert not painted_ground.is_there(ground, painted.stiffness)
+    ground.vertex_groups.new(name=painted.stiffness)
+    assert painted_ground.is_there(ground, painted.stiffness)
+    walk.softground.ground = None
+    assert material._paintable(painted, bpy.context, "") == []

@@ -175,3 +175,15 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
     assert modal_bake._Bake._work(bake, forever) is None
     assert bake._progress.fraction == 0.2
     assert modal_bake._Bake._work(bake, forever) == "written"
+
+
+def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
+    prepare(scene, "created")
+    result = jobs.run(bake_job.bake(scene, write=False))
+    first = min(step["frame_start"] for step in result.report["steps"])
+    told = []
+    operator = SimpleNamespace(report=lambda _kind, text: told.append(text))
+    for frame in (int(first) - 1, int(first) + 1):
+        scene.frame_set(frame)
+        modal_bake.SOFTGROUND_OT_bake._show(operator, result)
+    assert [text.endswith(". Press Play to see them") for text in told if "steps" in text] == [True, False]

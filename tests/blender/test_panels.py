@@ -52,6 +52,10 @@ def test_the_material_is_shown_in_field_units(shot):
     assert material.youngs_modulus == 2.5e6
     material.layer_depth = 0.45
     assert material.layer_depth_cm == pytest.approx(45.0)
+    material.crust_stress_kpa, material.firm_depth_cm = 30.0, 2.0
+    assert (material.crust_stress, material.firm_depth) == pytest.approx((30e3, 0.02))
+    shot.softground.tread_mm = 1.5
+    assert shot.softground.tread == pytest.approx(0.0015)
     shot.softground.cell_size_cm = 2
     assert shot.softground.cell_size == pytest.approx(0.02)
 

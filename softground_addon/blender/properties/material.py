@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
@@ -52,7 +54,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     layer_depth: FloatProperty(
         name="Layer Depth (m)",
-        description="Thickness of the loose layer, in metres. No print is deeper",
+        description="Thickness of the loose layer, in meters. No print is deeper",
         default=0.3,
         precision=3,
         soft_max=2.0,
@@ -60,7 +62,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     rim_reach: FloatProperty(
         name="Rim Reach (m)",
-        description="How far around the foot the displaced ground rises, in metres",
+        description="How far around the foot the displaced ground rises, in meters",
         default=0.04,
         precision=3,
         soft_max=0.5,
@@ -68,7 +70,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     blur_sigma: FloatProperty(
         name="Smoothing (m)",
-        description="Width of the blur that the shown ground gets, in metres. Forces and depths do not see it",
+        description="Width of the blur that the shown ground gets, in meters. Forces and depths do not see it",
         default=0.005,
         precision=4,
         soft_max=0.05,
@@ -120,7 +122,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     firm_depth: FloatProperty(
         name="Firm Below (m)",
-        description="Depth of compression below which the ground is ten times stiffer, in metres. 0 is loose all "
+        description="Depth of compression below which the ground is ten times stiffer, in meters. 0 is loose all "
         "through",
         default=0.0,
         precision=3,
@@ -142,8 +144,8 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         **in_unit("youngs_modulus", 1e6),
     )
     layer_depth_cm: FloatProperty(
-        name="Layer Depth (cm)",
-        description="Thickness of the loose layer, in centimetres. No print is deeper",
+        name="Layer (cm)",
+        description="Thickness of the loose layer, in centimeters. No print is deeper",
         min=0.1,
         soft_max=100.0,
         precision=1,
@@ -151,7 +153,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     rim_reach_cm: FloatProperty(
         name="Rim Reach (cm)",
-        description="How far around the foot the displaced ground rises, in centimetres",
+        description="How far around the foot the displaced ground rises, in centimeters",
         min=0.0,
         soft_max=20.0,
         precision=1,
@@ -159,12 +161,39 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     blur_sigma_cm: FloatProperty(
         name="Smoothing (cm)",
-        description="Width of the blur that the shown ground gets, in centimetres. Forces and depths do not see it",
+        description="Width of the blur that the shown ground gets, in centimeters. Forces and depths do not see it",
         min=0.0,
         soft_max=5.0,
         precision=2,
         **in_unit("blur_sigma", 0.01),
     )
+    crust_stress_kpa: FloatProperty(
+        name="Crust (kPa)",
+        description="Pressure at which the crust on untouched ground breaks, in kilopascals; what presses less leaves "
+        "no print. A person stands with about 20 kPa, walks with 40. 0 is no crust",
+        min=0.0,
+        soft_max=100.0,
+        precision=1,
+        **in_unit("crust_stress", 1e3),
+    )
+    firm_depth_cm: FloatProperty(
+        name="Firm Below (cm)",
+        description="Depth of compression below which the ground is ten times stiffer, in centimeters. 0 is loose all "
+        "through",
+        min=0.0,
+        soft_max=30.0,
+        precision=1,
+        **in_unit("firm_depth", 0.01),
+    )
+
+
+def _paintable(painted: SoftGroundPainted, _context: bpy.types.Context, _typed: str) -> list[str]:
+    """What the scene's ground could be painted with."""
+    ground = cast("Any", painted.id_data).softground.ground
+    if ground is None:
+        return []
+    floats = {one.name for one in ground.data.attributes if (one.domain, one.data_type) == ("POINT", "FLOAT")}
+    return [*ground.vertex_groups.keys(), *sorted(name for name in floats if not name.startswith("softground_"))]
 
 
 class SoftGroundPainted(bpy.types.PropertyGroup):
@@ -175,16 +204,19 @@ class SoftGroundPainted(bpy.types.PropertyGroup):
         description="Vertex group or float attribute of the ground by which its stiffness is multiplied: 1 is as the "
         "material says, 0.5 half as stiff. Vertices outside the group are as the material says",
         default="softground_stiffness",
+        search=_paintable,
     )
     layer_depth: StringProperty(
         name="Layer Depth",
         description="Vertex group or float attribute of the ground by which the depth of its loose layer is "
         "multiplied: 1 is as the material says, 0 takes no print",
         default="softground_layer_depth",
+        search=_paintable,
     )
     rim: StringProperty(
         name="Rim",
         description="Vertex group or float attribute of the ground by which the volume of its rims is multiplied: 1 is "
         "as the material says, 0 raises no rim",
         default="softground_rim_factor",
+        search=_paintable,
     )

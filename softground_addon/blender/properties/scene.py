@@ -33,7 +33,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     material: PointerProperty(name="Material", type=SoftGroundMaterial)
     cell_size: FloatProperty(
         name="Cell Size (m)",
-        description="Size of the cells in which the ground is computed, in metres",
+        description="Size of the cells in which the ground is computed, in meters",
         default=DEFAULT_CELL_SIZE,
         min=1e-4,
         max=1.0,
@@ -43,7 +43,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     cell_size_cm: FloatProperty(
         name="Cell Size (cm)",
-        description="Size of the cells in which the ground is computed, in centimetres. Half the size takes four times "
+        description="Size of the cells in which the ground is computed, in centimeters. Half the size takes four times "
         "the memory; the depth of the prints does not depend on it",
         min=0.01,
         max=100.0,
@@ -96,13 +96,22 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     tread: FloatProperty(
         name="Tread (m)",
-        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in metres. 0 "
+        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in meters. 0 "
         "for bare feet, paws and things",
         default=0.0,
         min=0.0,
         max=0.1,
         soft_max=0.005,
         precision=4,
+    )
+    tread_mm: FloatProperty(
+        name="Tread (mm)",
+        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in "
+        "millimeters. 0 for bare feet, paws and things",
+        min=0.0,
+        soft_max=5.0,
+        precision=1,
+        **in_unit("tread", 1e-3),
     )
     tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
