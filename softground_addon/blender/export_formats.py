@@ -38,7 +38,7 @@ class Format:
 
 
 FORMATS = {
-    "ALEMBIC": Format(".abc", "Alembic", "The moving ground with its shading attributes"),
+    "ALEMBIC": Format(".abc", "Alembic", "The moving ground"),
     "USD": Format(".usdc", "USD", "The moving ground with its shading attributes"),
     "PC2": Format(".pc2", "Point Cache (PC2)", "Positions of the ground's vertices, for a mesh cache"),
     "EXR": Format(

@@ -73,12 +73,14 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
         If there is no bake, or the file cannot be written.
     """
     carrier = baked_carrier(ground)
-    check_room(path, size_of_alembic(ground_mesh.mesh_of(carrier), end - start + 1))  # else Blender ends
     with _only(scene, carrier, start, end), replacing(path) as partial:
+        shown = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        check_room(path, size_of_alembic(ground_mesh.mesh_of(shown), end - start + 1))  # else Blender ends
         options = {
             "selected": True,
             "start": start,
             "end": end,
+            "apply_subdiv": True,  # else the ground is written without its last modifier where that subdivides
             "as_background_job": False,
             "export_custom_properties": False,
         }
@@ -100,11 +102,16 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
     Raises
     ------
     InputError
-        If there is no bake, or the file cannot be written.
+        If there is no bake, a frame is negative, or the file cannot be written.
     """
+    if start < 0:
+        raise InputError(
+            f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
+        )
     with _only(scene, baked_carrier(ground), start, end), replacing(path) as partial:
         options = {
             "selected_objects_only": True,
+            "export_subdivision": "TESSELLATE",
             "export_animation": True,
             "export_shapekeys": False,  # else the finished ground is written, with nothing that moves
             "export_materials": False,
@@ -177,7 +184,8 @@ def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: in
         raise InputError(f"'{carrier.name}' is not in the current view layer: include its collection first.")
     hidden = carrier.hide_get(), carrier.hide_viewport, carrier.hide_render
     selected = [thing for thing in layer.objects if thing.select_get()]
-    active, frames, frame = layer.objects.active, (scene.frame_start, scene.frame_end), scene.frame_current
+    active, frames = layer.objects.active, (scene.frame_start, scene.frame_end)
+    frame, subframe = scene.frame_current, scene.frame_subframe
     try:
         for thing in selected:
             thing.select_set(False)
@@ -197,7 +205,7 @@ def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: in
             thing.select_set(True)
         layer.objects.active = active
         scene.frame_start, scene.frame_end = frames
-        scene.frame_set(frame)
+        scene.frame_set(frame, subframe=subframe)
 
 
 def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:

@@ -14,6 +14,7 @@ from softground_addon.blender import (
     jobs,
     playback,
 )
+from softground_addon.blender.compat import action_curves
 from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround
@@ -154,16 +155,54 @@ def test_usd_holds_the_moving_ground_and_its_shading(scene, ground, tmp_path):
     assert "softground_compression" in copy.data.attributes
 
 
+def write_and_read(kind, scene, ground, folder, start, end):
+    """An object of what was written."""
+    export, importer, options = {
+        "abc": (exports.export_alembic, bpy.ops.wm.alembic_import, {"as_background_job": False}),
+        "usdc": (exports.export_usd, bpy.ops.wm.usd_import, {}),
+    }[kind]
+    export(scene, ground, folder / f"ground.{kind}", start, end)
+    return import_and_select(importer, folder / f"ground.{kind}", **options)
+
+
+@pytest.mark.parametrize("kind", ["abc", "usdc"])
+def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, ground, tmp_path, kind):
+    carrier = baked_ground.carrier_of(ground)
+    finer = carrier.modifiers.new("Finer", "SUBSURF")
+    finer.levels = finer.render_levels = 1
+    copy = write_and_read(kind, scene, ground, tmp_path, *FRAMES)
+    for frame in (12, 40):
+        np.testing.assert_allclose(played(copy, frame), played(carrier, frame), atol=1e-5)
+
+
+def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(scene, tmp_path):
+    shots.walker(scene, frames=30)
+    for curve in action_curves(scene.objects["Walker"].animation_data.action):
+        for key in curve.keyframe_points:
+            key.co.x -= 50
+    bpy.ops.softground.add_character()
+    ground = scene.softground.ground = plane(scene, vertices=2)
+    scene.softground.frame_start, scene.softground.frame_end = -49, -20
+    bpy.context.view_layer.update()
+    jobs.run(bake_job.bake(scene))
+    copy = write_and_read("abc", scene, ground, tmp_path, -49, -20)
+    for frame in (-40, -20):
+        assert_stands_as_recorded(ground, frame, played(copy, frame))
+    with pytest.raises(InputError, match=r"from frame 0 on, not from -49"):
+        exports.export_usd(scene, ground, tmp_path / "ground.usdc", -49, -20)
+    assert [path.name for path in tmp_path.iterdir()] == ["ground.abc"]
+
+
 @pytest.mark.parametrize("export", [exports.export_alembic, exports.export_usd])
 def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_path, export):
-    scene.frame_set(7)
+    scene.frame_set(7, subframe=0.25)
     bpy.context.view_layer.objects.active = scene.objects["Walker"]
     scene.objects["Walker"].select_set(True)
     frames = (scene.frame_start, scene.frame_end)
     export(scene, ground, tmp_path / f"ground{'.abc' if export is exports.export_alembic else '.usdc'}", *FRAMES)
     assert [thing.name for thing in bpy.context.selected_objects] == ["Walker"]
     assert bpy.context.view_layer.objects.active.name == "Walker"
-    assert (scene.frame_start, scene.frame_end, scene.frame_current) == (*frames, 7)
+    assert (scene.frame_start, scene.frame_end, scene.frame_current_final) == (*frames, 7.25)
 
 
 @pytest.mark.parametrize("kind", ["abc", "usdc"])
