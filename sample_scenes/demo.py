@@ -25,7 +25,7 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import addon
 from sample_scenes.stick_figure import add_stick_figure
-from softground_addon.blender import ground_mesh
+from softground_addon.blender.ground import ground_mesh
 from softground_addon.core import record
 from softground_addon.core.footprints import Footprint
 

@@ -16,7 +16,7 @@ from sample_scenes.dog import FRONT_SHARE, Dog
 from sample_scenes.four_legged import TROT, WALK, go_on_four_legs
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.blender import analysis
+from softground_addon.blender.reading import analysis
 from softground_addon.core.footprints import Footprint
 from softground_addon.core.simulation import CharacterLoads
 

@@ -26,7 +26,10 @@ import numpy as np
 
 import softground_addon
 from sample_scenes import stage
-from softground_addon.blender import bake_job, baked_ground, character_setup, jobs, settings
+from softground_addon.blender import jobs, settings
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.characters import character_setup
+from softground_addon.blender.ground import baked_ground
 from softground_addon.core.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")

@@ -16,7 +16,7 @@ from sample_scenes.character import copy_character, create_character
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.showpieces import dance, kick
-from softground_addon.blender import analysis
+from softground_addon.blender.reading import analysis
 from softground_addon.core.footprints import Footprint
 from softground_addon.core.simulation import CharacterLoads
 

@@ -20,7 +20,7 @@ from sample_scenes.plain_objects import BOX, Look, add_object, box_corners
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.rolling_things import create_ball, drop, write_poses
 from sample_scenes.snowshoe import snowshoe_mesh
-from softground_addon.blender import analysis
+from softground_addon.blender.reading import analysis
 from softground_addon.core.footprints import Footprint, recompose
 from softground_addon.core.simulation import CharacterLoads
 

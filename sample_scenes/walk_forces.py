@@ -16,7 +16,7 @@ from sample_scenes.force_arrows import whole_strides
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.blender import analysis
+from softground_addon.blender.reading import analysis
 from softground_addon.core.simulation import CharacterLoads
 
 mpl.use("Agg")

@@ -2,7 +2,21 @@
 
 import sys
 
-from .blender import cli
+import bpy
+
+from . import register, unregister
+from .blender.command_line import cli
+
+
+def main() -> int:
+    """Register the add-on, do what the arguments say, and clean up: the exit code."""
+    register()
+    try:
+        return cli.run_standalone(sys.argv[1:])
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        unregister()
+
 
 if __name__ == "__main__":
-    sys.exit(cli.run_standalone(sys.argv[1:]))
+    sys.exit(main())

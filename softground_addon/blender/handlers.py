@@ -8,9 +8,13 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import analysis, bake_report, live, modal_bake, overlay, session
+from . import session
+from .baking import bake_report
+from .characters.rig_sampling import TEMPORARY
 from .compat import remove_scene
-from .rig_sampling import TEMPORARY
+from .interface import modal_bake, overlay
+from .live import live
+from .reading import analysis
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does; edited meshes may be what it steps on, or what prints."""

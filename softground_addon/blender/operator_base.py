@@ -10,7 +10,9 @@ from typing import Any, TypeVar, cast
 import bpy
 
 from ..core.errors import SoftGroundError
-from . import baked_ground, character_setup, settings
+from . import settings
+from .characters import character_setup
+from .ground import baked_ground
 
 Operator = TypeVar("Operator", bound=bpy.types.Operator)
 

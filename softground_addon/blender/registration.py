@@ -7,25 +7,22 @@ from typing import Any
 
 import bpy
 
-from . import (
+from . import handlers, properties, session
+from .command_line import cli
+from .interface import (
     character_editing,
-    cli,
-    export_formats,
-    force_curves,
     forecast,
     ground_options_panel,
-    handlers,
-    live,
     menus,
     modal_bake,
     operators,
     overlay,
     panels,
     preset_menu,
-    properties,
     response_panel,
-    session,
 )
+from .live import live
+from .output import export_formats, force_curves
 
 _SETTINGS: tuple[tuple[Any, type], ...] = (
     (bpy.types.Scene, properties.SoftGroundSettings),

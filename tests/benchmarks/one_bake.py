@@ -15,7 +15,9 @@ from sample_scenes.character import create_character
 from sample_scenes.course import Course
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import baked_ground, ground_mesh
 
 RATE = 24
 

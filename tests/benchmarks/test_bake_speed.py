@@ -5,7 +5,8 @@ import time
 import bpy
 import pytest
 
-from softground_addon.blender import bake_job, jobs
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
 from tests.benchmarks.test_playback_speed import heavy_walker
 from tests.blender import shots
 

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import created_ground, live
+from softground_addon.blender.ground import created_ground
+from softground_addon.blender.live import live
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.heightfield import FlatTerrain
 from tests.blender.shots import walker

@@ -11,7 +11,10 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, exports, ground_mesh, jobs, playback, trail_detail
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import baked_ground, ground_mesh, playback, trail_detail
+from softground_addon.blender.output import exports
 from tests.blender import shots
 
 pytestmark = pytest.mark.benchmark

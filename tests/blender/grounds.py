@@ -3,7 +3,9 @@
 import bpy
 import numpy as np
 
-from softground_addon.blender import bake_job, ground_mesh, jobs
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import ground_mesh
 
 
 def heights(ground, key="Basis"):

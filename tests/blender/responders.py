@@ -6,11 +6,12 @@ import bpy
 import numpy as np
 
 from sample_scenes.body import BONES
-from softground_addon.blender import bake_job, jobs
-from softground_addon.blender.character_setup import mapping_of
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.characters.character_setup import mapping_of
+from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
-from softground_addon.blender.rig_sampling import sample_character
 from softground_addon.core.foot_placement import lowest_clearance, posed_points
 from softground_addon.core.ground_history import GroundHistory
 from softground_addon.core.grounding import leg_soles

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, ground_mesh
-from softground_addon.blender.character_setup import set_up_automatically
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.characters.character_setup import set_up_automatically
 from softground_addon.blender.compat import action_curves
-from softground_addon.blender.display_key import DISPLAY_KEY
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core import record
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import FOLDER

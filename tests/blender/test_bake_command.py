@@ -6,7 +6,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from softground_addon.blender import ground_mesh, operators
+from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.interface import operators
 from tests.blender import fingerprints, shots
 
 ROOT = Path(__file__).parents[2]

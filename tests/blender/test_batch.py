@@ -14,7 +14,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import batch, cli, ground_mesh
+from softground_addon.blender.command_line import batch, cli
+from softground_addon.blender.ground import ground_mesh
 from tests.blender import command_line, fingerprints, shots
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from softground_addon.blender.batch_runner import Outcome, Step, Workplace, run
+from softground_addon.blender.command_line.batch_runner import Outcome, Step, Workplace, run
 from softground_addon.core.errors import InputError
 from softground_addon.core.manifest import BatchShot
 
@@ -187,7 +187,7 @@ def test_garbage_on_a_workers_output_is_only_logged(batch):
 
 
 def test_an_interruption_ends_the_workers_and_leaves_the_rest_for_the_next_time(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.batch_runner.PATIENCE", 300.0)
+    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 300.0)
     shots = [
         batch.shot(name, "say('simulate', 0.5); time.sleep(300 if run == 1 and shot.stem in 'bc' else 0)")
         for name in "abcd"
@@ -209,7 +209,7 @@ def test_an_interruption_ends_the_workers_and_leaves_the_rest_for_the_next_time(
 
 
 def test_a_worker_that_ignores_the_request_to_end_is_killed(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.batch_runner.PATIENCE", 0.5)
+    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 0.5)
     shot = batch.shot("deaf", "signal.signal(signal.SIGTERM, signal.SIG_IGN); say('simulate', 0.5); time.sleep(60)")
 
     def interrupt(event):
@@ -222,7 +222,7 @@ def test_a_worker_that_ignores_the_request_to_end_is_killed(batch, monkeypatch):
 
 
 def test_two_batches_do_not_bake_the_same_shot_at_the_same_time(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.batch_runner.PATIENCE", 300.0)
+    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 300.0)
     shot = batch.shot("a", "time.sleep(1)")
     outcomes = []
     threads = [threading.Thread(target=lambda: outcomes.extend(batch.run(shot))) for _ in range(2)]
@@ -273,7 +273,7 @@ def test_no_shot_is_baked_twice_however_often_the_batch_is_killed(batch):
     script.write_text(
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from pathlib import Path\n"
-        "from softground_addon.blender.batch_runner import Workplace, run\n"
+        "from softground_addon.blender.command_line.batch_runner import Workplace, run\n"
         "from softground_addon.core.manifest import BatchShot\n"
         f"folder = Path({str(batch.folder)!r})\n"
         "shots = [BatchShot(name=name, file=folder / f'{name}.blend', save=folder / 'baked' / f'{name}.blend')\n"

@@ -6,8 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import nla_layer, response_job, settings
-from softground_addon.blender.character_keys import controls_of
+from softground_addon.blender import settings
+from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.response import response_job
+from softground_addon.blender.response.character_keys import controls_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.heightfield import FlatTerrain
 from tests.blender import auto_rig_pro, fingerprints, responders, rigs, shots

@@ -9,8 +9,9 @@ import time
 import bpy
 import pytest
 
-from softground_addon.blender import cli, ground_mesh
+from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves, slot_of
+from softground_addon.blender.ground import ground_mesh
 from tests.blender import command_line, shots
 
 

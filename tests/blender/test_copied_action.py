@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import nla_layer
+from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.core.heightfield import FlatTerrain
 from softground_addon.core.orientation import quaternion_power, quaternion_product, rotation_matrices
 from tests.blender import fingerprints, responders, shots

@@ -4,8 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_report, ground_mesh, mesh_arrays, trail_detail
-from softground_addon.blender.display_key import DISPLAY_KEY
+from softground_addon.blender import mesh_arrays
+from softground_addon.blender.baking import bake_report
+from softground_addon.blender.ground import ground_mesh, trail_detail
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 

@@ -8,7 +8,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, baked_ground, cli, export_formats, exports, jobs, playback
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.command_line import cli
+from softground_addon.blender.ground import baked_ground, playback
+from softground_addon.blender.output import export_formats, exports
 from softground_addon.core import point_cache
 from tests.blender import command_line, shots
 from tests.blender.grounds import plane

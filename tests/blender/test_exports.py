@@ -4,17 +4,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import (
-    bake_job,
-    bake_report,
-    baked_ground,
-    exports,
-    ground_mesh,
-    image_exports,
-    jobs,
-    playback,
-)
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job, bake_report
 from softground_addon.blender.compat import action_curves
+from softground_addon.blender.ground import baked_ground, ground_mesh, playback
+from softground_addon.blender.output import exports, image_exports
 from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
 from softground_addon.core.pressed_ground import PressedGround

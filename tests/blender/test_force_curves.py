@@ -7,8 +7,9 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import baked_ground, force_curves
 from softground_addon.blender.compat import action_curves
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.output import force_curves
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 

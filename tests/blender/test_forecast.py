@@ -3,7 +3,11 @@
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, compat, forecast, handlers, live, nla_layer
+from softground_addon.blender import compat, handlers
+from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.interface import forecast
+from softground_addon.blender.live import live
+from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from tests.blender.shots import walker
 

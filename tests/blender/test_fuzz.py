@@ -10,7 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softground_addon.blender import cli, ground_mesh
+from softground_addon.blender.command_line import cli
+from softground_addon.blender.ground import ground_mesh
 from softground_addon.core import manifest, presets, record
 from softground_addon.core.errors import InputError
 from tests.blender import shots

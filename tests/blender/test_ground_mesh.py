@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from mathutils import Euler
 
-from softground_addon.blender import created_ground, ground_checks, ground_mesh
-from softground_addon.blender.display_key import DISPLAY_KEY
+from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.heightfield import FlatTerrain

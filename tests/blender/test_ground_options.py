@@ -4,8 +4,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import analysis, bake_job, jobs, painted_ground, settings
+from softground_addon.blender import jobs, settings
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.ground import painted_ground
 from softground_addon.blender.properties import material
+from softground_addon.blender.reading import analysis
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
 from softground_addon.core.presets import MATERIAL_RANGES, find

@@ -6,7 +6,11 @@ import bpy
 import pytest
 
 import softground_addon
-from softground_addon.blender import analysis, ground_mesh, handlers, live, rig_sampling
+from softground_addon.blender import handlers
+from softground_addon.blender.characters import rig_sampling
+from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.live import live
+from softground_addon.blender.reading import analysis
 from tests.blender.shots import walker
 
 IDLE_LINES = 8

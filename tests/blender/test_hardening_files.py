@@ -14,7 +14,7 @@ from functools import partial
 import bpy
 import pytest
 
-from softground_addon.blender import cli
+from softground_addon.blender.command_line import cli
 from tests.blender import command_line, shots
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from softground_addon.blender import cli
+from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from tests.blender import fingerprints, rigs, shots
 

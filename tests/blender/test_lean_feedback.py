@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from softground_addon.blender import response_job
+from softground_addon.blender.response import response_job
 from tests.blender import responders, shots
 
 

@@ -4,7 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_report, baked_ground, ground_mesh, handlers, live
+from softground_addon.blender import handlers
+from softground_addon.blender.baking import bake_report
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.live import live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
 

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from softground_addon.blender import bake_job, jobs, modal_bake, session
+from softground_addon.blender import jobs, session
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.interface import modal_bake
 from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
 from tests.blender.shots import walker

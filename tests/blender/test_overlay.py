@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from softground_addon.blender import analysis, baked_ground, ground_mesh, live, overlay, overlay_shapes
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.interface import overlay, overlay_shapes
+from softground_addon.blender.live import live
+from softground_addon.blender.reading import analysis
 from softground_addon.core import record
 from tests.blender.shots import walker
 

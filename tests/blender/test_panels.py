@@ -6,7 +6,10 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, bake_job, jobs, panels, preset_menu, registration
+from softground_addon.blender import jobs, registration
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.interface import panels, preset_menu
+from softground_addon.blender.reading import analysis
 from softground_addon.core import presets
 from tests.blender.shots import import_motion, walker
 

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_mesh, playback
-from softground_addon.blender.display_key import DISPLAY_KEY
+from softground_addon.blender.ground import ground_mesh, playback
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.polylines import polylines_at
 from softground_addon.core.pressed_ground import PressedGround

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import bake_job, jobs
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
 from tests.blender import shots
 from tests.blender.grounds import plane
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from softground_addon.blender import bake_job, jobs
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
 from tests.blender import shots
 from tests.blender.responders import source_motion
 

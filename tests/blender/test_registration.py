@@ -3,7 +3,8 @@
 import bpy
 import pytest
 
-from softground_addon.blender import menus, registration
+from softground_addon.blender import registration
+from softground_addon.blender.interface import menus
 
 
 @pytest.fixture

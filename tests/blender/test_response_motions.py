@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground_mesh import undisturbed_surface
+from softground_addon.blender.ground.ground_mesh import undisturbed_surface
 from softground_addon.core.contacts import detect_contacts
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.heightfield import FlatTerrain

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.rig_mapping import map_rig
+from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.core.errors import InputError
 from softground_addon.core.motion import JOINTS
 

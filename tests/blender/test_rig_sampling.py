@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.characters.rig_mapping import RigMapping, SoleSource, map_rig
+from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.jobs import run
-from softground_addon.blender.rig_mapping import RigMapping, SoleSource, map_rig
-from softground_addon.blender.rig_sampling import sample_character
 from softground_addon.core.errors import InputError
 
 from . import fingerprints, rigs, shots

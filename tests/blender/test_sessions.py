@@ -7,7 +7,8 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from softground_addon.blender import baked_ground, ground_mesh, live, playback
+from softground_addon.blender.ground import baked_ground, ground_mesh, playback
+from softground_addon.blender.live import live
 from softground_addon.core.pressed_ground import PressedGround
 from softground_addon.core.ramps import TOLERANCE
 from tests.blender import fingerprints, shots

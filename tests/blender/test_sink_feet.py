@@ -3,7 +3,9 @@
 import bpy
 import pytest
 
-from softground_addon.blender import bake_report, jobs, nla_layer, sink_feet
+from softground_addon.blender import jobs
+from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.baking import bake_report, sink_feet
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 

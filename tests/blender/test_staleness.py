@@ -5,8 +5,10 @@ import json
 import bpy
 import pytest
 
-from softground_addon.blender import analysis, bake_report, baked_ground, staleness
+from softground_addon.blender.baking import bake_report
 from softground_addon.blender.compat import action_curves
+from softground_addon.blender.ground import baked_ground
+from softground_addon.blender.reading import analysis, staleness
 from tests.blender import shots
 from tests.blender.grounds import plane
 

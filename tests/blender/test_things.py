@@ -5,10 +5,17 @@ import numpy as np
 import pytest
 from mathutils import Quaternion
 
-from softground_addon.blender import analysis, bake_job, jobs
-from softground_addon.blender.character_setup import add_bone_contacts, add_character, add_object_contacts, add_things
+from softground_addon.blender import jobs
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.characters.character_setup import (
+    add_bone_contacts,
+    add_character,
+    add_object_contacts,
+    add_things,
+)
 from softground_addon.blender.compat import action_curves, slot_of
-from softground_addon.blender.shots import read_shot
+from softground_addon.blender.reading import analysis
+from softground_addon.blender.reading.shots import read_shot
 from softground_addon.core.errors import InputError
 
 from . import rigs, shots

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_mesh, refined_mesh, trail_detail
+from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
 from softground_addon.core.refinement import Region, refine
 from tests.blender import fingerprints, grounds
 from tests.blender.shots import walker

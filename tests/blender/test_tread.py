@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import ground_mesh
+from softground_addon.blender.ground import ground_mesh
 from tests.blender import shots
 from tests.blender.grounds import bake
 

@@ -15,7 +15,9 @@ BETWEEN = 14.25
 def make(blend: str, heights: str) -> None:
     """Bake the walker, save the shot, and write what its record says of the carrier's heights."""
     import softground_addon
-    from softground_addon.blender import bake_job, baked_ground, ground_mesh, jobs
+    from softground_addon.blender import jobs
+    from softground_addon.blender.baking import bake_job
+    from softground_addon.blender.ground import baked_ground, ground_mesh
     from softground_addon.core.pressed_ground import PressedGround
     from tests.blender import shots
     from tests.blender.grounds import plane

@@ -49,7 +49,9 @@ def longest_pauses(*, during_bake: bool, count: int = 8) -> list[tuple[float, fl
 @contextmanager
 def ticks_timed() -> Iterator[list[tuple[float, float]]]:
     """What the ticks of a bake take of the processor [s], each with how far it was: the add-on's own in the pauses."""
-    module = next(m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.modal_bake"))
+    module = next(
+        m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.interface.modal_bake")
+    )
     tick, ticks = module._Bake._tick, []
 
     def timed(operator):

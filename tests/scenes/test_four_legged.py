@@ -144,9 +144,9 @@ class TestInBlender:
     def loads(self, scene, gait):
         from sample_scenes.character import create_character
         from sample_scenes.keys import write_action
+        from softground_addon.blender.characters.rig_mapping import RigMapping, SoleSource, map_rig
+        from softground_addon.blender.characters.rig_sampling import sample_character
         from softground_addon.blender.jobs import run
-        from softground_addon.blender.rig_mapping import RigMapping, SoleSource, map_rig
-        from softground_addon.blender.rig_sampling import sample_character
         from softground_addon.core.heightfield import FlatTerrain
         from softground_addon.core.simulation import estimate_loads
         from tests.scenes.estimates import SNOW

@@ -9,7 +9,7 @@ from softground_addon.core.presets import SURFACES
 
 @pytest.fixture
 def ensure_material(scene):
-    from softground_addon.blender.materials import ensure_material
+    from softground_addon.blender.ground.materials import ensure_material
 
     return ensure_material
 
@@ -72,7 +72,7 @@ def test_an_unknown_surface_is_refused_with_the_known_ones(ensure_material):
 
 
 def test_a_blend_shows_both_surfaces_by_what_is_painted(scene):
-    from softground_addon.blender.materials import BLEND, ensure_blend
+    from softground_addon.blender.ground.materials import BLEND, ensure_blend
 
     material = ensure_blend("snow", "sand")
     mix = next(node for node in material.node_tree.nodes if node.type == "MIX_SHADER")

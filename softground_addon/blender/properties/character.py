@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from .. import nla_layer, settings
+from .. import settings
+from ..animation_layer import nla_layer
 from .fields import is_mesh
 
 DEFAULT_MASS = 77.5

@@ -1,0 +1,1 @@
+"""The bake: one generator that reads, checks, computes and writes."""

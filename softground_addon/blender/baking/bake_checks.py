@@ -1,0 +1,147 @@
+"""What a bake must fulfil before anything is written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.cell_keys import AROUND, among, cells_at, cells_of, keys_at, keys_of
+from ...core.deformation import GroundMaterial
+from ...core.errors import BakeError, InputError
+from ...core.footprints import QUANTUM, Footprint
+from ...core.heightfield import TILE
+from ...core.motion import CharacterMotion
+from ...core.pressed_ground import PressedGround
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+COARSEST_SPACING = 0.25
+"""Largest spacing of ground vertices under the prints, in lengths of the sole: coarser meshes cannot show a foot."""
+
+DETAIL_FROM = 4
+"""Spacing of ground vertices under the prints from which the ground is refined along the trail, in cells."""
+
+FEW = 5
+"""A square of 3·`DETAIL_FROM` cells that holds fewer vertices is not fine: where they are `DETAIL_FROM` cells apart, it
+holds 9."""
+
+MOST_MISSED = 0.02
+"""Share of the prints' area that may lie far from any vertex before the ground is refined along the trail."""
+
+RIM_TOLERANCE = 1e-6
+"""Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How densely the ground's vertices lie under the prints.
+
+    Attributes
+    ----------
+    spacing : float
+        Distance between them on average [m], infinite where there are none.
+    missed : float
+        Share of the prints' area that has few of them around.
+    is_fine_somewhere : bool
+        Whether the ground is fine enough anywhere, such as under other prints.
+    """
+
+    spacing: float
+    missed: float
+    is_fine_somewhere: bool
+
+    def is_coarse(self, cell_size: float) -> bool:
+        """Whether prints are not well shown."""
+        return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
+
+
+def coverage(vertices: Array, index: Indices, pressed: PressedGround) -> Coverage:
+    """How densely vertices (V, 3), of which those in `index` are moved, lie under the prints."""
+    compression = pressed.raw.sample(*vertices[index, :2].T)[0]
+    printed = [
+        np.argwhere(values[0] > 0)[:, ::-1] + np.array(tile) * TILE for tile, values in pressed.raw.tiles.items()
+    ]
+    cells = np.concatenate([np.zeros((0, 2), dtype=np.intp), *printed])
+    return _coverage(vertices, cells, int((compression > 0).sum()), pressed.raw.cell_size)
+
+
+def expected_coverage(vertices: Array, footfalls: Array, cell_size: float) -> Coverage:
+    """How densely vertices (V, 3) lie where feet come down, (N, 2) [m], as far as that is known before a bake."""
+    under = np.unique(cells_at(footfalls, cell_size))
+    inside = among(under, cells_at(vertices[:, :2], cell_size))
+    return _coverage(vertices, cells_of(under), int(inside.sum()), cell_size)
+
+
+def _coverage(vertices: Array, cells: Indices, vertices_in_cells: int, cell_size: float) -> Coverage:
+    spacing = float(np.sqrt(len(cells) * cell_size**2 / max(1e-9, float(vertices_in_cells))))
+    blocks, crowd = np.unique(keys_at(vertices[:, :2], DETAIL_FROM * cell_size), return_counts=True)
+    under, share = np.unique(keys_of(cells // DETAIL_FROM), return_counts=True)
+    around = under[:, None] + AROUND
+    place = np.minimum(np.searchsorted(blocks, around), len(blocks) - 1)
+    near = np.where(blocks[place] == around, crowd[place], 0).sum(axis=1)
+    missed = float(share[near < FEW].sum()) / max(1, len(cells))
+    return Coverage(spacing, missed, bool(crowd.max() >= FEW))
+
+
+def wants_detail(
+    ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, motions: Sequence[CharacterMotion]
+) -> bool:
+    """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
+    if detail == "ALWAYS" or (detail == "AUTO" and cover.is_coarse(cell_size)):
+        return True
+    length = min(sole.sole.length for motion in motions for sole in motion.soles)
+    if cover.spacing > COARSEST_SPACING * length:
+        raise InputError(
+            f"Ground '{ground.name}' is too coarse: its vertices are more than {COARSEST_SPACING * length * 100:.0f} "
+            f"cm apart under soles of {length * 100:.0f} cm. Set Detail to Automatic in the Ground panel, or Subdivide "
+            "the ground."
+        )
+    return False
+
+
+def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[str]:
+    """What the user should know about prints that leave the fine part of a ground."""
+    if not (cover.is_fine_somewhere and cover.is_coarse(cell_size)):
+        return []
+    if detail == "NEVER":
+        return [
+            f"Prints lie where ground '{ground.name}' is too coarse to show them: set Detail to Automatic in the "
+            "Ground panel, or create the ground anew."
+        ]
+    return [
+        f"Prints lie where ground '{ground.name}' is coarse: a finer copy, '{ground.name} Trail', takes them. To have "
+        f"them on '{ground.name}' itself, clear the bake and create the ground anew."
+    ]
+
+
+def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
+    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    material : GroundMaterial
+    factors : (V, 3) float array, optional
+        What is painted on the ground: there, the rim's share lies between the least and the largest painted.
+    """
+    depth, rim = np.ones((2, 2)) if factors is None else (np.append(column, 1.0) for column in factors[:, 1:].T)
+    least, most = np.clip(2.0 * material.poisson_ratio * np.array([rim.min(), rim.max()]), 0.0, 1.0)
+    for footprint in footprints:
+        raised = footprint.rim_m3 + footprint.unplaced_rim_m3
+        rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
+        low, high = least * footprint.compressed_m3, most * footprint.compressed_m3
+        if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
+            raise BakeError(
+                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
+                f"{high:.6g} m³ were displaced; nothing was written. Please report this shot."
+            )
+        if footprint.max_depth_m > material.layer_depth * depth.max() * (1 + 1e-9):
+            raise BakeError(
+                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
+                "was written. Please report this shot."
+            )

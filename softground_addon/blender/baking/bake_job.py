@@ -1,0 +1,286 @@
+"""The bake from settings to pressed ground: one generator, driven by a timer, an operator, or the command line.
+
+Everything is read, checked and computed first; the ground is written at the very end. A bake that is closed, fails or
+is refused before that has changed nothing.
+"""
+
+from __future__ import annotations
+
+import time
+import zlib
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import record, report
+from ...core.cell_limits import check_cell_size
+from ...core.footprints import Footprint
+from ...core.heightfield import Terrain
+from ...core.polylines import polylines_at
+from ...core.pressed_ground import PressedGround
+from ...core.refinement import refine
+from ...core.simulation import CharacterLoads, simulate
+from ...core.sole_marks import sole_marks
+from .. import settings
+from ..characters.character_setup import characters_of
+from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground.materials import drafted
+from ..jobs import Job, Progress, aside
+from ..reading import staleness
+from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
+from ..response import response_job
+from . import bake_report
+from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detail
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What a bake leaves behind, apart from the ground itself.
+
+    Attributes
+    ----------
+    report : dict
+        For JSON (see `core.report`).
+    footprints : tuple of Footprint
+    """
+
+    report: dict[str, object]
+    footprints: tuple[Footprint, ...]
+
+
+def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = False) -> Job[BakeResult]:
+    """Bake the scene's characters into its ground.
+
+    Without a ground in the settings, one is created that fits the walk.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Its `softground` settings say what to do.
+    write : bool
+        False computes and reports only, and changes nothing.
+    response_only : bool
+        Leave the ground as it is, whatever the settings say.
+
+    Raises
+    ------
+    InputError
+        If something that the user gave cannot be used; names it and the remedy.
+    BakeError
+        If the result fails a check.
+    """
+    started = time.perf_counter()
+    options = scene.softground
+    characters = characters_of(scene)
+    moving = bake_report.ground_warnings(options.ground, options.frame_start)
+    shot = yield from read_shot(scene)
+    movers = staleness.of_movers(scene)
+    yield Progress("sample", 1.0)
+    sampled = time.perf_counter()
+
+    loads, footprints, forces, answers = yield from _press(scene, shot)
+    simulated = time.perf_counter()
+
+    gaps = response_job.gap_table(answers)
+    if gaps is None:
+        gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
+    layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
+    inputs = bake_report.inputs_of(scene)
+    warnings = bake_report.warnings(
+        footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
+    )
+    offsets_mm = bake_report.offsets_mm(loads)
+    del loads  # they tell of every step of the simulation
+    if shot.surface and shot.surface.factors is not None:
+        inputs["painted_crc32"] = f"{zlib.crc32(shot.surface.factors.tobytes()):08x}"
+    written: _Written | None = None
+    if write and not response_only and options.output != "RESPONSE":
+        written = yield from _write(scene, shot, footprints, inputs)
+    else:
+        vertices = shot.surface.vertices if shot.surface else None
+        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
+    if write and options.output != "PRINTS":
+        response_job.put_layers(scene, characters, layers)
+    finished = time.perf_counter()
+    frames = options.frame_end - options.frame_start + 1
+    result = report.build(
+        inputs=inputs,
+        input_hash=written.input_hash if written else input_hash,
+        footprints=footprints,
+        offsets_mm=offsets_mm,
+        timings={
+            "sample": sampled - started,
+            "simulate": simulated - sampled,
+            "write": finished - simulated,
+            "frames_per_second": frames / (finished - started),
+        },
+        playback_error_m=written.error if written else None,
+        warnings=[
+            *warnings,
+            *moving,
+            *(written.warnings if written else ()),
+            *response_job.warnings(answers),
+        ],
+        forces=forces if options.keep_forces else None,
+        gaps_mm=gaps,
+        worst_gaps=response_job.worst_gaps(answers),
+        suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
+    )
+    if written:
+        ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
+        staleness.store(bake_report.inputs_of(scene), scene, movers)
+    yield Progress("write", 1.0)
+    return BakeResult(result, tuple(footprints))
+
+
+@dataclass(frozen=True)
+class _Written:
+    """What was written to the ground."""
+
+    ground: bpy.types.Object
+    carrier: bpy.types.Object
+    input_hash: str
+    error: float
+    warnings: list[str]
+
+
+def _write(
+    scene: bpy.types.Scene,
+    shot: Shot,
+    footprints: Sequence[Footprint],
+    inputs: dict[str, object],
+) -> Job[_Written]:
+    """Put the prints on the ground, all of them in the last step."""
+    options = scene.softground
+    blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
+    frame_rate, unit_scale = shot.motions[0].frame_rate, scene.unit_settings.scale_length
+    at_the_end = partial(
+        PressedGround.at,
+        footprints,
+        frame=float(options.frame_end),
+        frame_rate=frame_rate,
+        cell_size=cell_size,
+        blur_sigma=blur_sigma,
+    )
+    pressed = yield from aside("write", 0.1, at_the_end)
+    warnings: list[str] = []
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        if shot.surface is None:
+            lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
+            layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, unit_scale)
+            drafts.enter_context(drafted(options.material.surface))
+            yield Progress("write", 0.3)
+            ground = drafts.enter_context(created_ground.draft(layout))
+            inputs["ground"] = ground.name
+            vertices = layout.vertices
+            yield Progress("write", 0.3)
+            place = baked_ground.on_created(scene, ground, layout, pressed)
+        else:
+            ground, vertices = options.ground, shot.surface.vertices
+            index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, pressed, shot.terrain)
+            cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
+            place = baked_ground.on_itself(ground, index, vertices)
+            if wants_detail(ground, cover, options.detail, cell_size, shot.motions):
+                place = yield from _detail(drafts, ground, pressed, shot.terrain, cell_size, unit_scale)
+            warnings += coverage_warnings(ground, cover, options.detail, cell_size)
+        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
+        stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
+        across = place.position[:, :2].T
+        sample = yield from aside("write", 0.6, pressed.sample, *across)
+        del pressed  # the cells take as much memory as what is still to come
+        over_time = yield from aside("write", 0.7, partial(polylines_at, footprints, *across, blur_sigma=blur_sigma))
+        marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
+        yield Progress("write", 0.9)
+        carrier = yield from baked_ground.write(
+            place,
+            sample,
+            over_time,
+            stored,
+            frame_rate=frame_rate,
+            unit_scale=unit_scale,
+            time_stretch=settings.time_stretch_of(scene),
+            shape_keys=options.shape_keys,
+        )
+        ground_mesh.write_soles(carrier, place.index, marks)
+    return _Written(ground, carrier, input_hash, over_time.error, warnings)
+
+
+def _detail(
+    drafts: ExitStack,
+    ground: bpy.types.Object,
+    pressed: PressedGround,
+    terrain: Terrain,
+    cell_size: float,
+    unit_scale: float,
+) -> Job[baked_ground.Place]:
+    """A draft of the ground refined along the trail, as the place for a bake."""
+    surface = trail_detail.surface_of(ground, unit_scale)
+    region = trail_detail.region_of(pressed)
+    refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
+    draft = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
+    yield Progress("write", 0.4)
+    vertices = refinement.vertices(surface)
+    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, pressed, terrain)
+    return baked_ground.on_detail(ground, draft, index, vertices)
+
+
+def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:
+    """What `ground_mesh.SOLE` says of places (K, 3), for a tread of some depth [m]; None without a tread."""
+    if not depth > 0 or not footprints:
+        return None
+    marks: Array = sole_marks(footprints, footprints[0].cell_size).sample(*position[:, :2].T)
+    return marks.T * (1.0, 1.0, depth)
+
+
+def _press(
+    scene: bpy.types.Scene, shot: Shot
+) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object], list[response_job.Answer]]]:
+    """Loads, footprints and forces of a shot, and how its characters answer.
+
+    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
+    lean that the pressed ground gives is the lean that pressed it.
+    """
+    characters = characters_of(scene)
+    asked = response_job.options_of(scene)
+    if asked:
+        response_job.check_characters(characters)
+    standing = response_job.standing_on(shot.motions, shot.terrain, asked)
+    loads = yield from estimate_shot(scene, replace(shot, motions=standing))
+    footprints, forces = yield from _simulate(scene, shot, loads)
+    leaning = None
+    for _ in range(response_job.LEAN_PASSES):
+        before = leaning
+        leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
+        if not response_job.leans_anew(leaning, before):
+            break
+        loads = yield from estimate_shot(scene, replace(shot, motions=leaning.motions))
+        footprints, forces = yield from _simulate(scene, shot, loads)
+    check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
+    return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)
+
+
+def _simulate(
+    scene: bpy.types.Scene, shot: Shot, loads: Sequence[CharacterLoads]
+) -> Job[tuple[list[Footprint], dict[str, object]]]:
+    """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
+    footprints: list[Footprint] = []
+    check_cell_size(loads, settings.cell_size_of(scene))
+    frames: list[float] = []
+    forces: list[tuple[Array, ...]] = []
+    count = max(len(motion.frames) for motion in shot.motions)
+    for result in simulate(loads, ground_of(scene, shot), settings.cell_size_of(scene)):
+        footprints += result.footprints
+        frames.append(result.frame)
+        forces.append(result.forces)
+        yield Progress("simulate", len(frames) / count)
+    footprints.sort(
+        key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
+    )
+    return footprints, bake_report.force_table(loads, frames, forces)

@@ -1,0 +1,1 @@
+"""Characters: recognised from rigs and objects, read as motions with soles."""

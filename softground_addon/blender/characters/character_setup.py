@@ -1,0 +1,345 @@
+"""Setting up characters: from an armature to an entry of `scene.softground.characters`, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import ceil, floor, log10
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.solids import mass_properties
+from ..properties import SoftGroundCharacter
+from ..settings import exists, time_stretch_of
+from .rig_mapping import RigMapping, SoleSource, instances_armature, map_rig, require_armature
+from .rig_sampling import is_animated, is_simulated
+from .solid_extraction import surface_of
+
+_SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
+_SIDE_TO_ENUM = {code: side for side, code in _SIDE_TO_CODE.items()}
+
+
+def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> SoftGroundCharacter:
+    """Add an armature to the scene's characters, with its joints and feet as they were recognised.
+
+    The first character sets the bake's frame range to its animation; further ones widen it.
+
+    Raises
+    ------
+    InputError
+        If there is no armature, it is a character already, or its feet are not found.
+    """
+    require_armature(armature)
+    assert armature is not None
+    settings = scene.softground
+    if any(character.armature == armature for character in settings.characters):
+        raise InputError(
+            f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
+        )
+    mapping = map_rig(armature)
+    character = settings.characters.add()
+    character.name = armature.name
+    character.armature = armature
+    _fill(character, mapping)
+    settings.active_character = len(settings.characters) - 1
+    _take_frames(scene, animated_frames(armature))
+    return character
+
+
+DENSITY = 500.0
+"""Density from which a thing's first mass is guessed [kg/m³]: wood's, between a tyre's and a stone's."""
+
+
+def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[SoftGroundCharacter]:
+    """Add mesh objects to the scene's characters, as things without a rig that fall, roll and slide.
+
+    Objects that hang on one parent, such as the wheels of a bicycle, are one thing. Its mass is that of its rigid
+    bodies, or guessed from its volume.
+
+    Raises
+    ------
+    InputError
+        If there is no object, or one is no mesh, the ground, or printing already.
+    """
+    things = list(things)
+    if not things:
+        raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
+    for thing in things:
+        _check_printable(scene, thing)
+        for character in scene.softground.characters:
+            if character.armature and character.armature in ancestors(thing):
+                raise InputError(
+                    f"'{thing.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
+                    "Contact."
+                )
+    groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    for thing in things:
+        groups.setdefault(_root(thing), []).append(thing)
+    added = []
+    for root, members in groups.items():
+        character = scene.softground.characters.add()
+        character.name = (members[0] if len(members) == 1 else root).name
+        character.mass = _guessed_mass(scene, members)
+        for thing in members:
+            sole = character.soles.add()
+            sole.name, sole.object = thing.name, thing
+        added.append(character)
+        for thing in members:
+            _take_frames(scene, _moving_frames(scene, thing))
+    scene.softground.active_character = len(scene.softground.characters) - 1
+    return added
+
+
+def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    if thing.type != "MESH":
+        raise InputError(
+            f"'{thing.name}' is no mesh but of type {thing.type.title()}: select an animated armature, or mesh objects "
+            "that fall or roll."
+        )
+    if thing == scene.softground.ground:
+        raise InputError(f"'{thing.name}' is the ground: select what moves on it.")
+    if not thing.data.polygons and not thing.modifiers:
+        raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or select another object.")
+    for character in scene.softground.characters:
+        if any(sole.object == thing for sole in character.soles):
+            raise InputError(f"'{thing.name}' prints already, as a sole of '{title_of(character)}'.")
+
+
+def ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
+    """An object's parents, nearest first."""
+    found, parent = [], thing.parent
+    while parent is not None:
+        found.append(parent)
+        parent = parent.parent
+    return found
+
+
+def _root(thing: bpy.types.Object) -> bpy.types.Object:
+    return ([thing, *ancestors(thing)])[-1]
+
+
+def _guessed_mass(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> float:
+    """Mass of some objects [kg]: that of their rigid bodies, or from their volume, to two digits."""
+    total = 0.0
+    for thing in things:
+        if thing.rigid_body:
+            total += thing.rigid_body.mass
+            continue
+        vertices, triangles = surface_of(scene, thing)
+        to_world = np.array(thing.matrix_world)[:3, :3] * scene.unit_settings.scale_length
+        total += mass_properties(vertices @ to_world.T, triangles).volume * DENSITY
+    if not total > 0:
+        return 1.0
+    return round(total, 1 - floor(log10(total)))
+
+
+def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int, int] | None:
+    if is_simulated(thing) and scene.rigidbody_world:
+        cache = scene.rigidbody_world.point_cache
+        return max(cache.frame_start, scene.frame_start), min(cache.frame_end, scene.frame_end)
+    return animated_frames(thing)
+
+
+def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
+    """Bake the frames of the first character; widen the range for further ones."""
+    if not frames:
+        if len(scene.softground.characters) == 1:
+            scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
+        return
+    settings, stretch = scene.softground, time_stretch_of(scene)
+    start, end = floor(frames[0] / stretch), ceil(frames[1] / stretch)
+    if len(settings.characters) > 1:
+        start, end = min(settings.frame_start, start), max(settings.frame_end, end)
+    settings.frame_start, settings.frame_end = start, end
+
+
+def detect_bones(character: SoftGroundCharacter) -> None:
+    """Set a character's joints and feet as they are recognised, in place of those in the list; other soles stay.
+
+    Raises
+    ------
+    InputError
+        If it has no armature, or its feet are not found.
+    """
+    require_armature(character.armature)
+    _fill(character, map_rig(character.armature))
+
+
+def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
+    character.joints.clear()
+    for number in reversed(range(len(character.soles))):
+        if character.soles[number].kind == "FOOT" and not character.soles[number].object:
+            character.soles.remove(number)
+    character.active_sole = 0
+    for joint, (bone, end) in mapping.joints.items():
+        entry = character.joints.add()
+        entry.name, entry.bone, entry.end = joint, bone, end.upper()
+    for source in mapping.soles:
+        sole = character.soles.add()
+        sole.name, sole.bone, sole.toe_bone = source.name, source.bone, source.toe_bone
+        sole.side = _SIDE_TO_ENUM[source.side]
+
+
+def add_bone_contacts(character: SoftGroundCharacter, bones: Iterable[str]) -> list[str]:
+    """Let limbs of a character print, by whatever side of them faces down; names of the soles that were added.
+
+    Raises
+    ------
+    InputError
+        If there is none, or all print already.
+    """
+    taken = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone)}
+    fresh = [bone for bone in bones if bone not in taken]
+    if not fresh:
+        raise InputError(
+            f"No further bone of '{title_of(character)}' is selected: select the bones that touch the ground, in pose "
+            "mode."
+        )
+    for bone in fresh:
+        sole = character.soles.add()
+        sole.name, sole.bone, sole.kind = bone, bone, "LIMB"
+        sole.side = _side_of(bone)
+    character.active_sole = len(character.soles) - 1
+    return fresh
+
+
+def add_object_contacts(
+    scene: bpy.types.Scene, character: SoftGroundCharacter, things: Iterable[bpy.types.Object]
+) -> list[str]:
+    """Let objects print as soles of a character: canes, snowshoes, wheels; names of those that were added.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one is no mesh, the ground, or printing already.
+    """
+    things = list(things)
+    if not things:
+        raise InputError(
+            "No object is selected: select the meshes that touch the ground, such as a cane or a snowshoe."
+        )
+    for thing in things:
+        _check_printable(scene, thing)
+    for thing in things:
+        sole = character.soles.add()
+        sole.name, sole.object = thing.name, thing
+        sole.side = _side_of(thing.name)
+    character.active_sole = len(character.soles) - 1
+    return [thing.name for thing in things]
+
+
+def _side_of(name: str) -> str:
+    """Side that a name tells by its end, as Blender's own mirror names do."""
+    return next((side for end, side in ((".L", "LEFT"), (".R", "RIGHT")) if name.upper().endswith(end)), "NONE")
+
+
+def is_thing(character: SoftGroundCharacter) -> bool:
+    """Whether an entry is of objects without a rig."""
+    return character.armature is None and any(sole.object for sole in character.soles)
+
+
+def is_set_up(character: SoftGroundCharacter) -> bool:
+    """Whether an entry still has what leaves prints: an armature, or an object."""
+    return exists(character.armature) if character.armature else is_thing(character)
+
+
+def title_of(character: SoftGroundCharacter) -> str:
+    """What the user calls a character: its armature's name, or that of the thing."""
+    return character.armature.name if character.armature else character.name
+
+
+def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
+    """The scene's characters whose armature or objects are still there."""
+    return [character for character in scene.softground.characters if is_set_up(character)]
+
+
+def movers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The armatures and objects whose animation a bake of the scene reads."""
+    movers: list[bpy.types.Object] = []
+    for character in characters_of(scene):
+        movers += [character.armature] if character.armature else [s.object for s in character.soles if s.object]
+    return movers
+
+
+def mapping_of(character: SoftGroundCharacter) -> RigMapping:
+    """The joints and soles of a character as the user left them."""
+    joints = {entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone}
+    soles = tuple(
+        SoleSource(
+            sole.name,
+            _SIDE_TO_CODE[sole.side],
+            sole.bone,
+            sole.toe_bone,
+            sole.object.name_full if sole.object else "",
+            sole.kind == "LIMB",
+        )
+        for sole in character.soles
+        if sole.object or (sole.bone and character.armature)
+    )
+    return RigMapping(joints, soles, "settings")
+
+
+def animated_frames(
+    armature: bpy.types.Object, followers: frozenset[bpy.types.Object] = frozenset()
+) -> tuple[int, int] | None:
+    """First and last frame of the object's action and NLA strips, and of those that it is parented to.
+
+    Where there are none, of what its constraints follow; `followers` are those that are asked about already.
+    """
+    ranges: list[tuple[float, float]] = []
+    for node in (armature, *ancestors(armature)):
+        animation = node.animation_data
+        if animation:
+            strips = [
+                strip for track in animation.nla_tracks if not track.mute for strip in track.strips if not strip.mute
+            ]
+            ranges += [(strip.frame_start, strip.frame_end) for strip in strips]
+            if animation.action:
+                frames = animation.action.frame_range
+                ranges.append((frames[0], frames[1]))
+    if not ranges:
+        followers |= {armature}
+        ranges += [found for leader in leaders(armature) - followers if (found := animated_frames(leader, followers))]
+    if not ranges:
+        return None
+    return floor(min(start for start, _ in ranges)), ceil(max(end for _, end in ranges))
+
+
+def leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+    """Objects that the constraints of an object and of its bones follow."""
+    bones = thing.pose.bones if thing.pose else ()
+    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints if not one.mute]
+    followed = [getattr(one, "target", None) for one in constraints]
+    followed += [weighted.target for one in constraints if one.type == "ARMATURE" for weighted in one.targets]
+    return {leader for leader in followed if leader is not None} - {thing}
+
+
+def set_up_automatically(scene: bpy.types.Scene) -> None:
+    """Make the scene's only armature a character where no character is set up yet.
+
+    Raises
+    ------
+    InputError
+        If there is no armature or more than one, or its feet are not found.
+    """
+    if scene.softground.characters:
+        return
+    armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
+    if not armatures:
+        inside = next(filter(instances_armature, scene.objects), None)
+        if inside:
+            require_armature(inside)
+        raise InputError(
+            f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
+            "with Add Character in the SoftGround panel."
+        )
+    moving = [armature for armature in armatures if is_animated(armature)]
+    if len(armatures) > 1 and len(moving) != 1:
+        names = ", ".join(f"'{armature.name}'" for armature in armatures)
+        raise InputError(
+            f"Scene '{scene.name}' has several armatures ({names}): add those that walk with Add Character in the "
+            "SoftGround panel and save the file."
+        )
+    add_character(scene, (moving or armatures)[0])

@@ -1,0 +1,328 @@
+"""From recorded matrices to a `CharacterMotion`: which sole each foot has and how its bones carry it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Generator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.foot_attitude import (
+    UP,
+    FlatFoot,
+    FootSize,
+    flat_foot,
+    foot_size,
+    planted_instants,
+    reflection,
+    standing_up,
+)
+from ...core.motion import Array, CharacterMotion, SoleMotion
+from ...core.rigid import displacement, nearest_rotation, unit
+from ...core.soles import PlacedSole, solid_sole
+from ...core.solids import capsule
+from ..jobs import meanwhile
+from ..settings import frame_rate_of, gravity_of
+from .rig_at_rest import RestPose
+from .rig_mapping import RigMapping, SoleSource
+from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
+
+_REST_IS_FLAT = np.radians(10.0)
+"""Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
+
+_MIRROR_TOLERANCE = 0.2
+"""Distance between the direction of a foot bone and the other's mirror image, up to which both feet are alike."""
+
+_SAME_SIZE = 0.2
+"""Relative difference of foot bones up to which both feet are given one size."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """World matrices of bones and objects over time [m], as evaluated; a bone's y axis points from head to tail.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+    bones, things : mapping of str to (F, 4, 4) float array
+        By name.
+    armature : (F, 4, 4) float array
+    """
+
+    frames: Array
+    bones: Mapping[str, Array]
+    things: Mapping[str, Array]
+    armature: Array
+
+
+def assemble_motion(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    mapping: RigMapping,
+    recording: Recording,
+    *,
+    mass: float,
+    carried: Mapping[str, SoleMotion],
+) -> Generator[int, None, CharacterMotion]:
+    """The character's motion with the soles of its mapping.
+
+    Yields the number of frames read before each part of the work, so that Blender can answer its user.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    armature : bpy.types.Object
+    mapping : RigMapping
+    recording : Recording
+    mass : float
+        [kg]
+    carried : mapping of str to SoleMotion
+        The objects that print, by name of the sole.
+
+    Raises
+    ------
+    InputError
+        If a mesh that should print has no underside.
+    """
+    rest = RestPose.of(armature, mapping, recording.armature)
+    frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
+    leg = rest.leg_length(mapping)
+
+    sources = [source for source in mapping.soles if not source.object and not source.limb]
+    feet = [_Foot.of(source, recording, rest) for source in sources]
+    step = float(recording.frames[1] - recording.frames[0]) if len(recording.frames) > 1 else 1.0
+    planted = planted_instants(
+        [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
+    )
+    yield len(recording.frames)
+    meshes = find_foot_meshes(scene, armature, sources, rest.world)
+    yield len(recording.frames)
+    flats = _flat_feet(feet, planted, rest, facing=rest.facing(mapping), leg=leg, modelled=meshes.keys())
+    sizes = [
+        foot_size(flat, ankle_tip=foot.tip, ball=foot.ball, leg=leg) for foot, flat in zip(feet, flats, strict=True)
+    ]
+    sizes = _evened(sizes, feet, planted)
+    motions: dict[str, SoleMotion] = {}
+    for foot, flat, size in zip(feet, flats, sizes, strict=True):
+        shape = partial(foot_sole, has_toes=foot.ball is not None, mirrored=rest.is_mirrored)
+        mesh = meshes.get(foot.source.name)
+        placed = yield from meanwhile(len(recording.frames), shape, foot.source, flat, size, mesh)
+        motions[foot.source.name] = foot.motion_of(placed, flat)
+    yield len(recording.frames)
+    motions.update(_limb_motions(scene, mapping, recording, rest))
+    motions.update(carried)
+
+    return CharacterMotion(
+        name=armature.name,
+        mass=mass,
+        leg_length=leg + (float(np.mean([size.ankle_height for size in sizes])) if sizes else 0.0),
+        frames=recording.frames,
+        frame_rate=frame_rate,
+        soles=tuple(motions[source.name] for source in mapping.soles),
+        joints={
+            joint: along_bone(recording.bones[bone], 0.0 if end == "head" else armature.data.bones[bone].length)
+            for joint, (bone, end) in mapping.joints.items()
+        },
+        gravity=gravity,
+        four_legged=rest.is_four_legged(mapping),
+    )
+
+
+LIMB_THICKNESS = 0.2
+"""Radius of a limb without a skin over the length of its bone."""
+
+GIVE = 0.04
+"""How far flesh gives way where it touches, over the size of the limb: 3 mm for a hand, 1 cm for a trunk."""
+
+
+def _limb_motions(
+    scene: bpy.types.Scene, mapping: RigMapping, recording: Recording, rest: RestPose
+) -> dict[str, SoleMotion]:
+    """Limbs that print by whatever side faces down: the skin that moves with the bone, or a bar around it."""
+    meshes = find_limb_meshes(scene, rest.armature, mapping, rest.world)
+    motions = {}
+    for source in mapping.soles:
+        if not source.limb or source.object:
+            continue
+        head, tail = rest.end(source.bone, "head"), rest.end(source.bone, "tail")
+        if source.name in meshes:
+            vertices, triangles = meshes[source.name].vertices, meshes[source.name].triangles
+            vertices, triangles = _used(vertices, triangles)
+        else:
+            length = float(np.linalg.norm(tail - head))
+            vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
+        middle = vertices.mean(axis=0)
+        sole = solid_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
+        transforms = _rigid_motion(recording.bones[source.bone], rest.matrix(source.bone))
+        transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
+        motions[source.name] = SoleMotion(sole, transforms[:, None])
+    return motions
+
+
+def _used(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """A mesh without the vertices that no triangle uses."""
+    kept, index = np.unique(triangles, return_inverse=True)
+    return vertices[kept], index.reshape(-1, 3)
+
+
+def along_bone(matrices: Array, distance: float) -> Array:
+    """Path of the point at a distance from the bone's head, in units of the bone, (F, 3)."""
+    return matrices[:, :3, 1] * distance + matrices[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """A foot's bones: joints in the rest pose and rigid motions from it [m]."""
+
+    source: SoleSource
+    ankle: Array
+    hinge: Array  # where the toes bend, or the tip of a foot that does not
+    tip: Array
+    motion: Array
+    toe_motion: Array
+    path: Array  # of ankle and hinge, (F, 2, 3)
+
+    @property
+    def ball(self) -> Array | None:
+        return self.hinge if self.source.toe_bone else None
+
+    def motion_of(self, placed: PlacedSole, flat: FlatFoot) -> SoleMotion:
+        """A sole carried by the foot, its toes by the toe bone."""
+        carriers = [self.motion @ flat.foot_frame, self.toe_motion @ flat.toe_frame]
+        transforms = [carry @ place for carry, place in zip(carriers, placed.placements, strict=False)]
+        return SoleMotion(placed.sole, np.stack(transforms, axis=1))
+
+    @classmethod
+    def of(cls, source: SoleSource, recording: Recording, rest: RestPose) -> _Foot:
+        last = source.toe_bone or source.bone
+        hinge = (last, "head") if source.toe_bone else (last, "tail")
+        matrices = recording.bones[source.bone]
+        motion = _rigid_motion(matrices, rest.matrix(source.bone))
+        length = rest.armature.data.bones[source.bone].length
+        return cls(
+            source=source,
+            ankle=rest.end(source.bone, "head"),
+            hinge=rest.end(*hinge),
+            tip=rest.end(last, "tail"),
+            motion=motion,
+            toe_motion=_rigid_motion(recording.bones[last], rest.matrix(last)) if source.toe_bone else motion,
+            path=np.stack(
+                [
+                    matrices[:, :3, 3],
+                    along_bone(recording.bones[last], 0.0) if source.toe_bone else along_bone(matrices, length),
+                ],
+                axis=1,
+            ),
+        )
+
+
+def _flat_feet(
+    feet: Sequence[_Foot],
+    planted: Sequence[NDArray[np.bool_]],
+    rest: RestPose,
+    *,
+    facing: Array,
+    leg: float,
+    modelled: Collection[str],
+) -> list[FlatFoot]:
+    """How each foot stands; `modelled` are the names of those that have a mesh."""
+    images = _mirror_images(feet)
+    flats = []
+    for place, foot in enumerate(feet):
+        trust = _REST_IS_FLAT if foot.source.name in modelled else 0.0
+        flats.append(_stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, trust_rest_within=trust))
+    return flats
+
+
+def _stand(
+    place: int,
+    feet: Sequence[_Foot],
+    planted: Sequence[NDArray[np.bool_]],
+    images: Mapping[int, Array],
+    rest: RestPose,
+    *,
+    facing: Array,
+    leg: float,
+    trust_rest_within: float,
+) -> FlatFoot:
+    """How a foot stands, from its own planted instants and, reflected, from those of its mirror image.
+
+    It stands level in the world or, where the whole rig is tilted, level in the rig: whichever is nearer to how it
+    stands at rest.
+    """
+
+    def standing(turns: Sequence[Array], tilts: Array) -> Array:
+        def levelled(index: int) -> Array:
+            stands = planted[index]
+            return np.swapaxes(tilts[stands], -1, -2) @ turns[index][stands, :3, :3]
+
+        mirrored = [levelled(other) @ mirror for other, mirror in images.items()]
+        return standing_up(levelled(place), mirrored, trust_rest_within=trust_rest_within)
+
+    foot_motions, toe_motions = [other.motion for other in feet], [other.toe_motion for other in feet]
+    levels = (np.broadcast_to(np.eye(3), rest.tilts.shape), rest.tilts)
+    foot_up, tilts = max(((standing(foot_motions, level), level) for level in levels), key=lambda found: found[0] @ UP)
+    foot, own = feet[place], planted[place]
+    return flat_foot(
+        foot.ankle,
+        foot.hinge,
+        _pointing(foot, foot_up, facing, leg),
+        foot_up=foot_up,
+        toe_up=standing(toe_motions, tilts),
+        toe_turns=np.swapaxes(foot.toe_motion[own, :3, :3], -1, -2) @ foot.motion[own, :3, :3],
+    )
+
+
+_STUB = 0.02
+"""Length of a foot bone over the leg's, below which it points nowhere."""
+
+_STEEPEST = np.cos(np.radians(18.0))
+"""A foot bone closer than this to the vertical does not tell where the toes are."""
+
+
+def _pointing(foot: _Foot, up: Array, facing: Array, leg: float) -> Array:
+    """Direction of the toes in the rest pose; where the character faces if the foot bone is too short or too steep."""
+    along = foot.hinge - foot.ankle
+    length = float(np.linalg.norm(along))
+    if length < _STUB * leg or abs(float(along @ up)) > _STEEPEST * length:
+        return facing
+    return along
+
+
+def _mirror_images(feet: Sequence[_Foot]) -> list[dict[int, Array]]:
+    """For each foot, the others that are its mirror image in the rest pose, with the (3, 3) reflection."""
+    images: list[dict[int, Array]] = [{} for _ in feet]
+    for i, foot in enumerate(feet):
+        for j, other in enumerate(feet):
+            across = (other.ankle - foot.ankle) * (1, 1, 0)
+            if {foot.source.side, other.source.side} != {"L", "R"} or np.linalg.norm(across) == 0:
+                continue
+            if foot.source.name[:-1] != other.source.name[:-1]:
+                continue
+            mirror = reflection(across)
+            gap = unit(foot.hinge - foot.ankle) - mirror @ unit(other.hinge - other.ankle)
+            if np.linalg.norm(gap) < _MIRROR_TOLERANCE:
+                images[i][j] = mirror
+    return images
+
+
+def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[NDArray[np.bool_]]) -> list[FootSize]:
+    """Left and right foot of one size where their bones are, each counting by how long it was seen standing."""
+    instants = np.array([float(stands.sum()) for stands in planted]) + 1e-6
+    bones = np.array([float(np.linalg.norm(foot.hinge - foot.ankle)) for foot in feet])
+    values = np.array([(size.length, size.ankle_height) for size in sizes]).reshape(-1, 2)
+    evened = []
+    for foot, bone in zip(feet, bones, strict=True):
+        same_limb = np.array([other.source.name[:-1] == foot.source.name[:-1] for other in feet])
+        alike = same_limb & (np.abs(bones - bone) <= _SAME_SIZE * max(bone, 1e-12))
+        evened.append(FootSize(*np.average(values[alike], axis=0, weights=instants[alike]).tolist()))
+    return evened
+
+
+def _rigid_motion(matrices: Array, rest: Array) -> Array:
+    """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
+    turn = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
+    return displacement(turn, rest[:3, 3], matrices[:, :3, 3])

@@ -1,0 +1,122 @@
+"""A rig at rest, standing upright: what its size, its sides and its soles are measured on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.foot_attitude import UP
+from ...core.motion import Array
+from ...core.rigid import rotation, turn_between, unit
+from .rig_mapping import RigMapping
+
+_ACROSS, _ALONG = 0.6, 0.7
+"""Largest cosine between the legs and a four-legged trunk, smallest between hind and front legs."""
+
+_ALONG_LEGS = 0.8
+"""An axis of the armature is its upward one when the legs lie along it with at least this cosine."""
+
+_UPRIGHT = np.cos(np.radians(1.0))
+"""Cosine of the tilt within which an armature stands upright."""
+
+
+@dataclass(frozen=True)
+class RestPose:
+    """The rig at rest, standing upright where it is at the first frame, however its parents lie.
+
+    Attributes
+    ----------
+    armature : bpy.types.Object
+    world : (4, 4) float array
+        Armature space to world [m].
+    tilts : (F, 3, 3) float array
+        Rotations from upright to how the armature's own upward axis lies in each frame.
+    """
+
+    armature: bpy.types.Object
+    world: Array
+    tilts: Array
+
+    @classmethod
+    def of(cls, armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> RestPose:
+        """From the armature's matrices over time, (F, 4, 4) [m]."""
+        ups = unit(placed[:, :3, :3] @ _own_up(armature, mapping, placed[0]))
+        tilts = rotation(turn_between(np.broadcast_to(UP, ups.shape), ups))
+        world = placed[0].copy()
+        world[:3, :3] = tilts[0].T @ world[:3, :3]
+        return cls(armature, world, tilts)
+
+    @property
+    def is_mirrored(self) -> bool:
+        return bool(np.linalg.det(self.world[:3, :3]) < 0)
+
+    def matrix(self, bone: str) -> Array:
+        return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
+
+    def end(self, bone: str, end: str) -> Array:
+        point = self.armature.data.bones[bone]
+        local = np.array(point.head_local if end == "head" else point.tail_local)
+        return self.world[:3, :3] @ local + self.world[:3, 3]
+
+    def leg_length(self, mapping: RigMapping) -> float:
+        """Thigh and shank together, or about half the rig's height where they are not mapped."""
+        lengths = []
+        for side in "lr":
+            joints = [f"hip_{side}", f"knee_{side}", f"ankle_{side}"]
+            if all(joint in mapping.joints for joint in joints):
+                points = np.array([self.end(*mapping.joints[joint]) for joint in joints])
+                lengths.append(float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()))
+        if lengths and min(lengths) > 0:
+            return float(np.mean(lengths))
+        ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
+        return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
+
+    def is_four_legged(self, mapping: RigMapping) -> bool:
+        """Whether the trunk lies across the legs, and the arms along them."""
+        names = [f"{joint}_{side}" for joint in ("hip", "ankle", "shoulder", "wrist") for side in "lr"]
+        if any(name not in mapping.joints for name in names):
+            return False
+        left, right = (np.array([self.end(*mapping.joints[name]) for name in names[side::2]]) for side in (0, 1))
+        hip, ankle, shoulder, wrist = (left + right) / 2
+        leg, trunk, arm = (unit(line) for line in (ankle - hip, shoulder - hip, wrist - shoulder))
+        return bool(abs(leg @ trunk) < _ACROSS and leg @ arm > _ALONG)
+
+    def facing(self, mapping: RigMapping) -> Array:
+        """Horizontal direction in which the character faces; Blender's front where left and right do not show."""
+        ahead = np.cross(self._across(mapping), (0.0, 0.0, -1.0 if self.is_mirrored else 1.0))
+        length = float(np.linalg.norm(ahead))
+        return ahead / length if length > 0 else np.array((0.0, -1.0, 0.0))
+
+    def _across(self, mapping: RigMapping) -> Array:
+        """From a joint on the right to the same on the left."""
+        for joint in ("hip", "shoulder", "knee", "ankle"):
+            if f"{joint}_l" in mapping.joints and f"{joint}_r" in mapping.joints:
+                across = self.end(*mapping.joints[f"{joint}_l"]) - self.end(*mapping.joints[f"{joint}_r"])
+                if np.linalg.norm(across[:2]) > 0:
+                    return across
+        return np.zeros(3)
+
+
+def _own_up(armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> Array:
+    """The axis of the armature along which its legs reach up at rest; where none shows, the one that points up most.
+
+    An armature that stands upright itself does so whatever its rest pose: those of captured motions may lie.
+    """
+    if unit(placed[:3, 2]) @ UP > _UPRIGHT:
+        return UP
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    bones = armature.data.bones
+    legs = np.zeros(3)
+    for side in "lr":
+        joints = [f"ankle_{side}", f"hip_{side}"]
+        if all(joint in mapping.joints for joint in joints):
+            ankle, hip = (
+                getattr(bones[bone], f"{end}_local") for bone, end in (mapping.joints[joint] for joint in joints)
+            )
+            legs += np.array(hip - ankle)
+    along = axes @ unit(legs)
+    if along.max() < _ALONG_LEGS:
+        along = axes @ placed[2, :3]
+    return np.asarray(axes[along.argmax()])

@@ -1,0 +1,283 @@
+"""Which bone is what: joints and feet of an armature, from the names of the usual rigs, else from its rest pose.
+
+What each name says by itself is in `bone_names`; here the bones that carry the same word are told apart, and what the
+names leave out is completed from the rest pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import bpy
+from mathutils import Vector
+
+from ...core.errors import InputError
+from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
+from .rest_pose import map_by_rest_pose
+
+BoneEnd = tuple[str, str]
+"""A bone's name, and "head" or "tail"."""
+
+
+@dataclass(frozen=True)
+class SoleSource:
+    """What one sole is made from.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "".
+    bone : str
+        Bone of the armature that carries the sole; empty if an object does.
+    toe_bone : str
+        Bone of the toes; empty for a sole of one piece.
+    object : str
+        Name of an object that prints with its own mesh instead; empty if a bone does.
+    limb : bool
+        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
+    """
+
+    name: str
+    side: str = ""
+    bone: str = ""
+    toe_bone: str = ""
+    object: str = ""
+    limb: bool = False
+
+
+@dataclass(frozen=True)
+class RigMapping:
+    """What the parts of a rig are.
+
+    Attributes
+    ----------
+    joints : mapping of str to BoneEnd
+        Canonical joint (`core.motion.JOINTS`) to the end of a bone.
+    soles : tuple of SoleSource
+        What prints, feet first.
+    method : str
+        How they were found: by "names" or "rest pose", or as the "settings" have them.
+    """
+
+    joints: Mapping[str, BoneEnd] = field(default_factory=dict)
+    soles: tuple[SoleSource, ...] = ()
+    method: str = "names"
+
+
+def map_rig(armature: bpy.types.Object) -> RigMapping:
+    """Joints and feet of an armature.
+
+    Parameters
+    ----------
+    armature : bpy.types.Object
+        Only read; may be linked or overridden.
+
+    Returns
+    -------
+    RigMapping
+
+    Raises
+    ------
+    InputError
+        If the object is no armature, or no feet are found by name or by rest pose.
+    """
+    require_armature(armature)
+    bones = armature.data.bones
+    mapping = _map_by_names(bones)
+    if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
+        shape = map_by_rest_pose(armature)
+        if shape is not None:
+            joints, feet = shape
+            by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
+            mapping = by_shape if mapping is None else _completed(mapping, by_shape)
+    if mapping is None:
+        raise InputError(
+            f"No feet found in armature '{armature.name}': neither by bone names nor as mirrored lowest chains of the "
+            "rest pose. Choose the foot bones by hand in the character's list of soles."
+        )
+    return mapping
+
+
+_LEG, _ARM = ("hip", "knee", "ankle", "ball", "toe"), ("shoulder", "elbow", "wrist")
+
+_WHOLE_BODY = frozenset(("hips", "neck", "head", *(f"{joint}_{side}" for joint in (*_LEG[:3], *_ARM) for side in "lr")))
+"""Joints without which the rest pose is asked."""
+
+
+def _completed(named: RigMapping, shaped: RigMapping) -> RigMapping:
+    """What the names say, with what they leave out taken from the shape of the rest pose.
+
+    A leg that is named in part is taken whole from there, as its words may mean other bones; of arms and trunk, what is
+    missing. Limbs about whose place the two differ stay as they are named.
+    """
+    joints, soles, found = dict(named.joints), named.soles, shaped.joints
+    shaped_soles = {sole.name: sole for sole in shaped.soles}
+    for side in "lr":
+        leg, arm = ([f"{joint}_{side}" for joint in limb] for limb in (_LEG, _ARM))
+        if _is_part_of_leg(joints, found, side):
+            joints = {joint: place for joint, place in joints.items() if joint not in leg}
+            joints |= {joint: found[joint] for joint in leg if joint in found}
+            soles = tuple(shaped_soles.get(sole.name, sole) if sole.side.lower() == side else sole for sole in soles)
+        shoulder = f"shoulder_{side}"
+        if shoulder not in joints or joints[shoulder] == found.get(shoulder):
+            joints = _with_missing(joints, found, arm)
+    trunk = [joint for joint in found if not joint.endswith(("_l", "_r"))]
+    return RigMapping(_with_missing(joints, found, trunk), soles, named.method)
+
+
+def _is_part_of_leg(joints: Mapping[str, BoneEnd], found: Mapping[str, BoneEnd], side: str) -> bool:
+    """Whether a leg is named in part, and ends at a bone that is the end of a leg by its shape too."""
+    hip, knee, ankle, ball, _ = (f"{joint}_{side}" for joint in _LEG)
+    is_whole = {hip, knee, ankle} <= joints.keys()
+    return not is_whole and ankle in joints and joints[ankle] in (found.get(ankle), found.get(ball))
+
+
+def _with_missing(
+    joints: Mapping[str, BoneEnd], found: Mapping[str, BoneEnd], wanted: Iterable[str]
+) -> dict[str, BoneEnd]:
+    """The joints, and those of the wanted ones that only the others have."""
+    return {**joints, **{joint: found[joint] for joint in wanted if joint in found and joint not in joints}}
+
+
+def instances_armature(thing: bpy.types.Object) -> bool:
+    """Whether an object shows an armature of the collection that it instances, as linked characters are at first."""
+    collection = thing.instance_collection
+    return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)
+
+
+def require_armature(armature: bpy.types.Object | None) -> None:
+    """Raise InputError unless the object is an armature with bones."""
+    if armature is None:
+        raise InputError(
+            "No armature is chosen: select the character's armature, or mesh objects that fall or roll, and press Add "
+            "Character."
+        )
+    if armature.is_missing:
+        raise InputError(
+            f"'{armature.name}' is not in this file, and its library '{armature.library.filepath}' was not found: put "
+            "the library back, or relocate it (File > External Data > Find Missing Files)."
+        )
+    if instances_armature(armature):
+        raise InputError(
+            f"The armature of '{armature.name}' is in a collection instance and cannot be read there: make it real "
+            "(Object > Library Override > Make, or Object > Apply > Make Instances Real)."
+        )
+    if armature.type != "ARMATURE":
+        raise InputError(
+            f"'{armature.name}' is no armature but of type {armature.type.title()}: select the character's armature."
+        )
+    if not armature.data.bones:
+        raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")
+
+
+def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:
+    """The mapping that the names give, or None where they name no foot."""
+    names = read_names(bones)
+    by_name = {bone.name: bone for bone in bones}
+    joints: dict[str, BoneEnd] = {}
+    soles = []
+    for side, suffix in (("L", "_l"), ("R", "_r")):
+        limb = {segment: best(names, words, side) for segment, words in LIMBS.items()}
+        _settle_ambiguities(limb, names, by_name, side)
+        foot, toe = limb["foot"], limb["toe"]
+        for joint, segment in _JOINT_HEADS.items():
+            if bone := limb[segment]:
+                joints[joint + suffix] = (bone, "head")
+        if "wrist" + suffix not in joints and limb["forearm"]:
+            joints["wrist" + suffix] = (limb["forearm"], "tail")
+        if foot or toe:
+            joints["toe" + suffix] = (toe or foot, "tail")
+            soles.append(SoleSource(f"foot.{side}", side, foot or toe, toe if foot else ""))
+    if not soles:
+        return None
+    joints.update(_map_trunk(names, by_name, joints))
+    return RigMapping(joints=joints, soles=tuple(soles))
+
+
+_JOINT_HEADS = {
+    "hip": "thigh",
+    "knee": "shin",
+    "ankle": "foot",
+    "ball": "toe",
+    "shoulder": "upper_arm",
+    "elbow": "forearm",
+    "wrist": "hand",
+}
+"""Joint to the segment whose head it is."""
+
+
+def _settle_ambiguities(
+    limb: dict[str, str], names: list[BoneName], bones: Mapping[str, bpy.types.Bone], side: str
+) -> None:
+    """Words that name different bones in different families: `leg` above `knee`, `ankle` above `foot`."""
+    knee, leg = (best(names, (word,), side) for word in ("knee", "leg"))
+    if knee and leg and _is_ancestor(bones, leg, knee):
+        limb["shin"] = knee
+        limb["thigh"] = limb["thigh"] if limb["thigh"] and _is_ancestor(bones, limb["thigh"], leg) else leg
+    ankle, foot = (best(names, (word,), side) for word in ("ankle", "foot"))
+    if ankle and foot and _is_ancestor(bones, ankle, foot):
+        limb["foot"] = ankle
+        limb["toe"] = limb["toe"] if limb["toe"] and not _is_ancestor(bones, foot, limb["toe"]) else foot
+    toe, foot = limb["toe"], limb["foot"]
+    if toe and foot and (_is_ancestor(bones, toe, foot) or bones[foot].use_deform > bones[toe].use_deform):
+        limb["toe"] = ""
+
+
+_HIPS_OF_SOME = ("root", "cog", "spine")
+"""Words that mean the hips in some rigs and another place in others; where the thighs begin decides."""
+
+
+def _map_trunk(
+    names: list[BoneName], bones: Mapping[str, bpy.types.Bone], limbs: Mapping[str, BoneEnd]
+) -> dict[str, BoneEnd]:
+    """Hips, spine, neck and head; the hips may also be where the thighs meet."""
+    found = {joint: best(names, words, "") for joint, words in TRUNK.items()}
+    thighs = [bones[limbs[joint][0]] for joint in ("hip_l", "hip_r") if joint in limbs]
+    if not found["hips"] or not bones[found["hips"]].use_deform:
+        candidates = [found["hips"], *(best(names, (word,), "") for word in _HIPS_OF_SOME)]
+        candidates.append(_common_ancestor([thigh.name for thigh in thighs], bones))
+        found["hips"] = _nearest_to_thighs([bone for bone in candidates if bone], thighs, bones)
+    top = found["neck"] or found["head"]
+    if found["hips"] and top:
+        chain = _ancestors(bones, top)
+        if found["hips"] in chain:
+            above = chain[: chain.index(found["hips"])]
+            words = {name.bone: name.word for name in names}
+            trunk = [bone for bone in above if words.get(bone) not in TRUNK["neck"]]
+            found["spine"] = trunk[-1] if trunk else ""
+    if found["spine"] == found["hips"]:
+        spines = sorted(
+            (name.number, name.bone)
+            for name in names
+            if name.word == "spine" and name.deforms and name.bone != found["hips"]
+        )
+        found["spine"] = spines[0][1] if spines else ""
+    return {joint: (bone, "head") for joint, bone in found.items() if bone}
+
+
+def _ancestors(bones: Mapping[str, bpy.types.Bone], name: str) -> list[str]:
+    """Names of a bone's parents, nearest first."""
+    return [bone.name for bone in bones[name].parent_recursive]
+
+
+def _is_ancestor(bones: Mapping[str, bpy.types.Bone], ancestor: str, descendant: str) -> bool:
+    return ancestor in _ancestors(bones, descendant)
+
+
+def _common_ancestor(names: list[str], bones: Mapping[str, bpy.types.Bone]) -> str:
+    """Nearest bone that all of the given ones hang from; empty if there is none."""
+    if not names:
+        return ""
+    chains = [_ancestors(bones, name) for name in names]
+    return next((bone for bone in chains[0] if all(bone in chain for chain in chains)), "")
+
+
+def _nearest_to_thighs(candidates: list[str], thighs: list[bpy.types.Bone], bones: Mapping[str, bpy.types.Bone]) -> str:
+    """The bone that starts nearest to the middle between the thighs, deforming ones first; empty without candidates."""
+    if not thighs or not candidates:
+        return candidates[0] if candidates else ""
+    middle = sum((thigh.head_local for thigh in thighs), start=Vector()) / len(thighs)
+    return min(candidates, key=lambda name: (not bones[name].use_deform, (bones[name].head_local - middle).length))

@@ -1,0 +1,351 @@
+"""What a rig does over a range of frames, as a `CharacterMotion`; the user's scene is only read.
+
+The rig is evaluated in a temporary scene that depends on nothing else: constraints, drivers, NLA, parents and object
+motion act as in the user's scene, its meshes cost nothing, and the user's frame, pose and handlers are left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.motion import CharacterMotion
+from ..animation_layer.nla_layer import without_layer
+from ..compat import remove_scene
+from ..settings import frame_rate_of, gravity_of
+from .motion_assembly import Recording, assemble_motion
+from .rig_mapping import RigMapping, SoleSource, require_armature
+from .solid_extraction import check_things, solid_motion
+
+Sampling = Generator[int, None, CharacterMotion]
+"""Yields the number of frames read so far, returns the motion."""
+
+_SCALE_TOLERANCE = 1e-3
+"""Relative difference of scale between axes, and cosine between them, that still counts as uniform."""
+
+_FARTHEST = 1e6
+"""Largest coordinate that a pose may have [Blender units]: single precision knows no centimetres beyond."""
+
+TEMPORARY = "SoftGround Sampling"
+"""Name of what exists only while a rig is read."""
+
+_SCENE_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
+"""Render settings that decide which time a frame number means."""
+
+_SILENT_HANDLERS = ("frame_change_pre", "frame_change_post", "depsgraph_update_pre", "depsgraph_update_post")
+"""Handlers that must not take the temporary scene for a change of the user's frame."""
+
+
+def sample_character(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    mapping: RigMapping,
+    *,
+    mass: float,
+    frames: range,
+) -> Sampling:
+    """Read a character frame by frame.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        The user's scene: frame rate, units, gravity and meshes; only read.
+    armature : bpy.types.Object
+        May be linked or overridden.
+    mapping : RigMapping
+        From `rig_mapping.map_rig`, corrected by the user or not.
+    mass : float
+        [kg]
+    frames : range
+        Scene frames.
+
+    Yields
+    ------
+    int
+        Number of frames read; closing the generator at any point leaves nothing behind.
+
+    Returns
+    -------
+    CharacterMotion
+
+    Raises
+    ------
+    InputError
+        If the rig cannot be used as it is; the message names the object and the remedy.
+    """
+    _check_input(scene, armature, mapping, mass)
+    _check_frames(frames)
+    bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
+    things = dict.fromkeys(source.object for source in mapping.soles if source.object)
+    recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
+    _check_recording(armature.name, recording)
+    carried = {
+        source.name: solid_motion(scene, source, recording.things[source.object])[0]
+        for source in mapping.soles
+        if source.object
+    }
+    return (yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried))
+
+
+def sample_thing(
+    scene: bpy.types.Scene,
+    name: str,
+    mapping: RigMapping,
+    *,
+    mass: float,
+    frames: range,
+) -> Sampling:
+    """Read frame by frame a thing without a rig: one or more objects that fall, roll or slide together.
+
+    Parameters
+    ----------
+    name : str
+        What the user calls it.
+    mapping : RigMapping
+        Its soles are objects.
+    scene, mass, frames
+        As for `sample_character`; and so is what it yields, returns and raises.
+    """
+    _check_mass(name, mass)
+    sources = tuple(source for source in mapping.soles if source.object)
+    check_things(scene, name, sources)
+    _check_frames(frames)
+    things = list(dict.fromkeys(source.object for source in sources))
+    recording = yield from _evaluate(scene, "", frames, [], things)
+    _check_finite(name, recording)
+    parts = [solid_motion(scene, source, recording.things[source.object]) for source in sources]
+    volumes = np.array([volume for _, volume in parts])
+    shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
+    motions = tuple(motion for motion, _ in parts)
+    return CharacterMotion(
+        name=name,
+        mass=mass,
+        leg_length=max(motion.sole.solid.size for motion in motions if motion.sole.solid),
+        frames=recording.frames,
+        frame_rate=frame_rate_of(scene),
+        soles=motions,
+        gravity=gravity_of(scene),
+        centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
+    )
+
+
+def _bones(source: SoleSource) -> list[str]:
+    return [bone for bone in (source.bone, source.toe_bone) if bone]
+
+
+def _evaluate(
+    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], things: Sequence[str]
+) -> Generator[int, None, Recording]:
+    """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
+    bone_matrices = np.empty((len(frames), len(bones), 4, 4))
+    thing_matrices = np.empty((len(frames), len(things), 4, 4))
+    armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
+    simulated = any(is_simulated(object_named(thing)) for thing in things)
+    source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, things)
+    with source as name:
+        for frame in _simulated_before(scene, frames.start) if simulated else ():
+            with handlers_silent():
+                _still_there(name).frame_set(frame)
+            yield 0
+        for done, frame in enumerate(frames):
+            temporary = _still_there(name)
+            with handlers_silent(), without_layer(object_named(armature)) if armature else nullcontext():
+                temporary.frame_set(frame)
+                depsgraph = temporary.view_layers[0].depsgraph
+                assert depsgraph is not None
+                if armature:
+                    evaluated = object_named(armature).evaluated_get(depsgraph)
+                    armature_matrices[done] = evaluated.matrix_world
+                    pose = evaluated.pose.bones
+                    if done == 0:
+                        places = [pose.find(bone) for bone in bones]
+                        buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
+                    pose.foreach_get("matrix", buffer.reshape(-1))
+                    bone_matrices[done] = buffer[places]
+            for place, thing in enumerate(things):
+                thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
+            yield done + 1
+    yield len(frames)
+
+    metre = scene.unit_settings.scale_length
+    bone_matrices = armature_matrices[:, None] @ np.swapaxes(bone_matrices, -1, -2)  # foreach_get goes by columns
+    for matrices in (bone_matrices, thing_matrices, armature_matrices):
+        matrices[..., :3, :] *= metre
+    return Recording(
+        frames=np.array(frames, dtype=float),
+        bones={bone: bone_matrices[:, place] for place, bone in enumerate(bones)},
+        things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
+        armature=armature_matrices,
+    )
+
+
+@contextmanager
+def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], things: Sequence[str]) -> Iterator[str]:
+    """Name of a scene in which only the given bones and objects are evaluated; gone afterwards, whatever happens.
+
+    It holds a probe that depends on them instead of themselves: so they are evaluated even where the user hides them,
+    and the objects' meshes are not.
+    """
+    temporary = bpy.data.scenes.new(TEMPORARY)
+    probe = bpy.data.objects.new(TEMPORARY, None)
+    names = temporary.name, probe.name
+    try:
+        for setting in _SCENE_TIME:
+            setattr(temporary.render, setting, getattr(scene.render, setting))
+        for thing, bone in (*((armature, bone) for bone in bones), *((thing, "") for thing in things)):
+            dependence = probe.constraints.new("COPY_LOCATION")
+            dependence.target, dependence.subtarget = object_named(thing), bone
+        temporary.collection.objects.link(probe)
+        yield names[0]
+    finally:
+        with handlers_silent():
+            if (left_scene := bpy.data.scenes.get(names[0])) is not None:
+                remove_scene(left_scene)
+            if (left_probe := bpy.data.objects.get(names[1])) is not None:
+                bpy.data.objects.remove(left_probe)
+
+
+def is_simulated(thing: bpy.types.Object) -> bool:
+    """Whether Blender's rigid bodies move an object, or one that it is parented to."""
+    node: bpy.types.Object | None = thing
+    while node is not None:
+        if node.rigid_body and node.rigid_body.type == "ACTIVE":
+            return True
+        node = node.parent
+    return False
+
+
+@contextmanager
+def user_scene(scene: bpy.types.Scene) -> Iterator[str]:
+    """Name of the user's scene, which is put back to its frame afterwards."""
+    shown = scene.frame_current, scene.frame_subframe
+    name = scene.name
+    try:
+        yield name
+    finally:
+        left = bpy.data.scenes.get(name)
+        if left is not None:
+            with handlers_silent():
+                left.frame_set(shown[0], subframe=shown[1])
+
+
+def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
+    """Frames to step through before the first one.
+
+    Rigid bodies exist in their own scene only, and only frame after frame. Those that are baked are read from their
+    cache.
+    """
+    world = scene.rigidbody_world
+    return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)
+
+
+def _still_there(name: str) -> bpy.types.Scene:
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
+    return scene
+
+
+def object_named(name: str) -> bpy.types.Object:
+    """Object by its full name, which tells linked ones from local ones."""
+    found = bpy.data.objects.get(name)
+    if found is None or found.name_full != name:
+        found = next((thing for thing in bpy.data.objects if thing.name_full == name), None)
+    if found is None:
+        raise InputError(f"Object '{name}' is gone: choose another one for the character.")
+    return found
+
+
+@contextmanager
+def handlers_silent() -> Iterator[None]:
+    """Frame and update handlers put aside, and put back as they were."""
+    lists = [getattr(bpy.app.handlers, name) for name in _SILENT_HANDLERS]
+    saved = [list(handlers) for handlers in lists]
+    for handlers in lists:
+        handlers.clear()
+    try:
+        yield
+    finally:
+        for handlers, functions in zip(lists, saved, strict=True):
+            handlers[:] = functions
+
+
+def _check_frames(frames: range) -> None:
+    if not frames or frames.step < 0:
+        raise InputError(f"The frame range {frames.start} to {frames.stop - 1} is empty: set a start before the end.")
+
+
+def _check_mass(name: str, mass: float) -> None:
+    if not (np.isfinite(mass) and mass > 0):
+        raise InputError(f"The mass of '{name}' is {mass} kg: give it a positive mass.")
+
+
+def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
+    require_armature(armature)
+    name = armature.name
+    _check_mass(name, mass)
+    if not mapping.soles:
+        raise InputError(f"'{name}' has no soles: add a foot bone or an object to the character's list of soles.")
+    bones = armature.data.bones
+    for source in mapping.soles:
+        if not source.bone and not source.object:
+            raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
+    check_things(scene, name, mapping.soles)
+    missing = [
+        b
+        for b in [*(b for s in mapping.soles for b in _bones(s)), *(b for b, _ in mapping.joints.values())]
+        if b not in bones
+    ]
+    if missing:
+        raise InputError(f"Armature '{name}' has no bone '{missing[0]}': choose the bones of the character again.")
+    if armature.mode == "EDIT":
+        raise InputError(f"Armature '{name}' is in edit mode and stands still: leave edit mode.")
+    if armature.data.pose_position == "REST":
+        raise InputError(f"Armature '{name}' shows its rest position: set it to Pose Position in its data properties.")
+    if not is_animated(armature):
+        raise InputError(f"Armature '{name}' has no animation: give it an action, or choose the armature that has one.")
+
+
+def is_animated(armature: bpy.types.Object) -> bool:
+    """Whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
+    thing: bpy.types.Object | None = armature
+    while thing is not None:
+        animation = thing.animation_data
+        if animation and (animation.action or animation.drivers or any(track.strips for track in animation.nla_tracks)):
+            return True
+        if thing.constraints or (thing.type == "ARMATURE" and any(bone.constraints for bone in thing.pose.bones)):
+            return True
+        thing = thing.parent
+    return bool(armature.data.animation_data)
+
+
+def _check_finite(name: str, recording: Recording) -> None:
+    for matrices in (recording.armature, *recording.bones.values(), *recording.things.values()):
+        bad = ~(np.abs(matrices) <= _FARTHEST).all(axis=(1, 2))
+        if bad.any():
+            raise InputError(
+                f"'{name}' has no finite pose at frame {int(recording.frames[bad.argmax()])}: "
+                "look for broken keys (NaN, infinite or huge values) in its action and delete them."
+            )
+
+
+def _check_recording(name: str, recording: Recording) -> None:
+    _check_finite(name, recording)
+    axes = recording.armature[:, :3, :3]
+    gram = np.swapaxes(axes, -1, -2) @ axes
+    size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
+    if (size < 1e-9).any():
+        raise InputError(f"'{name}' has a scale of zero: set its scale, or apply it (Object > Apply > Scale).")
+    spread = np.ptp(size, axis=-1) > _SCALE_TOLERANCE * size.max(axis=-1)
+    cosines = gram / (size[:, :, None] * size[:, None, :])
+    sheared = np.abs(cosines - np.eye(3)).max(axis=(1, 2)) > _SCALE_TOLERANCE
+    if spread.any() or sheared.any():
+        values = ", ".join(f"{value:.4g}" for value in size[spread | sheared][0])
+        raise InputError(
+            f"'{name}' is stretched or sheared (scale {values}): "
+            "make its scale the same along all axes, or apply it (Object > Apply > Scale), also on its parents."
+        )

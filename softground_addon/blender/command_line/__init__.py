@@ -1,0 +1,1 @@
+"""`softground bake`, `softground batch` and the others."""

@@ -1,0 +1,330 @@
+"""Bakes of a batch side by side, each in a Blender process of its own: started, followed, retried, ended with us.
+
+Nothing here imports bpy: a worker is any program that takes the options of `softground bake` and shows its progress as
+JSON lines.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import shlex
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from ...core import files, receipts
+from ...core.errors import InputError
+from ...core.manifest import BatchShot
+
+try:
+    import fcntl
+except ImportError:  # Windows: two batches over one manifest are not kept apart there
+    fcntl = None  # type: ignore[assignment]
+
+ATTEMPTS = 2
+"""How often a shot is tried whose process crashes."""
+
+EXIT_MEANINGS = {0: "done", 2: "refused", 3: "failed"}
+"""What a worker's exit code says of its shot; every other code is a crash."""
+
+PATIENCE = 10.0
+"""Time that a worker has to end by itself, as is asked of it when the batch is interrupted or was killed [s]."""
+
+ALGEBRA_THREADS = "OPENBLAS_NUM_THREADS"
+"""What tells numpy's linear algebra how many threads to use. One in each worker is as fast, leaves the other processors
+to other shots, and gives the same bits however many jobs there are."""
+
+POLL = 0.25
+"""Longest time between two looks at signals and deadlines [s]."""
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where and by what a batch is baked.
+
+    Attributes
+    ----------
+    state : Path
+        Folder of receipts, logs and locks; created when missing.
+    made_by : str
+        Versions of the programs that bake: results of others are not taken as done.
+    command : callable
+        The command line of a worker, from the shot's file and the options of its bake.
+    """
+
+    state: Path
+    made_by: str
+    command: Callable[[Path, list[str]], list[str]]
+
+    def receipt(self, shot: BatchShot) -> Path:
+        """The shot's receipt (see `core.receipts`)."""
+        return self.state / f"{shot.name}.json"
+
+    def log(self, shot: BatchShot) -> Path:
+        """Everything that the shot's workers have printed."""
+        return self.state / f"{shot.name}.log"
+
+    def lock(self, shot: BatchShot) -> Path:
+        """Held by whoever bakes the shot."""
+        return self.state / f"{shot.name}.lock"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the bake of one shot ended.
+
+    Attributes
+    ----------
+    shot : BatchShot
+    status : str
+        'done', 'skipped' (it was done already), 'refused' (bad input), 'failed' (a check), 'crashed', or 'interrupted'.
+    attempts : int
+        Processes that were started for it.
+    seconds : float
+        Time that they took [s].
+    totals : dict
+        What the worker said at its end: steps, depth, force.
+    message : str
+        The error that it named.
+    """
+
+    shot: BatchShot
+    status: str
+    attempts: int = 0
+    seconds: float = 0.0
+    totals: dict[str, Any] = field(default_factory=dict)
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """How far a running bake is.
+
+    Attributes
+    ----------
+    shot : BatchShot
+    stage : str
+    fraction : float
+        Of the whole bake, 0 to 1.
+    seconds_left : float
+        As estimated from the time it took so far [s].
+    """
+
+    shot: BatchShot
+    stage: str
+    fraction: float
+    seconds_left: float
+
+
+@dataclass
+class _Worker:
+    shot: BatchShot
+    process: subprocess.Popen[bytes]
+    attempt: int
+    spent: float
+    lock: IO[bytes]
+    started: float
+    totals: dict[str, Any] = field(default_factory=dict)
+    message: str = ""
+    timed_out: bool = False
+
+    @property
+    def seconds(self) -> float:
+        return self.spent + time.monotonic() - self.started
+
+
+def run(
+    shots: Sequence[BatchShot],
+    workplace: Workplace,
+    *,
+    jobs: int,
+    timeout: float | None = None,
+    show: Callable[[Step | Outcome], None],
+) -> list[Outcome]:
+    """Bake shots, at most `jobs` at a time; each ends in one outcome, in the order of `shots`.
+
+    A shot that is done already is skipped, one whose process crashes (or takes longer than `timeout` seconds) is tried
+    once more. On KeyboardInterrupt the running workers are asked to end, and what is not done is 'interrupted'.
+
+    Raises
+    ------
+    InputError
+        If the folder of receipts and logs cannot be written.
+    """
+    try:
+        workplace.state.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"'{workplace.state}' cannot be written ({error.strerror}): choose another --state.") from None
+    return _Batch(workplace, jobs, timeout, show).run(shots)
+
+
+class _Batch:
+    def __init__(
+        self, workplace: Workplace, jobs: int, timeout: float | None, show: Callable[[Step | Outcome], None]
+    ) -> None:
+        self._workplace = workplace
+        self._jobs = jobs
+        self._timeout = timeout
+        self._show = show
+        self._running: dict[str, _Worker] = {}
+        self._outcomes: dict[str, Outcome] = {}
+        self._lines: queue.Queue[tuple[_Worker, bytes | None]] = queue.Queue()
+
+    def run(self, shots: Sequence[BatchShot]) -> list[Outcome]:
+        waiting = deque(shots)
+        try:
+            while waiting or self._running:
+                while waiting and len(self._running) < self._jobs:
+                    self._begin(waiting.popleft())
+                self._follow()
+        except KeyboardInterrupt:
+            for worker in list(self._running.values()):
+                self._end(Outcome(worker.shot, "interrupted", worker.attempt, worker.seconds))
+        finally:
+            self._stop_workers()
+        return [self._outcomes.get(shot.name, Outcome(shot, "interrupted")) for shot in shots]
+
+    def _begin(self, shot: BatchShot, attempt: int = 1, spent: float = 0.0, lock: IO[bytes] | None = None) -> None:
+        """Start a worker for a shot, unless the shot is done."""
+        place = self._workplace
+        try:
+            lock = lock or _locked(place.lock(shot))
+            totals = self._totals_if_done(shot)
+            if totals is not None:  # after a crash: it had done its work before
+                lock.close()
+                self._end(Outcome(shot, "done" if attempt > 1 else "skipped", attempt - 1, spent, totals))
+                return
+            for path in (*shot.outputs, place.receipt(shot)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                files.remove_leftovers(path)
+            command = place.command(
+                shot.file,
+                [*shot.options, "--progress=json", f"--receipt={place.receipt(shot)}", f"--parent={os.getpid()}"],
+            )
+            log = place.log(shot).open("ab" if attempt > 1 else "wb")
+            log.write(f"$ {shlex.join(command)}\n".encode())
+            log.flush()
+            inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # who outlives us keeps the lock
+            started = time.monotonic()
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C comes to us alone, and we pass it on
+                env={ALGEBRA_THREADS: "1", **os.environ},
+                **inherited,  # type: ignore[call-overload]
+            )
+        except OSError as error:
+            if lock:
+                lock.close()
+            self._end(Outcome(shot, "refused", attempt - 1, spent, message=f"{error.filename}: {error.strerror}"))
+            return
+        worker = _Worker(shot, process, attempt, spent, lock, started)
+        self._running[shot.name] = worker
+        threading.Thread(target=self._read, args=(worker, log), daemon=True).start()
+
+    def _totals_if_done(self, shot: BatchShot) -> dict[str, Any] | None:
+        place = self._workplace
+        return receipts.totals_if_done(
+            place.receipt(shot), made_by=place.made_by, options=shot.options, source=shot.file, outputs=shot.outputs
+        )
+
+    def _read(self, worker: _Worker, log: IO[bytes]) -> None:
+        assert worker.process.stdout is not None
+        with log, worker.process.stdout as lines:
+            for line in lines:
+                with contextlib.suppress(OSError):  # a full disk must not stop the worker at a full pipe
+                    if not line.startswith(b"{"):
+                        log.write(line)
+                        log.flush()
+                self._lines.put((worker, line))
+        self._lines.put((worker, None))
+
+    def _follow(self) -> None:
+        """Take one line of a worker, or notice that it has ended or takes too long."""
+        self._end_the_late()
+        try:
+            worker, line = self._lines.get(timeout=POLL)
+        except queue.Empty:
+            return
+        if line is None:
+            self._ended(worker)
+        elif line.startswith(b"{"):
+            self._progress(worker, line)
+        elif line.startswith(b"softground: "):
+            worker.message = line.decode(errors="replace").strip().removeprefix("softground: ")
+
+    def _progress(self, worker: _Worker, line: bytes) -> None:
+        try:
+            said = json.loads(line)
+            stage, fraction = str(said["stage"]), float(said["overall"])
+        except (ValueError, KeyError, TypeError):
+            return
+        worker.totals = said.get("totals", worker.totals)
+        passed = time.monotonic() - worker.started
+        left = passed * (1.0 - fraction) / max(fraction, 0.01)
+        self._show(Step(worker.shot, stage, fraction, left))
+
+    def _end_the_late(self) -> None:
+        for worker in self._running.values():
+            if self._timeout and time.monotonic() - worker.started > self._timeout:
+                worker.timed_out = True
+                worker.process.kill()
+
+    def _ended(self, worker: _Worker) -> None:
+        code = worker.process.wait()
+        del self._running[worker.shot.name]
+        status = EXIT_MEANINGS.get(code, "crashed")
+        if status == "crashed" and worker.attempt < ATTEMPTS:
+            self._begin(worker.shot, worker.attempt + 1, worker.seconds, worker.lock)
+            return
+        worker.lock.close()
+        message = worker.message
+        if status == "crashed":
+            said = f"took longer than {self._timeout:g} s" if worker.timed_out else f"ended with code {code}"
+            message = f"{said}; see '{self._workplace.log(worker.shot)}'"
+        self._end(Outcome(worker.shot, status, worker.attempt, worker.seconds, worker.totals, message))
+
+    def _end(self, outcome: Outcome) -> None:
+        self._outcomes[outcome.shot.name] = outcome
+        self._show(outcome)
+
+    def _stop_workers(self) -> None:
+        workers = list(self._running.values())
+        self._running.clear()
+        for worker in workers:
+            worker.process.terminate()
+        deadline = time.monotonic() + PATIENCE
+        for worker in workers:
+            try:
+                worker.process.wait(timeout=max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                worker.process.kill()
+                worker.process.wait()
+            worker.lock.close()
+
+
+def _locked(path: Path) -> IO[bytes]:
+    """The lock file, locked; waits for a worker that a killed batch has left behind and that is about to end."""
+    lock = path.open("ab")
+    deadline = time.monotonic() + PATIENCE
+    while fcntl is not None:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > deadline:
+                lock.close()
+                raise OSError(0, "another process is baking this shot", str(path)) from None
+            time.sleep(POLL)
+        else:
+            break
+    return lock

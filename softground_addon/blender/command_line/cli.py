@@ -1,0 +1,315 @@
+"""The command line: `softground bake`, `export` and `batch`, in `blender --command` and with the bpy module alike."""
+
+from __future__ import annotations
+
+import _thread
+import argparse
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core import files, presets, receipts, report
+from ...core.errors import BakeError, InputError, SoftGroundError
+from ...core.manifest import BatchShot
+from .. import jobs, settings
+from ..baking import bake_job
+from ..characters.character_setup import set_up_automatically
+from ..output import export_formats
+from ..settings import user_folder
+from . import batch, cli_arguments
+
+EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
+
+PARENT_POLL = 0.5
+"""Time between two looks at whether the parent process is there [s]."""
+
+_INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+def run_in_blender(arguments: Sequence[str]) -> int:
+    """Entry of `blender -b shot.blend --command softground ...`: acts on the open file."""
+    return _run(arguments, standalone=False)
+
+
+def run_standalone(arguments: Sequence[str]) -> int:
+    """Entry of `python -m softground_addon ...`, where the add-on is registered: opens the file and acts on it."""
+    return _run(arguments, standalone=True)
+
+
+def _run(arguments: Sequence[str], *, standalone: bool) -> int:
+    previous = {number: signal.signal(number, _interrupt) for number in _INTERRUPTS}
+    try:
+        options = cli_arguments.parse(arguments, standalone=standalone)
+        if options.command == "batch":
+            return _batch_code(batch.bake_batch(options))
+        if options.command == "export":
+            _export(options)
+        else:
+            with _ending_with(options.parent):
+                _bake(options)
+    except SystemExit as leaving:  # argparse has printed its message
+        return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
+    except BakeError as error:
+        print(f"softground: {error}", file=sys.stderr)
+        return EXIT_FAILED_CHECK
+    except SoftGroundError as error:
+        print(f"softground: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        previous.clear()  # the process is about to end: a second signal must not spoil that
+        print("softground: interrupted; nothing was written.", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler or signal.SIG_DFL)  # none: Blender's own, which Python cannot name
+    return EXIT_DONE
+
+
+def _interrupt(_number: int, _frame: object) -> None:
+    for number in _INTERRUPTS:
+        signal.signal(number, signal.SIG_IGN)  # once is enough: what follows is the cleaning up
+    raise KeyboardInterrupt
+
+
+def _batch_code(outcomes: Sequence[batch.Outcome]) -> int:
+    """The exit code of a batch: that of its worst shot."""
+    statuses = {outcome.status for outcome in outcomes}
+    if "interrupted" in statuses:
+        print("softground: interrupted; the same command goes on where it stopped.", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if statuses & {"crashed", "failed"}:
+        return EXIT_FAILED_CHECK
+    return EXIT_BAD_INPUT if "refused" in statuses else EXIT_DONE
+
+
+def _bake(options: argparse.Namespace) -> None:
+    if not (options.save or options.in_place or options.report or options.dry_run):
+        raise InputError("Nothing would be kept: give --save FILE.blend, --in-place, --report FILE.json or --dry-run.")
+    if options.blend is not None:
+        _open(options.blend)
+    read = receipts.checksums(_files_read(options)) if options.receipt else {}
+    scene = _scene(options.scene)
+    target = _save_target(options)
+    _check_places(options, target)
+    set_up_automatically(scene)
+    if options.preset:
+        settings.apply_preset(scene, _preset(options.preset))
+    if options.frames:
+        scene.softground.frame_start, scene.softground.frame_end = options.frames
+    if options.cell_size is not None:
+        settings.assign(scene.softground, "cell_size", str(options.cell_size))
+    for path, value in options.overrides:
+        settings.assign(scene.softground, path, value)
+    show = _PROGRESS[options.progress]
+    result = jobs.run(bake_job.bake(scene, write=not options.dry_run), show)
+    _write_results(options, target, result.report, read)
+    if options.progress == "json":
+        said = {"stage": "done", "fraction": 1.0, "overall": 1.0, "totals": result.report["totals"]}
+        print(json.dumps(said), flush=True)
+    if options.progress in ("plain", "openjd"):
+        print(report.summary(result.report), flush=True)
+
+
+def _export(options: argparse.Namespace) -> None:
+    if options.blend is not None:
+        _open(options.blend)
+    scene = _scene(options.scene)
+    path = options.output.absolute() if options.output else export_formats.default_path(scene, options.format)
+    start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
+    if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:
+        raise InputError(f"--resolution takes a number from 1 to {export_formats.LARGEST_IMAGE}.")
+    how = export_formats.Options(
+        options.format,
+        export_formats.with_suffix(path, options.format),
+        start,
+        end,
+        options.resolution,
+        options.uv_map,
+        options.outdated,
+    )
+    for written in export_formats.export(scene, how):
+        print(written, flush=True)
+
+
+@contextlib.contextmanager
+def _ending_with(parent: int) -> Iterator[None]:
+    """Interrupt the block when the parent process of that id has ended; 0 is none. Does nothing on Windows."""
+    over = threading.Event()
+
+    def watch() -> None:
+        while not over.wait(PARENT_POLL):
+            if os.getppid() != parent:
+                _thread.interrupt_main()
+                return
+
+    watcher = threading.Thread(target=watch)
+    if parent and os.name == "posix":
+        watcher.start()
+    try:
+        yield
+    finally:
+        over.set()  # a thread that is left behind would hang Blender's exit
+        if watcher.ident:
+            watcher.join()
+
+
+def _files_read(options: argparse.Namespace) -> list[Path]:
+    """The opened file, what it links, and the preset file."""
+    linked = [(item.filepath, item.library) for item in (*bpy.data.libraries, *bpy.data.cache_files)]
+    paths = [bpy.path.abspath(path, library=library) for path, library in linked]
+    if options.preset and options.preset.lower().endswith(".json"):
+        paths.append(options.preset)
+    return [Path(os.path.realpath(path)) for path in (bpy.data.filepath, *paths) if path]
+
+
+def _write_results(
+    options: argparse.Namespace, target: Path | None, content: dict[str, Any], read: dict[str, str]
+) -> None:
+    """Write shot and report whole under other names, then the receipt, and give them their names at the very end."""
+    with contextlib.ExitStack() as results:
+        wrote: dict[Path, Path] = {}
+        if target and not options.dry_run:
+            wrote[target] = results.enter_context(files.replacing(target))
+            _save_copy(wrote[target])
+        if options.report:
+            path = Path(os.path.realpath(options.report))
+            wrote[path] = results.enter_context(files.replacing(path))
+            wrote[path].write_text(report.dump(content), encoding="utf-8")
+        if options.receipt:
+            receipts.write(
+                options.receipt,
+                made_by=batch.made_by(),
+                options=_batch_shot(options, target).options,
+                read=read,
+                wrote={str(path): receipts.checksum(partial) for path, partial in wrote.items()},
+                totals=content["totals"],
+            )
+
+
+def _open(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(f"There is no file '{path}'.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise InputError(f"'{path}' could not be opened as a .blend file: {str(error).strip()}") from None
+
+
+def _scene(name: str | None) -> bpy.types.Scene:
+    if not name:
+        return settings.scene_of(bpy.context)
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        known = ", ".join(f"'{scene.name}'" for scene in bpy.data.scenes)
+        raise InputError(f"There is no scene '{name}' in the shot. There are: {known}.")
+    return scene
+
+
+def _preset(name_or_path: str) -> presets.Preset:
+    path = Path(name_or_path)
+    return (
+        presets.load(path)
+        if path.suffix.lower() == ".json"
+        else presets.find(name_or_path, (presets.FOLDER, user_folder()))
+    )
+
+
+def _save_target(options: argparse.Namespace) -> Path | None:
+    """Where the shot goes."""
+    if options.in_place:
+        if not bpy.data.filepath:
+            raise InputError("--in-place needs a shot that was opened from a file: give --save FILE.blend instead.")
+        return Path(os.path.realpath(bpy.data.filepath))
+    return options.save.resolve() if options.save else None
+
+
+def _check_places(options: argparse.Namespace, target: Path | None) -> None:
+    """Raise InputError unless all results can be written, each to a place of its own, and over no file that is read."""
+    places = [Path(os.path.realpath(path)) for path in (target, options.report, options.receipt) if path]
+    for path in places:
+        files.check_place(path)
+        if places.count(path) > 1:
+            raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
+    read, opened = _files_read(options), Path(os.path.realpath(bpy.data.filepath))
+    for path in places:
+        if path in read and not path == opened == target:
+            raise InputError(f"'{path}' is read by this bake and would be lost: write to another file.")
+
+
+def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:
+    """This bake as a manifest would say it."""
+    return BatchShot(
+        name="",
+        file=Path(bpy.data.filepath),
+        scene=options.scene or "",
+        preset=options.preset or "",
+        frames=options.frames,
+        cell_size=options.cell_size,
+        settings=tuple(options.overrides),
+        save=None if options.in_place else target,
+        in_place=options.in_place,
+        report=Path(os.path.realpath(options.report)) if options.report else None,
+    )
+
+
+def _save_copy(path: Path) -> None:
+    """Save the open file under `path`, compressed if the opened file was.
+
+    Raises
+    ------
+    InputError
+        If it could not be written.
+    """
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=_is_compressed(bpy.data.filepath))
+    except RuntimeError as error:
+        raise InputError(f"The baked shot could not be saved: {str(error).strip()}") from None
+
+
+def _is_compressed(path: str) -> bool:
+    if not path or not Path(path).is_file():
+        return False
+    with Path(path).open("rb") as blend:
+        return blend.read(7) != b"BLENDER"
+
+
+class _Plain:
+    """A line for each stage and each tenth of it."""
+
+    def __init__(self) -> None:
+        self.shown = ""
+
+    def __call__(self, progress: jobs.Progress) -> None:
+        line = f"{progress.stage} {int(progress.fraction * 10) * 10} %"
+        if line != self.shown:
+            self.shown = line
+            print(line, flush=True)
+
+
+def _json(progress: jobs.Progress) -> None:
+    fraction, overall = round(progress.fraction, 4), round(progress.overall, 4)
+    print(json.dumps({"stage": progress.stage, "fraction": fraction, "overall": overall}), flush=True)
+
+
+def _openjd(progress: jobs.Progress) -> None:
+    print(f"openjd_progress: {progress.overall * 100:.1f}\nopenjd_status: {progress.stage}", flush=True)
+
+
+def _none(_progress: jobs.Progress) -> None:
+    pass
+
+
+_PROGRESS: dict[str, Callable[[jobs.Progress], None]] = {
+    "plain": _Plain(),
+    "json": _json,
+    "openjd": _openjd,
+    "none": _none,
+}

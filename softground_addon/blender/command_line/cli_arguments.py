@@ -1,0 +1,108 @@
+"""What may be typed after `softground`: the options of `bake`, `export` and `batch`."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...core.manifest import frame_range
+from ..output import export_formats
+from . import batch
+
+
+def parse(arguments: Sequence[str], *, standalone: bool) -> argparse.Namespace:
+    """The options of a command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows `softground`.
+    standalone : bool
+        Whether the shot is named among them, as there is no Blender that has opened it.
+
+    Raises
+    ------
+    SystemExit
+        After the help, or what is wrong and how it should be, was printed.
+    """
+    return _parser(standalone=standalone).parse_args(_with_frames_joined(arguments))
+
+
+def _with_frames_joined(arguments: Sequence[str]) -> list[str]:
+    """The arguments with negative frames given as `--frames=-20-5`: alone, they would be taken for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] == "--frames" and re.fullmatch(r"-\d+--?\d+", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
+
+
+def _parser(*, standalone: bool) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="softground", description="Physically based footprints for animated characters."
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    _add_bake(commands.add_parser("bake", help="bake the footprints of a shot"), standalone=standalone)
+    _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
+    batch.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
+    return parser
+
+
+def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
+    if standalone:
+        bake.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file to bake")
+    bake.add_argument("--scene", metavar="NAME", help="scene to bake, if it is not the one that the file opens with")
+    bake.add_argument("--preset", metavar="NAME|FILE.json", help="ground preset")
+    bake.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
+    bake.add_argument("--cell-size", type=float, metavar="M", help="size of the ground's cells in metres")
+    bake.add_argument(
+        "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",
+        help="a setting under scene.softground, e.g. material.youngs_modulus=4e5; may be repeated",
+    )  # fmt: skip
+    destination = bake.add_mutually_exclusive_group()
+    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
+    destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
+    bake.add_argument("--report", type=Path, metavar="FILE.json", help="write the report to this file")
+    bake.add_argument("--progress", choices=batch.PROGRESS_STYLES, default="plain", help="how to show progress")
+    bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
+    bake.add_argument(
+        "--receipt", type=Path, metavar="FILE.json", help="write the checksums of what was read and written"
+    )
+    bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
+    bake.set_defaults(blend=None)
+
+
+def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
+    if standalone:
+        export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
+    export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
+    export.add_argument(
+        "--format", required=True, type=str.upper, choices=tuple(export_formats.FORMATS), help="kind of file"
+    )
+    export.add_argument(
+        "--output", type=Path, metavar="FILE",
+        help="the file; of images their folder and what their names begin with; beside the shot if left out",
+    )  # fmt: skip
+    export.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame; else those baked")
+    export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
+    export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
+    export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
+    export.set_defaults(blend=None)
+
+
+def _frame_range(text: str) -> tuple[int, int]:
+    try:
+        return frame_range(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _override(text: str) -> tuple[str, str]:
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip():
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form PATH=VALUE")
+    return path.strip(), value.strip()

@@ -1,0 +1,199 @@
+"""A bake on a ground, wherever it lies: on the user's own mesh, or on the detail that stands in for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import record
+from ...core.errors import InputError
+from ...core.footprints import Footprint
+from ...core.polylines import Polylines
+from ...core.pressed_ground import GroundSample, PressedGround
+from ..jobs import Job, Progress
+from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
+from .created_ground import Layout
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a bake is to be written. Nothing that the user sees is changed before `publish`.
+
+    Attributes
+    ----------
+    index : (K,) int array
+        Vertices of the carrier's mesh that the bake moves.
+    position : (K, 3) float array
+        Their undisturbed world positions [m].
+    carrier : bpy.types.Object
+        What takes the prints.
+    publish : callable
+        Takes away what stands in its way, and shows the carrier.
+    is_draft : bool
+        Whether the carrier is a new object, in no scene yet.
+    """
+
+    index: Indices
+    position: Array
+    carrier: bpy.types.Object
+    publish: Callable[[], object]
+    is_draft: bool = False
+
+
+def carrier_of(ground: bpy.types.Object) -> bpy.types.Object:
+    """The object that carries the ground's bake: the detail along the trail where there is one, else the ground."""
+    return trail_detail.detail_of(ground) or ground
+
+
+def is_baked(ground: bpy.types.Object) -> bool:
+    """Whether a bake is on this ground."""
+    return ground_mesh.is_baked(carrier_of(ground))
+
+
+def has_remains(ground: bpy.types.Object) -> bool:
+    """Whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
+    return ground_mesh.has_remains(carrier_of(ground)) or trail_detail.hides(ground)
+
+
+def clear(ground: bpy.types.Object) -> None:
+    """Take the bake off the ground: it is what it was before, bit for bit. Without a bake nothing happens.
+
+    Raises
+    ------
+    InputError
+        If the ground or the copy that carries the bake cannot be changed.
+    """
+    for thing in dict.fromkeys((ground, carrier_of(ground))):
+        ground_checks.check_writable(thing)
+    trail_detail.remove(ground)
+    ground_mesh.restore(ground)
+
+
+def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, pressed: PressedGround) -> Place:
+    """A ground that is not in the scene yet."""
+    index = np.flatnonzero(pressed.covers(*layout.vertices[:, :2].T))
+    return Place(index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft), is_draft=True)
+
+
+def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:
+    """A draft of the ground refined along the trail; a bake that lies on the ground itself is taken off."""
+
+    def publish() -> None:
+        ground_mesh.restore(ground)
+        trail_detail.publish(ground, draft)
+
+    there = trail_detail.detail_of(ground)
+    return Place(index, vertices[index], there or draft, publish, is_draft=there is None)
+
+
+def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Place:
+    """The ground itself; a detail that stood in for it is taken away."""
+    return Place(index, vertices[index], ground, partial(trail_detail.remove, ground))
+
+
+def write(
+    place: Place,
+    sample: GroundSample,
+    over_time: Polylines,
+    stored: bytes,
+    *,
+    frame_rate: float,
+    unit_scale: float,
+    time_stretch: float = 1.0,
+    shape_keys: bool = True,
+) -> Job[bpy.types.Object]:
+    """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
+
+    What is there already is written in the last step, a new object in steps before it gets into the scene.
+
+    Parameters
+    ----------
+    place : Place
+    sample : GroundSample
+        The finished ground at the place's positions.
+    over_time : Polylines
+        Of the place's positions.
+    stored : bytes
+        The footprints, from `core.record`.
+    frame_rate : float
+        Scene frames per second [Hz].
+    unit_scale : float
+        Metres per Blender unit.
+    time_stretch : float
+        See `settings.time_stretch_of`.
+    shape_keys : bool
+        See `ground_mesh.write`.
+    """
+    # Nodes count the animation's frames.
+    lines, frame_rate = over_time.stretched(time_stretch), frame_rate * time_stretch
+    sample = sample.moved_at(lines.point)  # what no line moves stays exactly where it is
+    up = ground_mesh.up_of(place.carrier, unit_scale)
+    with playback.timelines(lines, frame_rate) as table:
+        yield Progress("write", 0.9)
+        if not place.is_draft:
+            place.publish()
+        ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+        if place.is_draft:
+            yield Progress("write", 0.9)
+        playback.attach(place.carrier, place.index[lines.point], lines, table, up=up, frame_rate=frame_rate)
+        if place.is_draft:
+            yield Progress("write", 0.9)
+            place.publish()
+    return place.carrier
+
+
+def stored_record(ground: bpy.types.Object) -> memoryview:
+    """The record of a ground's bake as it is stored, in bytes; to be looked at, not to be kept.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record is something else.
+    """
+    stored = ground_mesh.mesh_of(carrier_of(ground)).get(ground_mesh.RECORD)
+    if stored is None:
+        raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
+    try:
+        return memoryview(stored).cast("B")
+    except TypeError:
+        raise InputError(
+            f"The stored record of the footprints on '{ground.name}' was replaced by something else: clear the bake "
+            "and bake again."
+        ) from None
+
+
+def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
+    """The record of a ground's bake: its footprints, and what is known about them.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record is damaged or no longer fits the mesh.
+    """
+    footprints, about = record.load(bytes(stored_record(ground)))
+    return footprints, dict(about)
+
+
+def baked_with(about: dict[str, Any], value: str) -> float:
+    """A value of the material that a bake was made with, such as its `blur_sigma`, in SI units.
+
+    Raises
+    ------
+    InputError
+        If the record does not say.
+    """
+    try:
+        return float(about["inputs"]["material"][value])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            "The stored record of the footprints lacks its material: clear the bake and bake again."
+        ) from None

@@ -1,0 +1,146 @@
+"""The ground that the add-on makes: as large as the walk, fine where feet come down, coarse elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.graded_grid import GradedGrid, graded_grid
+from ...core.ground_plan import GroundPlan
+from .. import settings
+from .ground_mesh import discard, mesh_of, write_positions
+from .materials import ensure_material
+
+Array = NDArray[np.float64]
+
+MAX_GRID_VERTICES = 4_000_000
+"""Most vertices that a created grid gets; a longer walk gets a coarser mesh (the physics keeps its cells)."""
+
+COARSEST = 0.4
+"""Side of the largest faces, far from the trail [m]: what follows vertices, such as paint, still has some. Larger only
+where so many would exceed `MAX_GRID_VERTICES`, as between characters that are kilometres apart."""
+
+BLUR_REACH = 3.0
+"""How far the display blur carries, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A ground before there is a mesh of it.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        World positions [m].
+    local : (V, 3) float32 array
+        Positions in the object's own space and units.
+    location : (3,) float32 array
+        Of the object, in Blender units.
+    corner_vertex, face_size : int arrays
+        See `GradedGrid`.
+    """
+
+    vertices: Array
+    local: NDArray[np.float32]
+    location: NDArray[np.float32]
+    corner_vertex: NDArray[np.intp]
+    face_size: NDArray[np.intp]
+
+
+def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
+    """A new ground with the material of the scene's preset, set as the scene's ground."""
+    layout = lay_out(plan, settings.cell_size_of(scene), scene.unit_settings.scale_length, reach=reach_for(scene))
+    with draft(layout) as ground:
+        publish(scene, ground)
+    return ground
+
+
+def reach_for(scene: bpy.types.Scene) -> float:
+    """How far beyond the soles the scene's material moves the ground [m]."""
+    material = settings.material_of(scene)
+    return material.rim_reach + BLUR_REACH * material.blur_sigma
+
+
+def lay_out(plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: float = 0.0) -> Layout:
+    """A plane ground whose vertices sit on the centres of the cells.
+
+    Parameters
+    ----------
+    plan : GroundPlan
+        Without footfalls, the ground is equally fine everywhere.
+    cell_size : float
+        Size of the physics' cells [m]; the mesh takes a multiple of it where it would exceed `MAX_GRID_VERTICES`.
+    unit_scale : float
+        Metres per Blender unit.
+    reach : float
+        How far beyond the footfalls it is fine [m].
+    """
+    grid, spacing = _graded(plan, cell_size, reach)
+    place = (grid.vertices + 0.5) * spacing
+    middle = (place.min(axis=0) + place.max(axis=0)) / 2
+    centre = np.append(middle, plan.terrain.heights(*middle))
+    local = ((np.column_stack([place, plan.terrain.heights(*place.T)]) - centre) / unit_scale).astype(np.float32)
+    location = (centre / unit_scale).astype(np.float32)
+    vertices = (local.astype(np.float64) + location) * unit_scale
+    return Layout(vertices, local, location, grid.corner_vertex, grid.face_size)
+
+
+@contextmanager
+def draft(layout: Layout) -> Iterator[bpy.types.Object]:
+    """The ground as an object that is in no scene yet; one that is in none at the end is taken away."""
+    mesh = bpy.data.meshes.new("SoftGround")
+    mesh.vertices.add(len(layout.local))
+    mesh.loops.add(len(layout.corner_vertex))
+    mesh.loops.foreach_set("vertex_index", layout.corner_vertex.astype(np.int32))
+    mesh.polygons.add(len(layout.face_size))
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(layout.face_size) - layout.face_size).astype(np.int32))
+    write_positions(mesh, layout.local)
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
+    layer = mesh.uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
+    layer.uv.foreach_set("vector", (uv / uv.max())[layout.corner_vertex].ravel())
+    ground = bpy.data.objects.new("SoftGround", mesh)
+    ground.location = layout.location.tolist()
+    try:
+        yield ground
+    finally:
+        if not ground.users_collection:
+            discard(ground)
+
+
+def publish(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
+    """Put a draft into a scene as its ground, with the material of its preset."""
+    mesh_of(ground).materials.append(ensure_material(scene.softground.material.surface))
+    scene.collection.objects.link(ground)
+    scene.softground.ground = ground
+    for layer in scene.view_layers:
+        layer.update()
+
+
+def _graded(plan: GroundPlan, cell_size: float, reach: float) -> tuple[GradedGrid, float]:
+    """The grid in whole spacings, its vertices in the middle of the cells, and the spacing [m]."""
+
+    def corners(spacing: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        lower, upper = np.floor(plan.lower / spacing - 0.5), np.ceil(plan.upper / spacing - 0.5)
+        return lower.astype(np.intp), upper.astype(np.intp)
+
+    if plan.footfalls is None:
+        cells = np.ceil((plan.upper - plan.lower) / cell_size).prod()
+        spacing = cell_size * int(np.ceil(np.sqrt(max(1.0, cells / MAX_GRID_VERTICES))))
+        return graded_grid(np.zeros((0, 2), dtype=np.intp), 0, *corners(spacing), 0), spacing
+    spacing = cell_size
+    fine, level = plan.fine_blocks(spacing, reach)
+    while len(fine) * 4**level > MAX_GRID_VERTICES:
+        spacing *= 2
+        fine, level = plan.fine_blocks(spacing, reach)
+    lower, upper = corners(spacing)
+    coarsest = max(level, int(np.floor(np.log2(max(COARSEST / spacing, 1.0)))))
+    while np.prod((upper - lower) / 2.0**coarsest) > MAX_GRID_VERTICES:
+        coarsest += 1
+    return graded_grid(fine, level, lower, upper, coarsest), spacing

@@ -1,0 +1,362 @@
+"""The ground as a mesh: its undisturbed surface in, the pressed ground out, and back to what it was.
+
+While a bake is on a ground, its mesh carries: the undisturbed positions (attribute `softground_rest`), the raw heights
+(shape key Basis), the blurred heights (shape key `SoftGround Display`), the shading attributes, and the record of
+footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.footprints import NEVER
+from ...core.heightfield import Terrain
+from ...core.pressed_ground import GroundSample, PressedGround
+from ...core.terrain import MeshTerrain
+from .. import mesh_arrays
+from ..compat import remove_scene
+from . import display_key, painted_ground, playback
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+REST = "softground_rest"
+COMPRESSION = "softground_compression"
+RIM = "softground_rim"
+AGE = "softground_age"
+SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
+SOLE = "softground_sole"
+"""Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
+RECORD = "softground_record"
+SUMMARY = "softground_summary"
+PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
+"""Properties of a mesh that carries a bake."""
+
+CACHE = "SoftGround Cache"
+"""Modifier that plays an exported cache of a bake in place of the native playback."""
+
+ON_SURFACE = 2e-3
+"""Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
+
+
+@dataclass(frozen=True)
+class GroundSurface:
+    """The undisturbed ground in world space.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        World positions of the vertices that the bake moves [m].
+    surface_vertices : (W, 3) float array
+        World positions of the evaluated surface [m]: the same, unless modifiers add vertices.
+    triangles : (T, 3) int array
+        Triangles of the evaluated surface.
+    factors : (W, 3) float array, optional
+        What is painted on the evaluated surface; see `painted_ground`.
+    """
+
+    vertices: Array
+    surface_vertices: Array
+    triangles: Indices
+    factors: Array | None = None
+
+    def terrain(self, bounds: Array | None = None) -> MeshTerrain:
+        """The surface as a function of place, within bounds in the plane [m]."""
+        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors)
+
+
+def pressed_vertices(vertices: Array, pressed: PressedGround, terrain: Terrain) -> Indices:
+    """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
+    near = np.flatnonzero(pressed.covers(vertices[:, 0], vertices[:, 1]))
+    x, y, z = vertices[near].T
+    return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
+
+
+def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh of a mesh object."""
+    return cast("bpy.types.Mesh", ground.data)
+
+
+def own_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """What plays a bake on the ground: the native playback, and a cache in its place."""
+    return [item for item in (playback.modifier_of(ground), ground.modifiers.get(CACHE)) if item]
+
+
+def is_baked(ground: bpy.types.Object) -> bool:
+    """Whether a bake is on this ground."""
+    return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def has_remains(ground: bpy.types.Object) -> bool:
+    """Whether a bake is on this ground, or at least what a bake would take away again."""
+    return ground.type == "MESH" and REST in mesh_of(ground).attributes
+
+
+def summary_of(ground: bpy.types.Object) -> dict[str, float]:
+    """What the bake that is on this ground came to, for display; empty if there is none."""
+    summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
+    return summary.to_dict() if summary else {}
+
+
+def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """World positions of the mesh's vertices without any bake or modifier, (V, 3) [m].
+
+    Raises
+    ------
+    InputError
+        If some are no numbers.
+    """
+    vertices = _transform(to_world_of(ground, unit_scale), rest_positions(mesh_of(ground)))
+    if not np.isfinite(vertices).all():
+        raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
+    return vertices
+
+
+def undisturbed_surface(
+    ground: bpy.types.Object, unit_scale: float, painted: painted_ground.Names = ()
+) -> GroundSurface:
+    """The ground as it is without any bake, in world space and metres, with what is painted on it.
+
+    Raises
+    ------
+    InputError
+        If the surface has points that are no numbers.
+    """
+    mesh = mesh_of(ground)
+    vertices = rest_vertices(ground, unit_scale)
+    to_world = to_world_of(ground, unit_scale)
+    if not any(modifier.show_viewport for modifier in ground.modifiers):
+        surface, triangles = vertices, mesh_arrays.triangles(mesh)
+        factors = painted_ground.factors(ground, mesh, painted)
+    else:
+        with undisturbed_copy(ground) as evaluated:
+            surface = _transform(to_world, mesh_arrays.positions(evaluated))
+            triangles = mesh_arrays.triangles(evaluated)
+            factors = painted_ground.factors(ground, evaluated, painted)
+        if len(surface) == len(vertices):
+            vertices = surface
+    if np.linalg.det(to_world[:3, :3]) < 0:
+        triangles = triangles[:, ::-1]
+    return GroundSurface(vertices, surface, triangles, factors)
+
+
+def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """Object space to world space in metres, (4, 4), whether the ground is visible or not."""
+    if ground.visible_get():
+        matrix = np.array(ground.matrix_world, dtype=np.float64)
+    else:  # Blender keeps no world matrix of hidden objects
+        with _stand_in(ground) as evaluated:
+            matrix = np.array(evaluated.matrix_world, dtype=np.float64)
+    matrix[:3] *= unit_scale
+    return matrix
+
+
+@contextmanager
+def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
+    """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
+
+    Modifiers that change over time are evaluated at the first frame of the bake.
+    """
+    scene = bpy.data.scenes.new("SoftGround Evaluation")
+    for shown_in in ground.users_scene[:1]:
+        scene.frame_current = shown_in.softground.frame_start
+    copy = ground.copy()
+    try:
+        copy.hide_viewport = False
+        if mesh is None:
+            copy.modifiers.clear()
+        else:
+            copy.data = mesh
+            for own in own_modifiers(copy):
+                copy.modifiers.remove(own)
+        scene.collection.objects.link(copy)
+        layer = scene.view_layers[0]
+        layer.update()
+        yield copy.evaluated_get(cast("bpy.types.Depsgraph", layer.depsgraph))
+    finally:
+        bpy.data.objects.remove(copy)
+        remove_scene(scene)
+
+
+@contextmanager
+def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
+    mesh = mesh_of(ground).copy()
+    try:
+        rest = rest_positions(mesh)
+        display_key.drop_all(mesh)
+        write_positions(mesh, rest)
+        with _stand_in(ground, mesh) as evaluated:
+            yield mesh_of(evaluated)
+    finally:
+        bpy.data.meshes.remove(mesh)
+
+
+def write(
+    ground: bpy.types.Object,
+    index: Indices,
+    pressed: GroundSample,
+    record: bytes,
+    unit_scale: float,
+    *,
+    shape_keys: bool = True,
+) -> None:
+    """Put a bake on the ground, in place of the one that may be there.
+
+    The raw heights become the mesh's positions and Basis, the blurred ones the shape key of `display_key` at value 1.
+    Without shape keys, the blurred heights are the mesh's positions.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    index : (K,) int array
+        Vertices of its mesh that the bake moves.
+    pressed : GroundSample
+        What it does to each of them.
+    record : bytes
+        The footprints, from `core.record`.
+    unit_scale : float
+        Metres per Blender unit.
+    shape_keys : bool
+        Blender evaluates shape keys on the whole mesh at each frame that is played, which a dense ground feels.
+    """
+    _take_off_cache(ground)
+    mesh = mesh_of(ground)
+    rest = rest_positions(mesh)
+    kept = mesh.attributes.get(REST) or _add_attribute(mesh, REST, "FLOAT_VECTOR")
+    kept.data.foreach_set("vector", rest.ravel())
+    up = up_of(ground, unit_scale)
+    raw, display = rest.copy(), rest.copy()
+    raw[index] += (pressed.raw[:, None] * up).astype(np.float32)
+    display[index] += (pressed.display[:, None] * up).astype(np.float32)
+
+    if shape_keys:
+        display_key.put(ground, raw, display)
+    else:
+        display_key.take_off(ground, display)
+    for name, values, default in (
+        (COMPRESSION, pressed.compression, 0.0),
+        (RIM, pressed.rim, 0.0),
+        (AGE, pressed.age, NEVER),
+    ):
+        whole = np.full(len(mesh.vertices), default, dtype=np.float32)
+        whole[index] = values
+        attribute = mesh.attributes.get(name) or _add_attribute(mesh, name, "FLOAT")
+        attribute.data.foreach_set("value", whole)
+    # Numbers, not bytes: Blender's Alembic exporter ends the program on bytes that hold a zero.
+    mesh.pop(RECORD, None)  # an array that is there would keep its length
+    mesh[RECORD] = np.frombuffer(record + bytes(-len(record) % 4), dtype=np.int32)
+    write_positions(mesh, raw if shape_keys else display)
+
+
+def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -> None:
+    """Say of vertices (K,) where under a sole they lay, (K, 3) as in `SOLE`, and of all others that under none."""
+    mesh = mesh_of(ground)
+    if marks is None:
+        if SOLE in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[SOLE])
+        return
+    whole = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+    whole[index] = marks
+    attribute = mesh.attributes.get(SOLE) or _add_attribute(mesh, SOLE, "FLOAT_VECTOR")
+    attribute.data.foreach_set("vector", whole.ravel())
+
+
+def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:
+    """World up in the ground's own space and units, of the length of one metre, (3,)."""
+    up: Array = np.linalg.inv(to_world_of(ground, unit_scale)[:3, :3])[:, 2]
+    return up
+
+
+def displayed_positions(ground: bpy.types.Object) -> NDArray[np.float32]:
+    """Positions of the finished ground as it is shown, (V, 3) in the object's own space and units."""
+    return _shown_positions(mesh_of(ground))
+
+
+def _shown_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    shown = display_key.positions(mesh)
+    return mesh_arrays.positions(mesh) if shown is None else shown
+
+
+def restore(ground: bpy.types.Object) -> None:
+    """Take the bake off the ground: its mesh is what it was before, bit for bit. Without a bake nothing happens.
+
+    Shape keys that the user has made on the baked ground stay.
+    """
+    if not has_remains(ground):
+        return
+    _take_off_cache(ground)
+    mesh = mesh_of(ground)
+    rest = rest_positions(mesh)
+    playback.remove(ground)
+    display_key.take_off(ground, rest)
+    for name in (REST, *SHADING_ATTRIBUTES, SOLE):
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+    for key in PROPERTIES:
+        mesh.pop(key, None)
+    write_positions(mesh, rest)
+
+
+def _take_off_cache(ground: bpy.types.Object) -> None:
+    """Let no cache of an earlier bake play on the ground any more."""
+    if cache := ground.modifiers.get(CACHE):
+        ground.modifiers.remove(cache)
+
+
+def discard(ground: bpy.types.Object) -> None:
+    """Remove a ground that the add-on made, with its mesh and playback, unless another object has taken those over."""
+    mesh = mesh_of(ground)
+    if mesh.users - mesh.use_fake_user == 1:
+        playback.remove(ground)
+    bpy.data.objects.remove(ground)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+
+
+def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> bpy.types.Attribute:
+    """A new point attribute; the one that the user has active stays so."""
+    active = mesh.attributes.active_index
+    attribute = mesh.attributes.new(name, kind, "POINT")
+    mesh.attributes.active_index = active
+    return mesh.attributes[attribute.name]
+
+
+def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """Positions without the bake, (V, 3) in the object's own space and units.
+
+    Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
+    """
+    attribute = mesh.attributes.get(REST)
+    if attribute is None or len(attribute.data) != len(mesh.vertices):
+        return mesh_arrays.positions(mesh)
+    kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    attribute.data.foreach_get("vector", kept)
+    rest = kept.reshape(-1, 3)
+    moves = playback.moves(mesh)
+    if moves is not None:
+        shown = _shown_positions(mesh)
+        edited = ~moves & (shown != rest).any(axis=1)  # keeps the sign of zeros
+        rest[edited] = shown[edited]
+    return rest
+
+
+def write_positions(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> None:
+    if not len(positions):
+        return
+    mesh.attributes["position"].data.foreach_set("vector", positions.ravel())
+    first = mesh.vertices[0]
+    first.co = first.co  # refreshes the bounding box, which the bulk write leaves stale before 5.1
+    mesh.update()
+
+
+def _transform(matrix: Array, points: NDArray[np.float32]) -> Array:
+    return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -1,0 +1,381 @@
+"""Render materials of the grounds, built from nodes: what the mesh attributes of a bake say is what one sees.
+
+Textures are laid out in world space, so that grains keep their size on any ground. All relief is in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, cast
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from .ground_mesh import COMPRESSION, RIM, SOLE
+
+TREAD_PITCH = 0.017
+"""From bar to bar of a tread [m]."""
+
+MARK = "softground_surface"
+"""Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
+
+BLEND = "surface_blend"
+"""Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Socket:
+    """An output of a node, with the arithmetic of shader graphs."""
+
+    graph: Graph
+    output: Any
+
+    def __add__(self, other: Socket | float) -> Socket:
+        return self.graph.math("ADD", self, other)
+
+    def __mul__(self, other: Socket | float) -> Socket:
+        return self.graph.math("MULTIPLY", self, other)
+
+
+class Graph:
+    """Writes nodes into a material, each at the right of those that it reads."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self._tree = tree
+        self._depth: dict[str, int] = {}
+        self._rows: dict[int, int] = {}
+
+    def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
+        """A node with its properties set and its inputs, given by identifier or position, linked or set."""
+        node: Any = self._tree.nodes.new(kind)
+        for name, value in properties.items():
+            setattr(node, name, value)
+        depth = 0
+        for key, value in (inputs or {}).items():
+            socket = _input(node, key)
+            if isinstance(value, Socket):
+                self._tree.links.new(value.output, socket)
+                depth = max(depth, self._depth[value.output.node.name] + 1)
+            else:
+                socket.default_value = value
+        row = self._rows.get(depth, 0)
+        self._depth[node.name], self._rows[depth] = depth, row + 1
+        node.location = (220 * depth, -260 * row)
+        return node
+
+    def out(self, node: Any, index: int = 0) -> Socket:
+        """An output by its position: names of outputs differ between Blender versions."""
+        return Socket(self, node.outputs[index])
+
+    def math(self, operation: str, a: Socket | float, b: Socket | float) -> Socket:
+        """a operation b."""
+        return self.out(self.node("ShaderNodeMath", {0: a, 1: b}, operation=operation))
+
+    def attribute(self, name: str) -> Socket:
+        """A float attribute of the mesh; 0 where the mesh has none."""
+        return self.out(self.node("ShaderNodeAttribute", attribute_name=name), 2)
+
+    def ramp(self, value: Socket, low: float, high: float, start: float = 0.0, end: float = 1.0) -> Socket:
+        """From `start` at `low` to `end` at `high`, smoothly, and level outside."""
+        inputs = {0: value, 1: low, 2: high, 3: start, 4: end}
+        return self.out(self.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP"))
+
+    def noise(self, place: Socket, size: float, detail: float = 2.0, roughness: float = 0.5) -> Socket:
+        """Noise around 0.5 whose features are about `size` [m] large."""
+        inputs = {"Vector": place, "Scale": 1.0 / size, "Detail": detail, "Roughness": roughness}
+        return self.out(self.node("ShaderNodeTexNoise", inputs))
+
+    def cells(self, place: Socket, size: float) -> Any:
+        """Voronoi cells of about `size` [m]: outputs are distance to the centre [cells], random colour."""
+        return self.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": 1.0 / size})
+
+    def mix(self, factor: Socket, a: Socket | Colour, b: Socket | Colour) -> Socket:
+        """Colour a at factor 0, b at factor 1."""
+        inputs = {"Factor_Float": factor, "A_Color": _rgba(a), "B_Color": _rgba(b)}
+        return self.out(self.node("ShaderNodeMix", inputs, data_type="RGBA"), 2)
+
+    def blend(self, factor: Socket, a: Socket | float, b: Socket | float) -> Socket:
+        """Number a at factor 0, b at factor 1."""
+        return self.out(self.node("ShaderNodeMix", {"Factor_Float": factor, "A_Float": a, "B_Float": b}))
+
+
+def _rgba(colour: Socket | Colour) -> Any:
+    return colour if isinstance(colour, Socket) else (*colour, 1.0)
+
+
+def _input(node: Any, key: str | int) -> Any:
+    if isinstance(key, int):
+        return node.inputs[key]
+    return next(socket for socket in node.inputs if key in (socket.identifier, socket.name))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What every surface is made from.
+
+    Attributes
+    ----------
+    place : Socket
+        World place [m].
+    pressed, deep, risen : Socket
+        From 0 to 1: whether a foot was here, whether it left a hollow, whether the ground stands up as a rim.
+    tread : Socket
+        Height of the bars that the tread of a shoe left in the print [m].
+    """
+
+    place: Socket
+    pressed: Socket
+    deep: Socket
+    risen: Socket
+    tread: Socket
+
+    @property
+    def edge(self) -> Socket:
+        """1 halfway down the wall of a print, 0 inside and outside."""
+        graph = self.pressed.graph
+        return self.pressed * graph.math("SUBTRACT", 1.0, self.pressed) * 4.0
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a surface hands to the shader: its relief [m] and the inputs of the Principled BSDF."""
+
+    relief: Socket
+    inputs: Mapping[str, Any]
+
+
+def ensure_material(surface: str) -> bpy.types.Material:
+    """The add-on's material for a surface, made on first use and left as it is from then on.
+
+    Parameters
+    ----------
+    surface : str
+        One of `core.presets.SURFACES`.
+
+    Raises
+    ------
+    InputError
+        If there is no such surface.
+    """
+    name = surface.replace("_", " ").title()
+    return _material(surface, name, (surface,), lambda graph: _shaded(graph, _looks(surface)[0](graph, _ground(graph))))
+
+
+@contextmanager
+def drafted(surface: str) -> Iterator[bpy.types.Material]:
+    """The same; one that is made now and that nothing has come to use at the end is taken away."""
+    known = set(bpy.data.materials)
+    material = ensure_material(surface)
+    is_new = material not in known
+    try:
+        yield material
+    finally:
+        if is_new and not material.users:
+            bpy.data.materials.remove(material)
+
+
+def ensure_blend(surface: str, other: str) -> bpy.types.Material:
+    """A material that passes from one surface to another where the attribute `BLEND` of the mesh goes from 0 to 1.
+
+    Raises
+    ------
+    InputError
+        If there is no such surface.
+    """
+
+    def build(graph: Graph) -> tuple[Socket, Socket]:
+        ground = _ground(graph)
+        shaders, reliefs = zip(
+            *(_shaded(graph, _looks(name)[0](graph, ground)) for name in (surface, other)), strict=True
+        )
+        drift = graph.noise(ground.place, 0.35, 4.0, 0.6) * 0.5  # no border is drawn with a ruler
+        factor = graph.ramp(graph.attribute(BLEND) + drift, 0.70, 0.80)
+        mixed = graph.node("ShaderNodeMixShader", {0: factor, 1: shaders[0], 2: shaders[1]})
+        return graph.out(mixed), graph.blend(factor, *reliefs)
+
+    name = " to ".join(one.replace("_", " ").title() for one in (surface, other))
+    return _material(f"{surface} {other}", name, (surface, other), build)
+
+
+def _looks(surface: str) -> tuple[Callable[[Graph, Ground], Look], Colour]:
+    if surface not in _SURFACES:
+        raise InputError(f"There is no surface '{surface}': choose one of {', '.join(_SURFACES)}.")
+    return _SURFACES[surface]
+
+
+def _material(
+    mark: str, name: str, surfaces: tuple[str, ...], build: Callable[[Graph], tuple[Socket, Socket]]
+) -> bpy.types.Material:
+    """The material of that mark, or a new one: its nodes from `build`, which gives its shader and its relief [m]."""
+    preview = np.mean([_looks(surface)[1] for surface in surfaces], axis=0)
+    for material in bpy.data.materials:
+        if material.get(MARK) == mark and material.library is None:
+            return material
+    material = bpy.data.materials.new(f"SoftGround {name}")
+    material[MARK] = mark
+    material.diffuse_color = (*preview.tolist(), 1.0)
+    if material.node_tree is None:  # 5.x makes the tree with the material and warns of the switch
+        material.use_nodes = True
+    tree = cast("bpy.types.NodeTree", material.node_tree)
+    tree.nodes.clear()
+    graph = Graph(tree)
+    shader, height = build(graph)
+    # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
+    relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Displacement": graph.out(relief)})
+    return material
+
+
+def _ground(graph: Graph) -> Ground:
+    compression = graph.attribute(COMPRESSION)
+    return Ground(
+        place=graph.out(graph.node("ShaderNodeNewGeometry")),
+        pressed=graph.ramp(compression, 0.0004, 0.004),
+        deep=graph.ramp(compression, 0.006, 0.020),
+        risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
+        tread=_tread(graph),
+    )
+
+
+def _tread(graph: Graph) -> Socket:
+    """Ridges that bow across the print where the sole has grooves, beside a plain edge [m]."""
+    place = graph.node("ShaderNodeAttribute", attribute_name=SOLE)
+    separate = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(place, 1)})
+    along, across, depth = (graph.out(separate, axis) for axis in range(3))
+    aside = graph.math("ABSOLUTE", across, 0.0)
+    phase = graph.math("FRACT", (along + aside * 0.35) * (1.0 / TREAD_PITCH), 0.0)
+    ridge = graph.ramp(graph.math("ABSOLUTE", phase + -0.5, 0.0), 0.12, 0.24, 1.0, 0.0)
+    return ridge * graph.ramp(aside, 0.030, 0.034, 1.0, 0.0) * depth
+
+
+def _shaded(graph: Graph, look: Look) -> tuple[Socket, Socket]:
+    """Shader and relief [m] of a look."""
+    # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
+    shader = graph.node("ShaderNodeBsdfPrincipled", look.inputs, subsurface_method="BURLEY")
+    return graph.out(shader), look.relief
+
+
+def _snow(graph: Graph, ground: Ground) -> Look:
+    """Bright, light scattering below the surface, glints; pressed snow is smooth, dense and bluish, its edge breaks."""
+    drifts = graph.noise(ground.place, 0.13, 2.0) * 0.012
+    clumps = graph.noise(ground.place, 0.014, 3.0, 0.6) * graph.blend(ground.pressed, 0.0045, 0.0012)
+    crystals = graph.noise(ground.place, 0.0030, 3.0, 0.65) * graph.blend(ground.pressed, 0.0018, 0.0008)
+    broken = graph.noise(ground.place, 0.009, 3.0, 0.7) * ground.edge * 0.009
+
+    glints = graph.cells(ground.place, 0.0016)
+    random = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(glints, 1)}))
+    tilt = graph.node("ShaderNodeVectorMath", {0: graph.out(glints, 1), 1: (0.5, 0.5, 0.0)}, operation="SUBTRACT")
+    facet = graph.node("ShaderNodeVectorMath", {0: graph.out(tilt)}, operation="NORMALIZE")
+    return Look(
+        drifts + clumps + crystals + broken + ground.tread,
+        {
+            "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.74, 0.84, 0.94)),
+            "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
+            "Subsurface Weight": 0.5,
+            "Subsurface Radius": (0.7, 0.9, 1.0),
+            "Subsurface Scale": 0.010,
+            "Coat Weight": graph.ramp(random, 0.90, 0.91) * graph.blend(ground.pressed, 1.0, 0.2),
+            "Coat Roughness": 0.10,
+            "Coat Normal": graph.out(facet),
+        },
+    )
+
+
+def _grains(graph: Graph, ground: Ground) -> tuple[Socket, Socket]:
+    """Relief [m] and tint (0-1) of sand: fine grains over soft undulations; a foot leaves it even, its rim loose."""
+    grain = graph.cells(ground.place, 0.0011)
+    tint = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(grain, 1)}))
+    relief = graph.noise(ground.place, 0.16, 1.0) * 0.012
+    relief = relief + graph.noise(ground.place, 0.0022, 2.0, 0.7) * graph.blend(ground.pressed, 0.0010, 0.0008)
+    relief = relief + graph.noise(ground.place, 0.024, 3.0, 0.6) * graph.blend(ground.pressed, 0.0034, 0.0012)
+    loose = graph.noise(ground.place, 0.011, 3.0, 0.65) * graph.math("MAXIMUM", ground.risen, ground.edge)
+    return relief + loose * 0.0040 + ground.tread * 0.5, tint
+
+
+def _dry_sand(graph: Graph, ground: Ground) -> Look:
+    """Fine grains of several colours; nothing shines."""
+    relief, tint = _grains(graph, ground)
+    patches = graph.noise(ground.place, 0.25, 3.0)
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))
+    colour = graph.mix(graph.ramp(patches, 0.35, 0.75, 0.0, 0.35), colour, (0.60, 0.37, 0.18))
+    colour = graph.mix(ground.pressed * 0.35, colour, (0.40, 0.24, 0.11))
+    return Look(relief, {"Base Color": colour, "Roughness": 0.92, "Specular IOR Level": 0.2})
+
+
+def _wet_sand(graph: Graph, ground: Ground) -> Look:
+    """Dark and firm; the rims dry first, and the hollows hold the water that shines."""
+    relief, tint = _grains(graph, ground)
+    colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.16, 0.095, 0.045), (0.30, 0.20, 0.115))
+    colour = graph.mix(ground.risen * 0.6, colour, (0.42, 0.29, 0.16))
+    colour = graph.mix(ground.pressed * 0.5, colour, (0.12, 0.072, 0.036))
+    return Look(
+        relief,
+        {
+            "Base Color": colour,
+            "Roughness": graph.blend(ground.pressed, 0.62, 0.36),
+            "Specular IOR Level": 0.5,
+            "Coat Weight": ground.deep * 0.6,
+            "Coat Roughness": 0.12,
+            "Coat IOR": 1.33,
+        },
+    )
+
+
+def _mud(graph: Graph, ground: Ground) -> Look:
+    """Dark, smooth and sticky; damp in patches, its rims in lumps; in the hollow of a print a film of water shines."""
+    lumps = graph.noise(ground.place, 0.06, 2.0, 0.45)
+    bits = graph.noise(ground.place, 0.008, 3.0, 0.6)
+    squeezed = graph.noise(ground.place, 0.020, 2.0, 0.5) * graph.math("MAXIMUM", ground.risen, ground.edge)
+    relief = lumps * graph.blend(ground.pressed, 0.008, 0.003) + bits * graph.blend(ground.pressed, 0.0020, 0.0006)
+    relief = relief + squeezed * 0.008 + ground.tread
+    damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
+    wet = graph.math("MAXIMUM", ground.pressed, damp)
+    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.105, 0.064, 0.036), (0.170, 0.110, 0.066))
+    colour = graph.mix(wet, colour, (0.062, 0.035, 0.019))
+    return Look(
+        relief,
+        {
+            "Base Color": colour,
+            "Roughness": graph.blend(wet, 0.68, 0.34),
+            "Specular IOR Level": 0.5,
+            "Coat Weight": ground.deep,
+            "Coat Roughness": 0.06,
+            "Coat IOR": 1.33,
+        },
+    )
+
+
+def _soil(graph: Graph, ground: Ground) -> Look:
+    """Dull crumbs of all sizes; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
+    loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
+    stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
+    stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
+    wavy = graph.out(stirred)  # crumbs are no honeycomb
+    large, middle, small = (
+        graph.ramp(graph.out(graph.cells(wavy, size)), 0.1, 0.75, 1.0, 0.0) for size in (0.030, 0.017, 0.009)
+    )
+    dust = graph.noise(ground.place, 0.0035, 3.0, 0.7)
+    clods = graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.50, 0.66)
+    crumbs = large * clods * 0.010 + middle * ground.risen * 0.013 + small * graph.blend(ground.risen, 0.0022, 0.0060)
+    relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0018, 0.0012)
+    relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008 + ground.tread
+    tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
+    colour = graph.mix(tint, (0.072, 0.042, 0.026), (0.195, 0.122, 0.077))
+    colour = graph.mix(ground.risen * middle * 0.6, colour, (0.28, 0.18, 0.115))
+    colour = graph.mix(ground.pressed * 0.7, colour, (0.060, 0.036, 0.022))
+    return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
+
+
+_SURFACES: dict[str, tuple[Callable[[Graph, Ground], Look], Colour]] = {
+    "snow": (_snow, (0.85, 0.89, 0.95)),
+    "sand": (_dry_sand, (0.66, 0.48, 0.29)),
+    "wet_sand": (_wet_sand, (0.24, 0.16, 0.09)),
+    "mud": (_mud, (0.07, 0.04, 0.02)),
+    "soil": (_soil, (0.12, 0.07, 0.04)),
+}
+"""What builds each surface, and its colour in Solid shading."""

@@ -1,0 +1,86 @@
+"""What is painted on a ground: vertex groups or float attributes by which its material is multiplied."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.variation import CHANNELS
+
+Array = NDArray[np.float64]
+
+_SETTINGS = dict(zip(CHANNELS, ("stiffness", "layer_depth", "rim"), strict=True))
+"""The setting that names what each channel is painted with."""
+
+Names = tuple[str, ...]
+"""Of what is painted, in the order of `CHANNELS`; empty where nothing is."""
+
+
+def names_of(scene: bpy.types.Scene) -> Names:
+    """What the scene's ground is painted with, of its own mesh.
+
+    Raises
+    ------
+    InputError
+        If a name that the user chose is not there, or is of another kind.
+    """
+    ground, painted = scene.softground.ground, scene.softground.painted
+    return tuple(_name(ground, painted, setting) for setting in _SETTINGS.values())
+
+
+def _name(ground: bpy.types.Object, painted: bpy.types.PropertyGroup, setting: str) -> str:
+    name: str = getattr(painted, setting)
+    attribute = ground.data.attributes.get(name) if name else None
+    if attribute and (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
+        raise InputError(
+            f"Attribute '{name}' of ground '{ground.name}' is no float on vertices: convert it in Object Data "
+            "Properties > Attributes (domain Vertex, type Float)."
+        )
+    if is_there(ground, name):
+        return name
+    if name and name != painted.bl_rna.properties[setting].default:
+        raise InputError(
+            f"Ground '{ground.name}' has no vertex group or attribute '{name}': paint one of that name, or leave the "
+            "field in the Ground panel empty."
+        )
+    return ""
+
+
+def is_there(ground: bpy.types.Object, name: str) -> bool:
+    """Whether a ground has a vertex group or an attribute of that name."""
+    return bool(name) and (name in ground.data.attributes or name in ground.vertex_groups)
+
+
+def factors(ground: bpy.types.Object, mesh: bpy.types.Mesh, names: Names) -> Array | None:
+    """Factors on the material at the vertices of a mesh.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+        Whose vertex groups they are.
+    mesh : bpy.types.Mesh
+        Its own mesh, or the evaluated one.
+    names : Names
+
+    Returns
+    -------
+    (V, 3) float array, or None where nothing is painted.
+    """
+    if not any(names):
+        return None
+    values = np.ones((len(mesh.vertices), len(CHANNELS)), np.float32)
+    for channel, name in enumerate(names):
+        attribute = mesh.attributes.get(name) if name else None
+        if attribute and (attribute.domain, attribute.data_type) == ("POINT", "FLOAT"):
+            column = np.empty(len(mesh.vertices), np.float32)
+            attribute.data.foreach_get("value", column)
+            values[:, channel] = column
+        elif name in ground.vertex_groups:
+            group = ground.vertex_groups[name].index
+            for number, vertex in enumerate(mesh.vertices):
+                for member in vertex.groups:
+                    if member.group == group:
+                        values[number, channel] = member.weight
+    return values.astype(np.float64)

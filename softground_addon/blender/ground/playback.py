@@ -1,0 +1,218 @@
+"""Playing a bake on the ground: its record as splines over time, and the modifier that samples them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.footprints import NEVER
+from ...core.polylines import TICK, Polylines
+from ...core.timelines import NO_VISIT
+from ..compat import straighten
+from . import playback_nodes as nodes
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MODIFIER = "SoftGround Playback"
+
+TABLE = "SoftGround Timelines"
+
+_ATTRIBUTES = (
+    nodes.MOVED,
+    nodes.START,
+    nodes.END,
+    nodes.SPLINE,
+    nodes.OFFSET,
+    nodes.LAST_HEIGHT,
+    nodes.LAST_CONTACT,
+    nodes.PRESSURE,
+)
+_TYPE = {"FLOAT": np.float32, "INT": np.int32, "BOOLEAN": np.bool_}
+
+FEW = 1 / 64
+"""Part of the vertices that is worth looking up whole: a look-up takes about as long as 60 comparisons."""
+
+
+@contextmanager
+def timelines(lines: Polylines, frame_rate: float) -> Iterator[bpy.types.Object]:
+    """An object that holds timelines as splines and is in no scene; it is taken away if nothing has come to use it.
+
+    Parameters
+    ----------
+    lines : Polylines
+    frame_rate : float
+        Their frames per second [Hz].
+    """
+    table = _table_object(lines, frame_rate)
+    try:
+        yield table
+    finally:
+        if not table.users:
+            _remove_table(table)
+
+
+def attach(
+    ground: bpy.types.Object,
+    vertices: Indices,
+    lines: Polylines,
+    table: bpy.types.Object,
+    *,
+    up: Array,
+    frame_rate: float,
+) -> bpy.types.Modifier:
+    """Let timelines play a ground, in place of those that may play it.
+
+    The ground must carry its undisturbed positions and stand finished (`ground_mesh.write`). The modifier comes first,
+    so that the user's own modifiers work on the ground as it is at the time.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    vertices : (P,) int array
+        Vertex of its mesh that each of the polylines is of.
+    lines : Polylines
+    table : bpy.types.Object
+        The same as an object, from `timelines`.
+    up : (3,) float array
+        World up in the ground's own space and units, of the length of one metre.
+    frame_rate : float
+        Frames of the polylines per second [Hz].
+    """
+    remove(ground)
+    mesh = cast("bpy.types.Mesh", ground.data)
+    _write_attributes(mesh, vertices, lines)
+    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = nodes.build(
+        table=table,
+        up=up.tolist(),
+        frame_rate=frame_rate,
+        few=len(vertices) < FEW * len(mesh.vertices),
+        settled=mesh.shape_keys is None,
+    )
+    modifier.show_in_editmode = False
+    modifier.show_expanded = False
+    ground.modifiers.move(len(ground.modifiers) - 1, 0)
+    return modifier
+
+
+def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The ground's playback, whatever the names of the modifier and its node group have become."""
+    for modifier in ground.modifiers:
+        group = getattr(modifier, "node_group", None)
+        if group is not None and nodes.is_playback(group):
+            return modifier
+    return None
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take the playback off a ground; nothing happens where there is none."""
+    while modifier := modifier_of(ground):
+        group = cast("Any", modifier).node_group
+        ground.modifiers.remove(modifier)
+        if not group.users:
+            _remove_group(group)
+    mesh = cast("bpy.types.Mesh", ground.data)
+    for name in [attribute.name for attribute in mesh.attributes]:
+        if is_playback_attribute(name):
+            mesh.attributes.remove(mesh.attributes[name])
+
+
+def _remove_group(group: bpy.types.NodeTree) -> None:
+    table = nodes.table_of(group)
+    bpy.data.node_groups.remove(group)
+    if table is not None and not table.users:
+        _remove_table(table)
+
+
+def _remove_table(table: bpy.types.Object) -> None:
+    splines: Any = table.data
+    bpy.data.objects.remove(table)
+    bpy.data.hair_curves.remove(splines)
+
+
+def is_playback_attribute(name: str) -> bool:
+    """Whether an attribute of this name belongs to the playback."""
+    return name in _ATTRIBUTES
+
+
+def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
+    """Whether the playback moves each vertex, (V,); None where there is none."""
+    attribute: Any = mesh.attributes.get(nodes.MOVED)
+    if attribute is None or len(attribute.data) != len(mesh.vertices):
+        return None
+    moved = np.empty(len(attribute.data), dtype=bool)
+    attribute.data.foreach_get("value", moved)
+    return moved
+
+
+def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
+    """Vertices that the playback moves, (K,)."""
+    moved = moves(mesh)
+    return np.zeros(0, dtype=np.intp) if moved is None else np.flatnonzero(moved)
+
+
+def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, lines: Polylines) -> None:
+    """Store of which vertices (P,) the polylines are, and what is known of them without a look into these."""
+    spline, offset = lines.end_to_end()
+    last = lines.state[lines.first[1:] - 1]
+    active = mesh.attributes.active_index
+    for name, kind, values, elsewhere in (
+        (nodes.MOVED, "BOOLEAN", np.ones(len(vertex), dtype=bool), False),
+        (nodes.START, "FLOAT", lines.start, -NO_VISIT),
+        (nodes.END, "FLOAT", lines.end, -NO_VISIT),
+        (nodes.SPLINE, "INT", spline, 0),
+        (nodes.OFFSET, "FLOAT", offset, 0.0),
+        (nodes.LAST_CONTACT, "FLOAT", last[:, 2], NO_VISIT),
+        # What is there is overwritten faster than made.
+        (nodes.PRESSURE, "FLOAT", last[:, 3], 0.0),
+        *([(nodes.LAST_HEIGHT, "FLOAT", last[:, 0], 0.0)] if mesh.shape_keys else []),
+    ):
+        whole = np.full(len(mesh.vertices), elsewhere, dtype=_TYPE[kind])
+        whole[vertex] = values
+        _store(mesh, name, kind, whole)
+    mesh.attributes.active_index = active  # the one that the user has active stays so
+
+
+def _table_object(lines: Polylines, frame_rate: float) -> bpy.types.Object:
+    """The polylines as splines, laid end to end: fewer are looked up faster and take less memory."""
+    splines = bpy.data.hair_curves.new(TABLE)
+    spline, offset = lines.end_to_end()
+    size = np.diff(lines.first)
+    if len(size):
+        splines.add_curves(np.bincount(spline, size).astype(int).tolist())
+        along: Any = splines.attributes["position"]
+        along.data.foreach_set("vector", _positions(lines.frame + np.repeat(offset, size)))
+    height, compression, _, pressure = lines.state.T
+    _store(splines, nodes.HEIGHT, "FLOAT", height.copy())
+    _store(splines, nodes.COMPRESSION, "FLOAT", compression.copy())
+    _store(splines, nodes.AGE, "FLOAT", _ages(lines, frame_rate))
+    _store(splines, nodes.PRESSURE, "FLOAT", pressure.copy())
+    if len(size):
+        straighten(splines)
+    return bpy.data.objects.new(TABLE, splines)
+
+
+def _positions(along: Array) -> NDArray[np.float32]:
+    """Coordinates of points (R,) along the splines, one after the other."""
+    position = np.zeros((len(along), 3), dtype=np.float32)
+    position[:, 0] = np.round(along / TICK) * TICK
+    return position.ravel()
+
+
+def _ages(lines: Polylines, frame_rate: float) -> NDArray[np.float32]:
+    """Time since the last contact at each point of the polylines, (R,) [s]."""
+    contact_end = lines.state[:, 2]
+    since = lines.frame + np.repeat(lines.start, np.diff(lines.first)) - contact_end
+    age: Array = np.where(contact_end < NO_VISIT, np.maximum(since, 0.0) / frame_rate, NEVER)
+    return age.astype(np.float32)
+
+
+def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:
+    attribute: Any = geometry.attributes.new(name, kind, "POINT")
+    attribute.data.foreach_set("value", values)

@@ -1,0 +1,245 @@
+"""The node group that plays a bake: attributes and the time in, the ground at that time out.
+
+It is native Blender data and needs nothing of this add-on. A vertex stands still most of the time: before its first
+movement where it was, after its last where that left it, which is where the mesh has it. So only those that wait for
+theirs are put back, and only those under way are looked up, in timelines (see `core.polylines`): the splines of an
+object of its own, on each of which those of some vertices lie end to end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from ...core.footprints import NEVER
+
+GROUP = "SoftGround Playback"
+MARK = "softground_playback"
+"""Custom property of the group, whatever the user calls it."""
+
+REST = "softground_rest"
+MOVED = "softground_moved"
+"""Whether the bake moves or touches the vertex at all."""
+START, END = "softground_start", "softground_end"
+"""Frame from which on something happens to a vertex, and frame from which on nothing does."""
+SPLINE, OFFSET = "softground_spline", "softground_offset"
+"""Number of the spline that the vertex's timeline lies on, and where on it that begins."""
+LAST_HEIGHT, LAST_CONTACT = "softground_last_height", "softground_last_contact"
+"""Height at which a vertex comes to rest [m], and last frame of its last contact."""
+COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
+
+HEIGHT = "softground_height"
+"""Of a point of a spline, beside compression, age and pressure; along the spline runs the time in frames."""
+
+COLUMN, ROW = 180.0, 160.0
+"""Spacing of the nodes in the editor."""
+
+
+def build(
+    *,
+    table: bpy.types.Object,
+    up: Sequence[float],
+    frame_rate: float,
+    few: bool,
+    settled: bool,
+) -> bpy.types.NodeTree:
+    """A new node group.
+
+    Parameters
+    ----------
+    table : bpy.types.Object
+        Its splines are the timelines.
+    up : (3,) floats
+        World up in the ground's own space and units, of the length of one metre.
+    frame_rate : float
+        Frames of the table per second [Hz].
+    few : bool
+        Whether so few of the vertices move that looking all of them up costs less than telling them apart.
+    settled : bool
+        Whether the positions that the group is given are those at which vertices come to rest, whatever the user does.
+    """
+    graph = _Graph(GROUP)
+    geometry, frame = graph.inputs(up)
+    start, end = graph.attribute(START), graph.attribute(END)
+    waiting = graph.compare("LESS_THAN", frame, start)
+    looked_up = graph.compare("LESS_THAN", frame, end)
+    moved = graph.attribute(MOVED, "BOOLEAN")  # vertices that the user adds have 0 in all attributes
+    if few:
+        looked_up = graph.both(moved, looked_up)
+    else:
+        waiting = graph.both(moved, waiting)
+        looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), looked_up)
+    since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, start), 0.0)
+    timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
+
+    graph.next_row()
+    rest, height = graph.attribute(REST, "FLOAT_VECTOR"), timelines.now(HEIGHT)
+    if not settled:
+        at_rest = graph.both(moved, graph.compare("LESS_EQUAL", end, frame))
+        geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
+    if not few:
+        geometry = graph.put(geometry, waiting, rest)
+    geometry = graph.put(geometry, looked_up, rest, graph.scaled(graph.up, height))
+
+    graph.next_row()
+    last = graph.attribute(LAST_CONTACT)
+    aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
+    shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
+    compression = timelines.now(COMPRESSION)
+    rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
+    age = graph.choose("FLOAT", waiting, timelines.now(AGE), NEVER)
+    for name, value, untouched in ((COMPRESSION, compression, 0.0), (RIM, rim, 0.0), (AGE, age, NEVER)):
+        graph.next_row()
+        if not few:
+            shaded = graph.store(shaded, name, untouched, waiting)
+        shaded = graph.store(shaded, name, value, looked_up)
+    graph.next_row()
+    shaded = graph.store(shaded, PRESSURE, timelines.now(PRESSURE), looked_up)
+    graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
+    return graph.tree
+
+
+def is_playback(tree: bpy.types.NodeTree) -> bool:
+    """Whether a node group is one that `build` made; before it was marked, only its name told."""
+    return MARK in tree.keys() or tree.name.split(".")[0] == GROUP  # noqa: SIM118  (an ID is no mapping)
+
+
+def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
+    """The object whose splines a group samples."""
+    for node in tree.nodes:
+        if node.bl_idname == "GeometryNodeObjectInfo":
+            found: bpy.types.Object | None = node.inputs["Object"].default_value
+            return found
+    return None
+
+
+class _Timelines:
+    """What the timelines of vertices say at a place along their splines."""
+
+    def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
+        info = graph.node("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value = table
+        self._graph, self._splines, self._length = graph, info.outputs["Geometry"], length
+        self._number = graph.attribute(SPLINE, "INT")
+
+    def now(self, name: str) -> Any:
+        return self._graph.sample(self._splines, name, self._number, self._length)
+
+
+class _Graph:
+    """A node group while it is built, laid out in rows."""
+
+    def __init__(self, name: str) -> None:
+        self.tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
+        self.tree.is_modifier = True
+        self.tree[MARK] = True
+        self._place = [0.0, 0.0]
+
+    def inputs(self, up: Sequence[float]) -> tuple[Any, Any]:
+        """The group's geometry and the scene's frame, with its fraction."""
+        interface = self.tree.interface
+        interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        shading = interface.new_socket("Shading", in_out="INPUT", socket_type="NodeSocketBool")
+        shading.default_value = True
+        shading.description = "Let compression, rim, age and pressure follow the time, for materials that read them"
+        direction = interface.new_socket("Up", in_out="INPUT", socket_type="NodeSocketVector")
+        direction.default_value = tuple(up)
+        direction.description = "World up in the space of the ground, of the length of one metre"
+        group = self.node("NodeGroupInput")
+        self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
+        return group.outputs["Geometry"], self.node("GeometryNodeInputSceneTime").outputs["Frame"]
+
+    def finish(self, geometry: Any) -> None:
+        node = self.node("NodeGroupOutput")
+        self.link(geometry, node.inputs["Geometry"])
+
+    def next_row(self) -> None:
+        self._place = [2 * COLUMN, self._place[1] - ROW]
+
+    def node(self, kind: str) -> Any:
+        node = self.tree.nodes.new(kind)
+        node.location = self._place
+        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
+        self._place[0] += COLUMN
+        return node
+
+    def link(self, source: Any, socket: Any) -> None:
+        """Connect an output, or set a number or vector."""
+        if isinstance(source, bpy.types.NodeSocket):
+            self.tree.links.new(source, socket)
+        else:
+            socket.default_value = source
+
+    def attribute(self, name: str, kind: str = "FLOAT") -> Any:
+        node = self.node("GeometryNodeInputNamedAttribute")
+        node.data_type = kind
+        node.inputs["Name"].default_value = name
+        return node.outputs["Attribute"]
+
+    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Put the selected vertices elsewhere."""
+        node = self.node("GeometryNodeSetPosition")
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(position, node.inputs["Position"])
+        self.link(offset, node.inputs["Offset"])
+        return node.outputs["Geometry"]
+
+    def store(self, geometry: Any, name: str, value: Any, selection: Any) -> Any:
+        """Give the selected vertices another number of that name."""
+        node = self.node("GeometryNodeStoreNamedAttribute")
+        node.data_type, node.domain = "FLOAT", "POINT"
+        node.inputs["Name"].default_value = name
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(value, node.inputs["Value"])
+        return node.outputs["Geometry"]
+
+    def math(self, operation: str, first: Any, second: Any) -> Any:
+        node = self.node("ShaderNodeMath")
+        node.operation = operation
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Value"]
+
+    def both(self, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeBooleanMath")
+        node.operation = "AND"
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Boolean"]
+
+    def compare(self, operation: str, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeCompare")
+        node.data_type, node.operation = "FLOAT", operation
+        self.link(first, node.inputs["A"])
+        self.link(second, node.inputs["B"])
+        return node.outputs["Result"]
+
+    def scaled(self, vector: Any, factor: Any) -> Any:
+        node = self.node("ShaderNodeVectorMath")
+        node.operation = "SCALE"
+        self.link(vector, node.inputs[0])
+        self.link(factor, node.inputs["Scale"])
+        return node.outputs["Vector"]
+
+    def sample(self, splines: Any, name: str, number: Any, length: Any) -> Any:
+        """A number of the points of a spline, at a length along it."""
+        node = self.node("GeometryNodeSampleCurve")
+        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
+        self.link(splines, node.inputs["Curves"])
+        self.link(self.attribute(name), node.inputs["Value"])
+        self.link(length, node.inputs["Length"])
+        self.link(number, node.inputs["Curve Index"])
+        return node.outputs["Value"]
+
+    def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
+        node = self.node("GeometryNodeSwitch")
+        node.input_type = kind
+        self.link(switch, node.inputs["Switch"])
+        self.link(when_false, node.inputs["False"])
+        self.link(when_true, node.inputs["True"])
+        return node.outputs["Output"]

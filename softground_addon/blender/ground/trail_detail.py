@@ -1,0 +1,155 @@
+"""Detail along the trail: where the ground is coarse, a copy of it that is fine under the prints takes them.
+
+The user's ground is hidden and otherwise left alone; removing the copy shows it again. While it is hidden, the copy is
+selected and active in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.cell_keys import cells_at, cells_of, keys_of
+from ...core.pressed_ground import PressedGround
+from ...core.refinement import Refinement, Region, Surface
+from . import ground_mesh, playback, refined_mesh
+
+Array = NDArray[np.float64]
+
+DETAIL_OF = "softground_detail_of"
+"""Property of the copy: the ground that it stands in for."""
+NAMED = "softground_named"
+"""Property of the copy: the name that it was given. Duplicates of it get another one, and carry the same properties."""
+WAS_HIDDEN = "softground_was_hidden"
+"""Property of the ground while it is hidden: whether it was in viewports and renders before."""
+
+FLOOR = 1e-4
+"""Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
+
+
+def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The copy that takes the prints in place of a ground, which is hidden meanwhile; no duplicate of it."""
+    if not hides(ground):
+        return None  # a copy of the copy may still be there, as the user's own
+    candidates = [
+        thing for thing in bpy.data.objects if thing.get(DETAIL_OF) == ground and thing.library == ground.library
+    ]
+    # If the user has renamed it, it is the one that was there first in this session.
+    return min(candidates, key=lambda thing: (thing.get(NAMED) != thing.name, thing.session_uid), default=None)
+
+
+def hides(ground: bpy.types.Object) -> bool:
+    """Whether the ground is hidden in favour of a copy."""
+    return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def region_of(pressed: PressedGround) -> Region:
+    """The cells whose displayed height changes."""
+    columns, rows = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
+    for window in pressed.smooth.tile_windows():
+        row, column = np.nonzero(pressed.smooth.read(window).sum(axis=0) > FLOOR)
+        columns.append(column + window.column)
+        rows.append(row + window.row)
+    return Region(np.concatenate(columns), np.concatenate(rows), pressed.smooth.cell_size)
+
+
+def region_around(footfalls: Array, cell_size: float, reach: float) -> Region:
+    """The cells within reach of where feet come down (N, 2), before it is known what they press [m]."""
+    far = int(np.ceil(reach / cell_size)) + 1
+    row, column = np.mgrid[-far : far + 1, -far : far + 1]
+    disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
+    cells = cells_of(np.unique(cells_at(footfalls, cell_size)[:, None] + disc))
+    return Region(cells[:, 0], cells[:, 1], cell_size)
+
+
+def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:
+    """The faces of the ground as its modifiers leave it, in world space [m]."""
+    with ground_mesh.undisturbed_copy(ground) as source:
+        return refined_mesh.surface_of(source, ground_mesh.to_world_of(ground, unit_scale))
+
+
+@contextmanager
+def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Iterator[bpy.types.Object]:
+    """The refined ground as an object that is in no scene yet; one that is in none at the end is taken away."""
+    with ground_mesh.undisturbed_copy(ground) as source:
+        groups = [group.name for group in ground.vertex_groups]
+        mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
+    del surface, refinement  # they may be large, and the draft is there for long
+    detail = ground.copy()
+    detail.name = f"{ground.name} Trail"
+    detail.modifiers.clear()
+    detail.data = mesh
+    _show_again(detail)
+    try:
+        yield detail
+    finally:
+        if not detail.users_collection:
+            ground_mesh.discard(detail)
+
+
+def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:
+    """Show the refined ground in place of the ground, which is hidden.
+
+    Where there is a copy already, it gets the mesh, and the draft stays out.
+    """
+    detail = detail_of(ground)
+    if detail is not None:
+        _exchange_mesh(detail, ground_mesh.mesh_of(draft))
+        return detail
+    draft[DETAIL_OF], draft[NAMED] = ground, draft.name
+    if not hides(ground):
+        ground[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
+    for collection in ground.users_collection:
+        collection.objects.link(draft)
+    _choose_instead(draft, ground)
+    ground.hide_viewport = ground.hide_render = True
+    return draft
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
+    detail = detail_of(ground)
+    _show_again(ground)
+    if detail is None:
+        return
+    _choose_instead(ground, detail)
+    ground_mesh.discard(detail)
+
+
+def _show_again(thing: bpy.types.Object) -> None:
+    """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
+    if hides(thing):
+        thing.hide_viewport, thing.hide_render = (bool(value) for value in thing[WAS_HIDDEN])
+        del thing[WAS_HIDDEN]
+
+
+def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:
+    """Select one object, and make it the active one, wherever the other is that."""
+    for scene in gone.users_scene:
+        for layer in scene.view_layers:
+            layer.update()  # an object that has just come in, or was hidden, cannot be selected yet
+            if gone.name in layer.objects and shown.name in layer.objects:
+                shown.select_set(gone.select_get(view_layer=layer), view_layer=layer)
+                if layer.objects.active == gone:
+                    layer.objects.active = shown
+
+
+def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
+    """Give the copy a new mesh of the same name; its materials and what the user added to the object stay."""
+    playback.remove(detail)
+    old: Any = detail.data
+    for place, material in enumerate(old.materials):
+        if place < len(mesh.materials):
+            mesh.materials[place] = material
+        else:
+            mesh.materials.append(material)
+    detail.data = mesh
+    name = old.name
+    if not old.users:
+        bpy.data.meshes.remove(old)
+    mesh.name = name

@@ -1,0 +1,145 @@
+"""Operators that correct the list of characters: take one out, find its bones again, add and remove soles."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import bpy
+
+from ...core.errors import InputError
+from .. import settings
+from ..characters import character_setup
+from ..characters.character_setup import ancestors
+from ..operator_base import reports_errors
+
+
+def active_character(scene: bpy.types.Scene) -> Any:
+    """The character that is chosen in the list, or None."""
+    options = scene.softground
+    if 0 <= options.active_character < len(options.characters):
+        return options.characters[options.active_character]
+    return None
+
+
+def active_sole(scene: bpy.types.Scene) -> Any:
+    """The sole that is chosen in the list of the active character, or None."""
+    character = active_character(scene)
+    if character and 0 <= character.active_sole < len(character.soles):
+        return character.soles[character.active_sole]
+    return None
+
+
+class _OnCharacter:
+    """Operators that need a chosen character."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen."""
+        if active_character(settings.scene_of(context)) is None:
+            cast("Any", cls).poll_message_set("Add a character first")
+            return False
+        return True
+
+
+class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
+    """Take the character out of the list; its armature and the ground stay as they are"""
+
+    bl_idname = "softground.remove_character"
+    bl_label = "Remove Character"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        options = settings.scene_of(context).softground
+        options.characters.remove(options.active_character)
+        options.active_character = max(0, min(options.active_character, len(options.characters) - 1))
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_detect_bones(_OnCharacter, bpy.types.Operator):
+    """Find the feet and joints of the character again, by the names of its bones or its rest pose"""
+
+    bl_idname = "softground.detect_bones"
+    bl_label = "Detect Bones"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        character_setup.detect_bones(active_character(settings.scene_of(context)))
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
+    """Let the selected bones or objects print too: hands, knees, canes, snowshoes. Each presses with whatever side of
+    it faces down"""
+
+    bl_idname = "softground.add_contact"
+    bl_label = "Add Contact"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        posed = context.object if context.mode == "POSE" else None
+        if posed is not None:
+            character = next((one for one in scene.softground.characters if one.armature == posed), None)
+            if character is None:
+                raise InputError(f"'{posed.name}' is no character yet: press Add Character first.")
+            bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
+            added = character_setup.add_bone_contacts(character, bones)
+        else:
+            characters = scene.softground.characters
+            things = [thing for thing in context.selected_objects if all(thing != one.armature for one in characters)]
+            wearer = next(
+                (one for one in characters if any(one.armature in ancestors(thing) for thing in things)), None
+            )
+            character = wearer or active_character(scene)
+            added = character_setup.add_object_contacts(scene, character, things)
+        self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
+    """Add something that prints: a foot, a hand, a snowshoe"""
+
+    bl_idname = "softground.add_sole"
+    bl_label = "Add Sole"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        character = active_character(settings.scene_of(context))
+        taken = {sole.name for sole in character.soles}
+        sole = character.soles.add()
+        number = next(number for number in range(1, len(taken) + 2) if f"sole {number}" not in taken)
+        sole.name = f"sole {number}"
+        character.active_sole = len(character.soles) - 1
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
+    """Take the chosen sole out of the list: it leaves no prints"""
+
+    bl_idname = "softground.remove_sole"
+    bl_label = "Remove Sole"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if active_sole(settings.scene_of(context)) is None:
+            cls.poll_message_set("Choose a sole in the list first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        character = active_character(settings.scene_of(context))
+        character.soles.remove(character.active_sole)
+        character.active_sole = max(0, min(character.active_sole, len(character.soles) - 1))
+        return {"FINISHED"}
+
+
+CLASSES = (
+    SOFTGROUND_OT_remove_character,
+    SOFTGROUND_OT_detect_bones,
+    SOFTGROUND_OT_add_contact,
+    SOFTGROUND_OT_add_sole,
+    SOFTGROUND_OT_remove_sole,
+)

@@ -1,0 +1,324 @@
+"""The bake as the user runs it: in small steps between events, with progress, time left, and a way out."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import bpy
+
+from ...core.errors import InputError, SoftGroundError
+from .. import jobs, session, settings
+from ..baking import bake_job, sink_feet
+from ..characters.character_setup import characters_of
+from ..operator_base import reports_errors
+from ..reading import analysis
+from ..translation import iface_, rpt_
+
+TICK = 0.02
+"""Longest work between two looks at the user's events [s]; a single step of the bake may exceed it."""
+
+TIMER_STEP = 0.001
+"""Time left to the events between two ticks [s]; what they and Blender's drawing need beyond, they take."""
+
+LONG_DRAWING = 0.02
+"""Time that Blender took for itself after which its user's events come before more work [s]."""
+
+SHOWN_FOR = 0.15
+"""Shortest time between two drawings of the progress [s]: they cost more than many a tick."""
+
+WORK_PER_DRAWING = 4.0
+"""Least time for work, as a multiple of that for drawing, where drawing takes long."""
+
+STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
+
+_NAVIGATION = (
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "MIDDLEMOUSE",
+    "WHEEL",
+    "TRACKPAD",
+    "MOUSEROTATE",
+    "MOUSESMARTZOOM",
+    "NDOF",
+    "TIMER",
+    "WINDOW_DEACTIVATE",
+)
+"""Events that change nothing in the file (first parts of their names): they go on to Blender during a bake."""
+
+_running: list[_Bake] = []
+"""The operator that is baking, for the handlers that have to end it before its scene goes away; at most one."""
+
+
+class _Bake(bpy.types.Operator):
+    """What operators that bake have in common: blocking in a script, modal for the user."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is something to bake; otherwise the button says what is missing."""
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        with analysis.own_changes(scene):
+            result = jobs.run(self._job_of(scene))
+        self._show(result)
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
+        return run(context)
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        raise NotImplementedError
+
+    @reports_errors
+    def _start(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        self._job, self._scene, self._needed = self._job_of(scene), scene.session_uid, _read_by_bake(scene)
+        self._started = self._ticked = self._show_at = time.perf_counter()
+        self._gave_way = False
+        self._progress: jobs.Progress | None = None
+        next(self._job)  # what cannot be baked is refused before anything moves
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
+        self._workspace = context.workspace.name
+        manager.progress_begin(0.0, 1.0)
+        self._show_status(0.0, iface_(STAGE_NAMES["sample"]))
+        manager.modal_handler_add(self)
+        _running.append(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self not in _running:
+            return {"CANCELLED"}  # ended by `stop`
+        if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
+            self._end()
+            self.report({"INFO"}, rpt_("Bake cancelled: nothing was changed"))
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            try:
+                return self._tick()
+            finally:
+                self._ticked = time.perf_counter()
+        return {"PASS_THROUGH"} if _is_harmless(context, event) else {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """End the bake as Blender quits or opens another file."""
+        self._end()
+
+    def _tick(self) -> set[str]:
+        now = time.perf_counter()
+        waited = now - self._ticked
+        if session.is_rendering():  # it reads what a bake reads and writes: it has the scene for itself
+            self._started += waited
+            if now > self._show_at:
+                self._show_at = now + SHOWN_FOR
+                self._show_status(session.current().progress, iface_("Waiting for the render"))
+            return {"PASS_THROUGH"}
+        self._gave_way = waited > LONG_DRAWING and not self._gave_way
+        if self._gave_way:  # to the events that have come while Blender drew: they wait for its drawing or a tick
+            self._show_at = max(self._show_at, now + WORK_PER_DRAWING * waited)
+            return {"PASS_THROUGH"}
+        if self._progress and now > self._show_at:  # a tick works or has something drawn
+            self._show_at = now + SHOWN_FOR
+            self._show_progress(self._progress)
+            return {"PASS_THROUGH"}
+        try:
+            _check_still_there(self._needed)
+            result = self._work(until=now + TICK)
+        except SoftGroundError as error:
+            self._end()
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except BaseException:
+            self._end()
+            raise
+        if result is None:
+            return {"PASS_THROUGH"}
+        self._end()
+        self._show(result)
+        return {"FINISHED"}
+
+    def _work(self, until: float) -> bake_job.BakeResult | None:
+        """Go on with the bake until a time; the result if it is done by then."""
+        scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
+        blocks = _count_of_blocks()
+
+        def goes_on() -> bool:
+            if self._progress and self._progress.overall >= 1.0:
+                return True  # what is written is not cancelled
+            drawn_anew = _count_of_blocks() != blocks  # the whole window, as soon as the tick ends
+            return time.perf_counter() < until and not drawn_anew
+
+        with analysis.own_changes(scene):
+            try:
+                self._progress = next(self._job)
+                while goes_on():
+                    self._progress = next(self._job)
+            except StopIteration as finished:
+                result: bake_job.BakeResult = finished.value
+                return result
+        return None
+
+    def _show_progress(self, progress: jobs.Progress) -> None:
+        done = max(session.current().progress, progress.overall)
+        passed = time.perf_counter() - self._started
+        left = passed * (1.0 - done) / max(done, 1e-3)
+        bpy.context.window_manager.progress_update(done)
+        status = iface_("{stage}: {seconds} s left")
+        self._show_status(done, status.format(stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))))
+
+    def _show_status(self, progress: float, status: str) -> None:
+        label, way_out = iface_("Bake Footprints"), iface_("Cancel")
+        self._write_status_bar(f"{label} {progress:.0%}  |  {status}  |  [Esc] {way_out}")
+        session.show_bake(progress, status)
+
+    def _write_status_bar(self, text: str | None) -> None:
+        workspace = bpy.data.workspaces.get(self._workspace)
+        if workspace:
+            workspace.status_text_set(text)
+
+    def _end(self) -> None:
+        """Leave nothing behind: no job, no timer, no progress. What the job has not written yet is never written."""
+        if self not in _running:
+            return
+        _running.remove(self)
+        self._job.close()
+        manager = bpy.context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        self._write_status_bar(None)
+        session.current().cancel_requested = False
+        session.show_no_bake()
+
+    def _show(self, result: bake_job.BakeResult) -> None:
+        raise NotImplementedError
+
+
+class SOFTGROUND_OT_bake(_Bake):
+    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
+
+    bl_idname = "softground.bake"
+    bl_label = "Bake Footprints"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        return bake_job.bake(scene)
+
+    def _show(self, result: bake_job.BakeResult) -> None:
+        totals: Any = result.report["totals"]
+        warnings: Any = result.report["warnings"]
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
+        text = rpt_("{steps} steps, deepest print {depth:.1f} cm").format(
+            steps=totals["steps"], depth=totals["max_depth_m"] * 100
+        )
+        steps: Any = result.report["steps"]
+        now = settings.scene_of(bpy.context).frame_current
+        if steps and all(now < step["frame_start"] for step in steps):  # the ground looks as it did before
+            text += rpt_(". Press Play to see them")
+        self.report({"INFO"}, text)
+
+
+class SOFTGROUND_OT_sink_feet(_Bake):
+    """Let the feet down into their prints, hips and knees with them: switch Grounding on and bake it as a layer above
+    the animation. The prints stay as they are, and Clear Bake takes the layer off. Esc cancels"""
+
+    bl_idname = "softground.sink_feet"
+    bl_label = "Sink Feet"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+        return sink_feet.sink_feet(scene)
+
+    def _show(self, result: bake_job.BakeResult) -> None:
+        gaps: Any = result.report["gaps_mm"]
+        left = rpt_("Feet stand on their prints; the largest gap left is {gap:.1f} mm")
+        largest = max(gap["max"] for of_one in gaps["after"].values() for gap in of_one.values())
+        self.report({"INFO"}, left.format(gap=largest))
+
+
+class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
+    """End the bake now; the scene stays as it was"""
+
+    bl_idname = "softground.cancel_bake"
+    bl_label = "Cancel Bake"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether there is a bake to cancel."""
+        cls.poll_message_set("No bake is running")
+        return bool(session.current().is_baking)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session.current().cancel_requested = True
+        return {"FINISHED"}
+
+
+def stop() -> None:
+    """End the bake that may be running, as the scene that it works on is about to be replaced."""
+    for operator in list(_running):
+        operator._end()
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """What keeps a bake from starting, or an empty text."""
+    state = session.current()
+    if state.is_baking:
+        return "A bake is running"
+    if session.is_rendering():
+        return "A render is running: wait until it has ended"
+    if state.is_live:
+        return "Live mode is on: stop it first"
+    if not characters_of(settings.scene_of(context)):
+        return "Add a character first: select its armature and press Add Character"
+    return ""
+
+
+def _read_by_bake(scene: bpy.types.Scene) -> dict[int, str]:
+    """Scene, ground, armatures and soles of a bake: their names, by their identifiers in this session."""
+    options = scene.softground
+    soles = [sole.object for character in options.characters for sole in character.soles]
+    blocks = (scene, options.ground, *(character.armature for character in options.characters), *soles)
+    return {block.session_uid: block.name for block in blocks if block}
+
+
+def _count_of_blocks() -> int:
+    """Number of the file's data-blocks of the kinds that a bake makes."""
+    data = bpy.data
+    return sum(len(kind) for kind in (data.scenes, data.objects, data.meshes, data.materials, data.node_groups))
+
+
+def _check_still_there(needed: dict[int, str]) -> None:
+    """Raise InputError if something that a bake reads was deleted meanwhile: Blender does not survive its use."""
+    found = {block.session_uid for blocks in (bpy.data.scenes, bpy.data.objects) for block in blocks}
+    gone = [name for uid, name in needed.items() if uid not in found]
+    if gone:
+        raise InputError(f"'{gone[0]}' was deleted while the bake read it: nothing was changed. Bake again.")
+
+
+def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Whether an event neither edits, saves nor renders: it navigates, or clicks in the panel (it can cancel)."""
+    if event.type.startswith(_NAVIGATION):
+        return True
+    if event.type != "LEFTMOUSE":
+        return False
+    for area in context.screen.areas if context.screen else ():
+        for region in area.regions:
+            if (
+                area.type in session.PANEL_AREAS
+                and region.type == "UI"
+                and 0 <= event.mouse_x - region.x < region.width
+                and 0 <= event.mouse_y - region.y < region.height
+            ):
+                return True
+    return False
+
+
+CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_sink_feet, SOFTGROUND_OT_cancel_bake)

@@ -1,0 +1,174 @@
+"""What the buttons do. Each operator is thin: it calls one function, and its errors become a report."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import InputError
+from ...core.manifest import BatchShot
+from ...core.shell import command_line
+from .. import jobs, session, settings
+from ..characters import character_setup
+from ..command_line import batch
+from ..ground import baked_ground, ground_checks, ground_mesh
+from ..ground.created_ground import create_ground
+from ..operator_base import reports_errors
+from ..reading import analysis, shots
+from ..response import response_job
+from ..translation import rpt_
+
+
+class SOFTGROUND_OT_add_character(bpy.types.Operator):
+    """Add the active armature: its feet, hips and limbs are recognized by their names or by the rest pose. Without an
+    armature, add the selected mesh objects as things that fall, roll or slide"""
+
+    bl_idname = "softground.add_character"
+    bl_label = "Add Character"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        armature = _armature_of(context.active_object)
+        if armature is not None and armature.type == "MESH":
+            selected = [
+                thing for thing in context.selected_objects if thing.type == "MESH" and not thing.find_armature()
+            ]
+            added = character_setup.add_things(scene, dict.fromkeys([armature, *selected]))
+            self.report({"INFO"}, "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added))
+        else:
+            character = character_setup.add_character(scene, armature)
+            names = ", ".join(sole.name for sole in character.soles)
+            self.report({"INFO"}, f"Added '{character.name}' with {names}")
+        if not bpy.app.background:
+            with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+                analysis.read(scene)
+        return {"FINISHED"}
+
+
+def _armature_of(thing: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The object itself, or the armature that deforms it: clicking a character mostly selects its mesh."""
+    if thing is not None and thing.type == "MESH":
+        return thing.find_armature() or thing
+    return thing
+
+
+class SOFTGROUND_OT_create_ground(bpy.types.Operator):
+    """Take the selected mesh as the ground as it is; with none selected, create one that fits the walk"""
+
+    bl_idname = "softground.create_ground"
+    bl_label = "Create Ground"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        chosen = _selected_ground(context)
+        if chosen is not None:
+            ground_checks.check_usable(chosen)
+            settings.scene_of(context).softground.ground = chosen
+            self.report({"INFO"}, f"'{chosen.name}' is the ground")
+            return {"FINISHED"}
+        scene = settings.scene_of(context)
+        plan = jobs.run(shots.fit_ground(scene))
+        with analysis.own_changes(scene):
+            ground = create_ground(scene, plan)
+        for warning in plan.warnings:
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
+        return {"FINISHED"}
+
+
+def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a selected mesh that no character wears or carries and that does not print itself."""
+    thing = context.active_object
+    if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
+        return None
+    characters = settings.scene_of(context).softground.characters
+    above = character_setup.ancestors(thing)
+    belongs = any(one.armature in above or any(sole.object == thing for sole in one.soles) for one in characters)
+    return None if belongs else thing
+
+
+class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
+    """Take the footprints off the ground and the response off the characters: all is as before the bake"""
+
+    bl_idname = "softground.clear_bake"
+    bl_label = "Clear Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        if (ground is None or not baked_ground.has_remains(ground)) and not response_job.has_layers(scene):
+            cls.poll_message_set("There is no bake on the ground")
+            return False
+        if session.current().is_live:
+            cls.poll_message_set("Live mode is on: stop it with Discard or Keep")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        ground = scene.softground.ground
+        with analysis.own_changes(scene):
+            if ground is not None and baked_ground.has_remains(ground):
+                baked_ground.clear(ground)
+            response_job.remove_layers(scene)
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
+    """Copy the command line that bakes this shot as it is saved, into a new file beside it. For a terminal or a farm"""
+
+    bl_idname = "softground.copy_bake_command"
+    bl_label = "Copy Bake Command"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether the file on disk is the one that is open."""
+        if not bpy.data.filepath:
+            cls.poll_message_set("Save the file first: the command bakes it from there")
+            return False
+        if bpy.data.is_dirty and not bpy.app.background:  # in background it always is
+            cls.poll_message_set("Save your changes first: the command bakes the file as it is saved")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = bake_command(settings.scene_of(context))
+        self.report({"INFO"}, rpt_("Copied the command that bakes this shot"))
+        return {"FINISHED"}
+
+
+def bake_command(scene: bpy.types.Scene) -> str:
+    """The command line that bakes a scene of the saved file into `NAME-baked.blend` beside it.
+
+    Raises
+    ------
+    InputError
+        If a name in it cannot be typed.
+    """
+    shot = Path(bpy.data.filepath)
+    bake = BatchShot(
+        name=shot.stem,
+        file=shot,
+        scene=scene.name if len(bpy.data.scenes) > 1 else "",
+        save=shot.with_name(f"{shot.stem}-baked.blend"),
+    )
+    return command_line(batch.worker_command(shot, bake.options), windows=os.name == "nt")
+
+
+CLASSES = (
+    SOFTGROUND_OT_add_character,
+    SOFTGROUND_OT_create_ground,
+    SOFTGROUND_OT_clear_bake,
+    SOFTGROUND_OT_copy_bake_command,
+)

@@ -1,0 +1,255 @@
+"""The overlay in the viewport: predicted footfalls, soles, forces, and the cells of the frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core import record
+from ...core.errors import InputError
+from ...core.footprints import Footprint
+from .. import session, settings
+from ..ground import baked_ground
+from ..live import live
+from ..operator_base import OnShot, reports_errors
+from ..reading import analysis
+from . import forecast, overlay_shapes
+from .overlay_shapes import Cells, Outline
+
+Array = NDArray[np.float64]
+Colour = tuple[float, float, float, float]
+
+SIDES: dict[str, Colour] = {"L": (0.25, 0.6, 1.0, 1.0), "R": (1.0, 0.35, 0.3, 1.0), "": (0.9, 0.8, 0.3, 1.0)}
+FORCES: dict[str, Colour] = {
+    "weight": (0.3, 0.85, 0.35, 1.0),
+    "momentum": (1.0, 0.75, 0.15, 1.0),
+    "total": (0.95, 0.2, 0.2, 1.0),
+}
+CONTACT: Colour = (0.95, 0.25, 0.2, 0.45)
+RIM: Colour = (0.25, 0.75, 0.95, 0.35)
+LINE, BOLD_LINE = 1.5, 3.0
+"""Widths of lines [px, before the interface's scale]."""
+HEAD = 0.15
+"""Length of an arrow's head, in lengths of the arrow."""
+TEXT_SIZE = 13
+"""Size of the numbers [px, before the interface's scale]."""
+
+
+@dataclass(frozen=True)
+class _ById:
+    """An analysis that is compared by identity, so that what was worked out for it can be kept."""
+
+    analysis: Any
+
+    def __hash__(self) -> int:
+        return id(self.analysis)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ById) and other.analysis is self.analysis
+
+
+@lru_cache(maxsize=2)
+def _footfalls(source: _ById) -> list[Outline]:
+    return overlay_shapes.footfalls(source.analysis.loads, source.analysis.shot.terrain)
+
+
+_bake: dict[tuple[int, bytes], tuple[Sequence[Footprint], float]] = {}
+"""Footprints and rim reach [m] of the bake that was shown last, by its mesh and what tells its record from others."""
+
+
+def draw_shapes() -> None:
+    """Draw lines and faces in world space; for the viewport's draw handler."""
+    state = session.current()
+    context: Any = bpy.context
+    if not state.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
+        return
+    foretold = forecast.of(settings.scene_of(context))
+    if foretold is None:
+        return
+    known = foretold.analysis
+    import gpu  # noqa: PLC0415  (not there in background)
+
+    scene = settings.scene_of(context)
+    frame = float(scene.frame_current)
+    metre = 1.0 / scene.unit_settings.scale_length
+    gpu.state.blend_set("ALPHA")
+    try:
+        if state.show_cells:
+            contact, rim, size = _cells(scene)
+            for cells, colour in ((contact, CONTACT), (rim, RIM)):
+                _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
+        if state.show_footfalls:
+            for outline in _footfalls(_ById(known)):
+                _line(_closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
+        if state.show_soles:
+            for outline in overlay_shapes.soles(known.loads, frame):
+                _line(_closed(outline.points) * metre, SIDES[outline.side], BOLD_LINE)
+        if state.show_forces:
+            for arrow in overlay_shapes.arrows(known.loads, frame):
+                _arrow(arrow.start * metre, arrow.end * metre, FORCES[arrow.kind])
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def draw_numbers() -> None:
+    """Number the footfalls; for the viewport's draw handler in pixels."""
+    state = session.current()
+    context: Any = bpy.context
+    if not (state.show_overlay and state.show_footfalls) or not context.space_data.overlay.show_overlays:
+        return
+    foretold = forecast.of(settings.scene_of(context))
+    if foretold is None:
+        return
+    known = foretold.analysis
+    import blf  # noqa: PLC0415
+    from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
+
+    metre = 1.0 / settings.scene_of(context).unit_settings.scale_length
+    blf.size(0, TEXT_SIZE * context.preferences.system.ui_scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+    for number, outline in enumerate(_footfalls(_ById(known)), start=1):
+        place = location_3d_to_region_2d(context.region, context.region_data, Vector((outline.middle * metre).tolist()))
+        if place is None:
+            continue
+        text = f"{number}"
+        width, height = blf.dimensions(0, text)
+        blf.position(0, place.x - width / 2, place.y - height / 2, 0)
+        blf.color(0, *SIDES[outline.side])
+        blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
+    """The cells in contact and in the rim at the scene's frame, and their size [m], from live mode or from the bake."""
+    shown = live.in_contact(scene)
+    if shown is not None:
+        windows, size, reach = shown
+        touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
+    else:
+        footprints, reach = _baked(scene.softground.ground)
+        size = footprints[0].cell_size if footprints else 1.0
+        touched = list(overlay_shapes.touched_at(footprints, float(scene.frame_current)))
+    return *overlay_shapes.contact_and_rim(touched, reach / size), size
+
+
+def _baked(ground: bpy.types.Object | None) -> tuple[Sequence[Footprint], float]:
+    """The footprints on a ground, and the reach of their rims [m]; nothing where there is no bake that can be read."""
+    if ground is None or not baked_ground.is_baked(ground):
+        return (), 0.0
+    try:
+        tail = bytes(baked_ground.stored_record(ground)[-record.TAIL :])
+        key = (baked_ground.carrier_of(ground).data.session_uid, tail)
+        if key not in _bake:
+            footprints, about = baked_ground.load(ground)
+            _bake.clear()
+            _bake[key] = footprints, baked_ground.baked_with(about, "rim_reach")
+    except InputError:
+        return (), 0.0
+    return _bake[key]
+
+
+def _line(points: Array, colour: Colour, width: float) -> None:
+    import gpu  # noqa: PLC0415
+    from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
+
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    viewport: Any = gpu.state.viewport_get()
+    shader.uniform_float("viewportSize", viewport[2:])
+    shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
+    shader.uniform_float("color", colour)
+    content: Any = {"pos": points.astype(np.float32)}
+    batch_for_shader(shader, "LINE_STRIP", content).draw(shader)
+
+
+def _fill(triangles: Array, colour: Colour) -> None:
+    import gpu  # noqa: PLC0415
+    from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
+
+    if not len(triangles):
+        return
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", colour)
+    content: Any = {"pos": triangles.astype(np.float32)}
+    batch_for_shader(shader, "TRIS", content).draw(shader)
+
+
+def _arrow(start: Array, end: Array, colour: Colour) -> None:
+    """A line with a head that faces the viewer."""
+    context: Any = bpy.context
+    view = np.array(context.region_data.view_matrix.inverted().col[2][:3])
+    along = end - start
+    aside = np.cross(along, view)
+    length = float(np.linalg.norm(aside))
+    _line(np.stack([start, end]), colour, BOLD_LINE)
+    if length > 0:
+        base = end - HEAD * along
+        wing = aside / length * float(np.linalg.norm(along)) * HEAD / 2
+        _fill(np.stack([end, base + wing, base - wing]), colour)
+
+
+def _closed(points: Array) -> Array:
+    return np.concatenate([points, points[:1]])
+
+
+def _faded(colour: Sequence[float], alpha: float) -> Colour:
+    return (colour[0], colour[1], colour[2], colour[3] * alpha)
+
+
+class SOFTGROUND_OT_overlay(OnShot, bpy.types.Operator):
+    """Show predicted footfalls, soles, forces and the cells of the frame in the viewport"""
+
+    bl_idname = "softground.overlay"
+    bl_label = "Footfall Overlay"
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        state = session.current()
+        if not state.show_overlay:
+            analysis.read(settings.scene_of(context))
+        state.show_overlay = not state.show_overlay
+        session.redraw()
+        session.redraw(region_type="WINDOW")
+        return {"FINISHED"}
+
+
+def read_again() -> None:
+    """Predict anew after an edit, for a timer."""
+    scene = bpy.context.window_manager.windows[0].scene if bpy.context.window_manager.windows else None
+    if scene is not None and session.current().show_overlay:
+        try:
+            analysis.read(scene)
+        except InputError:
+            return
+        session.redraw(region_type="WINDOW")
+
+
+_handles: list[Any] = []
+"""What Blender wants back to take the draw handlers away."""
+
+
+def register() -> None:
+    """Add the draw handlers, where there is anything to draw on."""
+    if not bpy.app.background:
+        for draw, when in ((draw_shapes, "POST_VIEW"), (draw_numbers, "POST_PIXEL")):
+            _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when))
+
+
+def unregister() -> None:
+    """Take the draw handlers away and forget what was worked out."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+    if bpy.app.timers.is_registered(read_again):
+        bpy.app.timers.unregister(read_again)
+    _footfalls.cache_clear()
+    _bake.clear()
+
+
+CLASSES = (SOFTGROUND_OT_overlay,)

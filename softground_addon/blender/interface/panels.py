@@ -1,0 +1,407 @@
+"""The sidebar: what to set, in the order of work. Panels read and show; nothing is computed or changed in `draw`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.cell_limits import BYTES_PER_CELL
+from ...core.motion import JOINTS
+from .. import session, settings
+from ..baking import bake_report
+from ..characters.character_setup import is_set_up, is_thing
+from ..ground import baked_ground, ground_checks, ground_mesh
+from ..response import response_job
+from ..translation import iface_
+from . import forecast
+from .character_editing import active_character, active_sole
+
+CATEGORY = "SoftGround"
+
+
+class _Panel:
+    bl_space_type: Any = "VIEW_3D"
+    bl_region_type: Any = "UI"
+    bl_category = CATEGORY
+
+    layout: Any
+
+    def column(self) -> bpy.types.UILayout:
+        """The layout in Blender's property style; greyed while a bake runs."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.enabled = not session.current().is_baking
+        return layout
+
+
+class SOFTGROUND_UL_characters(bpy.types.UIList):
+    """Characters by name, each with its armature."""
+
+    def draw_item(
+        self,
+        _context: Any,
+        layout: Any,
+        _data: Any,
+        item: Any,
+        _icon: Any,
+        _active: Any,
+        _property: Any,
+        _index: int = 0,
+    ) -> None:
+        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_thing(item) else "ERROR"
+        layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
+
+
+class SOFTGROUND_UL_soles(bpy.types.UIList):
+    """Soles by name, each with its side."""
+
+    def draw_item(
+        self,
+        _context: Any,
+        layout: Any,
+        _data: Any,
+        item: Any,
+        _icon: Any,
+        _active: Any,
+        _property: Any,
+        _index: int = 0,
+    ) -> None:
+        icon = "MESH_CUBE" if item.object else "BONE_DATA" if item.kind == "LIMB" else "MOD_DYNAMICPAINT"
+        layout.prop(item, "name", text="", emboss=False, icon=icon)
+        layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
+
+
+class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
+    """Who walks"""
+
+    bl_label = "Character"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        options = settings.scene_of(context).softground
+        if not options.characters:
+            column = layout.column()
+            column.scale_y = 1.4
+            column.operator("softground.add_character", icon="ARMATURE_DATA")
+            return
+        row = layout.row()
+        row.template_list(
+            "SOFTGROUND_UL_characters", "", options, "characters", options, "active_character", rows=2, maxrows=5
+        )
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_character", text="", icon="ADD")
+        buttons.operator("softground.remove_character", text="", icon="REMOVE")
+        character = active_character(settings.scene_of(context))
+        if character:
+            if not is_thing(character):
+                layout.prop(character, "armature")
+            layout.prop(character, "mass")
+            layout.prop(character, "force_model")
+
+
+class _OfCharacter(_Panel):
+    bl_parent_id = "SOFTGROUND_PT_character"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen."""
+        character = active_character(settings.scene_of(context))
+        return bool(character and is_set_up(character))
+
+
+class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
+    """What prints"""
+
+    bl_label = "Soles"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        scene = settings.scene_of(context)
+        character = active_character(scene)
+        row = layout.row()
+        row.template_list("SOFTGROUND_UL_soles", "", character, "soles", character, "active_sole", rows=3, maxrows=6)
+        buttons = row.column(align=True)
+        buttons.operator("softground.add_sole", text="", icon="ADD")
+        buttons.operator("softground.remove_sole", text="", icon="REMOVE")
+        layout.operator("softground.add_contact", icon="PLUS")
+        sole = active_sole(scene)
+        if not sole:
+            return
+        if character.armature:
+            bones = character.armature.data
+            layout.prop(sole, "side")
+            column = layout.column(align=True)
+            column.active = sole.object is None
+            column.prop(sole, "kind")
+            column.prop_search(sole, "bone", bones, "bones")
+            if sole.kind == "FOOT":
+                column.prop_search(sole, "toe_bone", bones, "bones")
+        layout.prop(sole, "object")
+
+
+class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
+    """Where the body's mass is"""
+
+    bl_label = "Hips and Limbs"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character with an armature is chosen."""
+        character = active_character(settings.scene_of(context))
+        return bool(character and character.armature)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        character = active_character(settings.scene_of(context))
+        layout.operator("softground.detect_bones", icon="FILE_REFRESH")
+        column = layout.column(align=True)
+        order = {joint: place for place, joint in enumerate(JOINTS)}
+        for joint in sorted(character.joints, key=lambda joint: order.get(joint.name, len(order))):
+            split = column.split(factor=0.3, align=True)
+            name = split.row()
+            name.alignment = "RIGHT"
+            name.label(text=_joint_label(joint.name), translate=False)
+            row = split.row(align=True)
+            row.use_property_split = False
+            row.prop_search(joint, "bone", character.armature.data, "bones", text="")
+            end = row.row(align=True)
+            end.ui_units_x = _END_WIDTH
+            end.prop(joint, "end", text="")
+
+
+_END_WIDTH = 2.6
+"""Width of a bone's end, of which a few letters are enough, in units of the interface: the bone has the rest."""
+
+
+def _joint_label(joint: str) -> str:
+    """`ankle_l` as people write it."""
+    name, _, side = joint.partition("_")
+    label = iface_(name.capitalize())
+    return f"{label} {side.upper()}" if side else label
+
+
+class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
+    """What gives way"""
+
+    bl_label = "Ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        options = settings.scene_of(context).softground
+        column = layout.column()
+        column.prop(options, "ground")
+        if options.ground is None:
+            row = column.row()
+            row.operator("softground.create_ground", icon="MESH_GRID")
+        else:
+            _changing_ground(column, options)
+        column.prop(options, "cell_size_cm")
+        column.prop(options, "detail")
+        column.prop(options, "shape_keys")
+        foretold = forecast.of(settings.scene_of(context))
+        if foretold:
+            _note(layout, _estimate(foretold.analysis.area, settings.cell_size_of(settings.scene_of(context))))
+
+
+class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
+    """How it gives way"""
+
+    bl_label = "Material"
+    bl_parent_id = "SOFTGROUND_PT_ground"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        scene = settings.scene_of(context)
+        material = scene.softground.material
+        row = layout.row(align=True)
+        row.menu("SOFTGROUND_MT_presets", text=material.preset or iface_("Presets"), translate=False)
+        row.operator("softground.save_preset", text="", icon="ADD")
+        row.operator("softground.remove_preset", text="", icon="REMOVE")
+        column = layout.column()
+        column.prop(material, "stiffness_mpa")
+        column.prop(material, "poisson_ratio")
+        column.prop(material, "characteristic_time")
+        foretold = forecast.of(scene)
+        row = layout.row(align=True)
+        if foretold is None:
+            row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
+            return
+        depth = "…" if foretold.depth is None else f"{foretold.depth * 100:.1f} cm"
+        split = row.split(factor=0.4)
+        split.alignment = "RIGHT"
+        split.label(text="Deepest Print")
+        row = split.row(align=True)
+        row.active = foretold.is_current
+        row.operator("softground.match_depth", text=depth, icon="DRIVER_DISTANCE", translate=False)
+        row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
+
+
+class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
+    """The layer, its rim and its look"""
+
+    bl_label = "Details"
+    bl_parent_id = "SOFTGROUND_PT_material"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.column().column()
+        material = settings.scene_of(context).softground.material
+        for field in ("layer_depth_cm", "rim_reach_cm", "blur_sigma_cm"):
+            column.prop(material, field)
+        column.prop(material, "surface")
+
+
+class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
+    """Press the prints"""
+
+    bl_label = "Bake"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.column()
+        state = session.current()
+        options = settings.scene_of(context).softground
+        column = layout.column(align=True)
+        column.prop(options, "frame_start")
+        column.prop(options, "frame_end")
+        if state.is_baking:
+            layout.enabled = True
+            column.enabled = False
+            layout.progress(factor=state.progress, text=state.status)
+            layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
+            return
+        column = layout.column()
+        column.scale_y = 1.4
+        column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
+        _live_buttons(layout, state)
+        layout.operator("softground.clear_bake", icon="TRASH")
+        summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
+        if summary:
+            _result(layout, summary)
+            _floating_feet(layout, options, summary)
+            for reason in state.stale.splitlines():
+                layout.label(text=reason, icon="ERROR", translate=False)
+
+
+def _live_buttons(layout: Any, state: Any) -> None:
+    """One button to start live mode; two to end it, with and without the prints."""
+    if not state.is_live:
+        layout.operator("softground.live", icon="PLAY")
+        return
+    row = layout.row(align=True)
+    row.alert = True
+    row.operator("softground.live", text="Discard", icon="X").keep = False
+    row.alert = False
+    row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
+
+
+class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
+    """What to see in the viewport"""
+
+    bl_label = "Overlay"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, _context: bpy.types.Context) -> None:
+        shown = session.current().show_overlay
+        icon = "HIDE_OFF" if shown else "HIDE_ON"
+        self.layout.operator("softground.overlay", text="", icon=icon, depress=shown, emboss=False)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.column()
+        state = session.current()
+        layout.active = state.show_overlay
+        column = layout.column(align=True, heading="Show")
+        for part in ("show_footfalls", "show_soles", "show_forces", "show_cells"):
+            column.prop(state, part)
+
+
+class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
+    """What to take out of a bake"""
+
+    bl_label = "Output"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.column()
+        column = layout.column(align=True)
+        column.operator("softground.export", icon="EXPORT")
+        column.operator("softground.final_mesh", icon="MESH_DATA")
+        column = layout.column(align=True)
+        column.operator("softground.force_curves", icon="GRAPH")
+        column.operator("softground.export_forces", icon="EXPORT")
+        layout.operator("softground.copy_bake_command", icon="COPYDOWN")
+
+
+def _result(layout: Any, summary: Any) -> None:
+    """What the bake that is on the ground came to."""
+    box = layout.box().column(align=True)
+    rows = [
+        ("Steps", f"{summary['steps']:.0f}"),
+        ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
+        ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
+    ]
+    if "seconds" in summary:  # live mode takes none
+        rows.append(("Bake Time", f"{summary['seconds']:.1f} s"))
+    for label, value in rows:
+        row = box.split(factor=0.5)
+        row.alignment = "RIGHT"
+        row.label(text=label)
+        row.alignment = "LEFT"
+        row.label(text=value, translate=False)
+
+
+def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
+    """How far the feet are above the prints that they made, and a button that lets them down."""
+    floating = summary.get(bake_report.FLOATING, 0.0)
+    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
+        return
+    box = layout.box().column(align=True)
+    box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.label(text="above their prints", icon="BLANK1")
+    box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
+
+
+def _changing_ground(layout: Any, options: Any) -> None:
+    """Which frame's shape is taken of a ground that changes over time."""
+    modifier = ground_checks.changes_with_time(options.ground)
+    if modifier:
+        box = layout.box().column(align=True)
+        box.label(text=iface_("'{modifier}' changes its shape").format(modifier=modifier), icon="INFO", translate=False)
+        taken = iface_("Taken as it is at frame {frame}").format(frame=options.frame_start)
+        box.label(text=taken, icon="BLANK1", translate=False)
+
+
+def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:
+    """A line of small information under the fields."""
+    row = layout.row()
+    row.active = False
+    row.label(text=text, icon=icon, translate=False)
+
+
+def _estimate(area: float, cell_size: float) -> str:
+    """Cells that soles cover an area [m²] with, and the memory that a bake takes for them."""
+    cells = area / cell_size**2
+    text = iface_("About {cells} cells printed, {megabytes} MB")
+    return text.format(cells=f"{rounded(cells):,.0f}", megabytes=f"{rounded(cells * BYTES_PER_CELL / 1e6):,.0f}")
+
+
+def rounded(value: float) -> float:
+    """A positive number to two digits, at least 1, as estimates are told."""
+    return max(1.0, float(f"{value:.2g}"))
+
+
+CLASSES = (
+    SOFTGROUND_UL_characters,
+    SOFTGROUND_UL_soles,
+    SOFTGROUND_PT_character,
+    SOFTGROUND_PT_soles,
+    SOFTGROUND_PT_joints,
+    SOFTGROUND_PT_ground,
+    SOFTGROUND_PT_material,
+    SOFTGROUND_PT_material_details,
+    SOFTGROUND_PT_bake,
+    SOFTGROUND_PT_overlay,
+    SOFTGROUND_PT_output,
+)

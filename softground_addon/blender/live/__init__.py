@@ -1,0 +1,1 @@
+"""The ground that gives way while the timeline plays."""

@@ -1,0 +1,313 @@
+"""Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed.
+
+No modal operator is needed for it: a handler follows the frame, so that autosave, undo and every other tool go on
+working. While live mode is on, the ground carries what a bake would leave on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty
+from numpy.typing import NDArray
+
+from ...core import record
+from ...core.errors import InputError
+from ...core.heightfield import Window
+from ...core.playhead import Playhead
+from ...core.polylines import polylines_at
+from ...core.pressed_ground import PressedGround
+from ...core.refinement import refine
+from .. import jobs, session, settings
+from ..baking import bake_report
+from ..baking.bake_checks import expected_coverage, wants_detail
+from ..characters.character_setup import characters_of
+from ..ground import baked_ground, ground_mesh, trail_detail
+from ..ground.created_ground import create_ground, reach_for
+from ..operator_base import reports_errors
+from ..reading import analysis, staleness
+from ..reading.shots import ground_of
+from ..translation import rpt_
+from .live_ground import LiveGround
+
+Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
+"""Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
+around them [m]."""
+
+
+class LiveMode:
+    """A scene whose ground follows its timeline.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+
+    Raises
+    ------
+    InputError
+        If the scene could not be baked either.
+    """
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        settings.forget_deleted_ground(scene)
+        options = scene.softground
+        known = analysis.read(scene)
+        if options.ground is None:
+            with analysis.own_changes(scene):
+                create_ground(scene, known.shot.plan)
+            known = analysis.read(scene)
+        self.scene = scene.session_uid
+        self.rendering = False
+        self._owner = options.ground.session_uid
+        self._ground = _carrier(scene, known)
+        self._begin(scene, known)
+
+    def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
+        self._analysis = known
+        self._playhead = Playhead(known.loads, ground_of(scene, known.shot), settings.cell_size_of(scene))
+        self._frame_rate = known.shot.motions[0].frame_rate
+
+    def follow(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
+        ground = self._ground.object()
+        if ground is None:
+            return False
+        self._playhead.material = settings.material_of(scene)
+        before = self._playhead.frame
+        windows = self._playhead.go_to(float(scene.frame_current))
+        if self._playhead.frame != before:
+            self._show(ground, windows)
+        return True
+
+    def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
+        self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._frame_rate)
+
+    def show_anew(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
+        ground = self._ground.object()
+        if ground is None:
+            return False
+        self._ground.take_from(ground)
+        self._playhead.go_to(float(scene.frame_current))
+        self._show(ground, self._playhead.ground.tile_windows())
+        return True
+
+    def read_anew(self, scene: bpy.types.Scene) -> bool:
+        """Start from the animation, mass and forces as they are now; False if that is not possible."""
+        try:
+            self._begin(scene, analysis.read(scene))
+        except InputError:
+            return False
+        return self.show_anew(scene)
+
+    def is_outdated(self, scene: bpy.types.Scene) -> bool:
+        """Whether the character has changed since it was read."""
+        return analysis.current(scene) is not self._analysis
+
+    def in_contact(self) -> Contact:
+        """See `in_contact` of this module."""
+        return self._playhead.in_contact(), self._playhead.ground.cell_size, self._playhead.material.rim_reach
+
+    def keep(self, scene: bpy.types.Scene) -> None:
+        """Leave the ground as it is shown, as the bake of the frames up to now."""
+        ground = self._ground.object()
+        if ground is None:
+            return
+        footprints = self._playhead.footprints()
+        unit_scale = scene.unit_settings.scale_length
+        sigma = self._playhead.material.blur_sigma
+        pressed = PressedGround.at(
+            footprints,
+            frame=self._playhead.frame,
+            frame_rate=self._frame_rate,
+            cell_size=self._playhead.ground.cell_size,
+            blur_sigma=sigma,
+        )
+        vertices = ground_mesh.rest_vertices(ground, unit_scale)
+        index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
+        inputs = bake_report.inputs_of(scene)
+        so_far = inputs | {"frames": [scene.softground.frame_start, int(self._playhead.frame)]}
+        stored = record.dump(footprints, {"inputs": so_far, "input_hash": ""})
+        place = baked_ground.on_itself(ground, index, vertices)
+        across = place.position[:, :2].T
+        over_time = polylines_at(footprints, *across, blur_sigma=sigma)
+        writing = baked_ground.write(
+            place,
+            pressed.sample(*across),
+            over_time,
+            stored,
+            frame_rate=self._frame_rate,
+            unit_scale=unit_scale,
+            time_stretch=settings.time_stretch_of(scene),
+            shape_keys=scene.softground.shape_keys,
+        )
+        carrier = jobs.run(writing)
+        ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
+        staleness.store(inputs, scene)
+
+    def discard(self) -> None:
+        """Leave the ground as it was before."""
+        owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner), None)
+        ground = owner or self._ground.object()
+        if ground is not None:
+            baked_ground.clear(ground)
+
+
+def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
+    """What takes the prints: the scene's ground, or a copy that is fine where its characters will step.
+
+    Raises
+    ------
+    InputError
+        If the ground is too coarse and is to stay so.
+    """
+    options, unit_scale = scene.softground, scene.unit_settings.scale_length
+    ground, shot, cell_size = options.ground, known.shot, settings.cell_size_of(scene)
+    vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
+    footfalls = shot.plan.footfalls
+    if footfalls is not None and wants_detail(
+        ground, expected_coverage(vertices, footfalls, cell_size), options.detail, cell_size, shot.motions
+    ):
+        surface = trail_detail.surface_of(ground, unit_scale)
+        refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
+        with trail_detail.draft(ground, surface, refinement) as draft:
+            ground, vertices = trail_detail.publish(ground, draft), refinement.vertices(surface)
+    return LiveGround(ground, vertices, shot, unit_scale)
+
+
+_mode: LiveMode | None = None
+"""Live mode if it is on: Blender's handlers are functions, so that what they follow lives here."""
+
+
+def is_on() -> bool:
+    """Whether live mode is on."""
+    return _mode is not None
+
+
+def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:
+    """Handle a change of the frame; never during a render."""
+    if _mode is None or _mode.rendering or scene.session_uid != _mode.scene:
+        return
+    if depsgraph is not None and depsgraph.mode == "RENDER":
+        return
+    if not _mode.follow(scene):
+        forget()
+
+
+def in_contact(scene: bpy.types.Scene) -> Contact | None:
+    """Cells in contact at the frame that is shown; None if live mode is not on there."""
+    if _mode is None or _mode.scene != scene.session_uid:
+        return None
+    return _mode.in_contact()
+
+
+def rendering(active: bool) -> None:
+    """Handle the begin or the end of a render."""
+    if _mode is not None:
+        _mode.rendering = active
+
+
+def after_undo() -> None:
+    """Handle an undo or redo: the mesh is another one now, live mode goes on if it still is live mode's."""
+    scene = _scene()
+    if _mode is not None and (scene is None or not _mode.show_anew(scene)):
+        forget()
+
+
+def after_edit() -> float | None:
+    """Read the character anew where it was edited; for a timer, as nothing may be evaluated in a handler."""
+    scene = _scene()
+    if _mode is not None and scene is not None and _mode.is_outdated(scene) and not _mode.read_anew(scene):
+        forget()
+    return None
+
+
+def forget() -> None:
+    """End live mode as it stands, because its scene or its ground went away."""
+    global _mode  # noqa: PLW0603
+    _mode = None
+    session.current().is_live = False
+    session.redraw()
+
+
+def discard() -> None:
+    """End live mode and take its prints off the ground, as the file or the add-on is about to go."""
+    if _mode is not None:
+        _mode.discard()
+        forget()
+
+
+def _scene() -> bpy.types.Scene | None:
+    uid = _mode.scene if _mode else None
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
+class SOFTGROUND_OT_live(bpy.types.Operator):
+    """Let the ground give way while the timeline plays, or end that"""
+
+    bl_idname = "softground.live"
+    bl_label = "Live Footprints"
+    bl_options = {"REGISTER", "UNDO"}
+
+    keep: BoolProperty(
+        name="Keep",
+        description="When it ends: leave the prints on the ground as a bake, instead of taking them off",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether live mode can start or end; otherwise the button says what is missing."""
+        if is_on():
+            return True
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
+        """What the button does at the moment."""
+        if not is_on():
+            return rpt_("Press prints while the timeline plays; sliders act at once on what follows")
+        if properties.keep:
+            return rpt_("End live mode and leave the prints on the ground, as a bake up to the frame that is shown")
+        return rpt_("End live mode and leave the ground as it was before")
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        global _mode  # noqa: PLW0603
+        scene = _scene() or settings.scene_of(context)
+        if _mode is None:
+            _mode = LiveMode(scene)
+            session.current().is_live = True
+            _mode.follow(scene)
+        elif self.keep:
+            with analysis.own_changes(scene):
+                _mode.keep(scene)
+            forget()
+        else:
+            discard()
+        session.redraw()
+        return {"FINISHED"}
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """What keeps live mode from starting, or an empty text."""
+    options = settings.scene_of(context).softground
+    if session.current().is_baking:
+        return "A bake is running"
+    if session.is_rendering():
+        return "A render is running: wait until it has ended"
+    if not characters_of(settings.scene_of(context)):
+        return "Add a character first: select its armature and press Add Character"
+    if options.ground and baked_ground.is_baked(options.ground):
+        return "There is a bake on the ground: clear it first"
+    return ""
+
+
+CLASSES = (SOFTGROUND_OT_live,)

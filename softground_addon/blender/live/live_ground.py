@@ -1,0 +1,204 @@
+"""The ground's mesh while live mode is on: heights of a few cells written as the timeline moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import record
+from ...core.footprints import NEVER
+from ...core.heightfield import TILE, HeightField, Window
+from ...core.playhead import Playhead
+from ...core.pressed_ground import GroundSample
+from ...core.smoothing import blurred_window, gaussian_kernel
+from ..ground import ground_mesh
+from ..reading.shots import Shot
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Tile = tuple[int, int]
+
+ON_CENTRE = 1e-4
+"""Vertices this near to the centres of their cells, in cells, take the cells' values as they are."""
+
+
+@dataclass(frozen=True)
+class _TileVertices:
+    """The vertices over a tile of cells, and where they lie between the centres of the cells.
+
+    Attributes
+    ----------
+    index : (N,) int array
+        Vertices of the mesh.
+    corner : (N, 2) int array
+        Column and row of the cell before each of them, in the tile with a margin of one cell.
+    cell : (N, 2) int array
+        Column and row of the cell that each of them lies in, in the tile.
+    u, v : (N,) float arrays
+        How far they are from its centre to the next one's, 0 to 1.
+    """
+
+    index: Indices
+    corner: Indices
+    cell: Indices
+    u: Array
+    v: Array
+
+    def interpolate(self, values: Array) -> Array:
+        """Values (channels, rows, columns) of the tile with its margin, at the vertices."""
+        column, row = self.corner.T
+        if not (self.u.any() or self.v.any()):
+            on_centres: Array = values[:, row, column]
+            return on_centres
+        low = values[:, row, column] * (1 - self.u) + values[:, row, column + 1] * self.u
+        high = values[:, row + 1, column] * (1 - self.u) + values[:, row + 1, column + 1] * self.u
+        result: Array = low * (1 - self.v) + high * self.v
+        return result
+
+
+class LiveGround:
+    """Writes a height field and the age of its contacts to the ground of a scene, where it changed.
+
+    While it is at work the mesh is one with a bake on it, so that `ground_mesh.restore` takes everything away again,
+    in this session or after a crash.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+        Carries no bake.
+    vertices : (V, 3) float array
+        World positions of its vertices [m].
+    shot : Shot
+        Read from that ground, or from the one that it stands in for.
+    unit_scale : float
+        Metres per Blender unit.
+    """
+
+    def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
+        self.uid = ground.session_uid
+        self.name = ground.name
+        x, y, z = vertices.T
+        near = ((vertices[:, :2] >= shot.plan.lower) & (vertices[:, :2] <= shot.plan.upper)).all(axis=1)
+        near = np.flatnonzero(near)
+        on_top = np.abs(z[near] - shot.terrain.heights(x[near], y[near])) < ground_mesh.ON_SURFACE
+        self._vertices = near[on_top]
+        self._place = vertices[self._vertices, :2]
+        self._up = ground_mesh.up_of(ground, unit_scale)
+        self._by_tile: dict[Tile, Indices] | None = None
+        self._known: dict[Tile, _TileVertices] = {}
+        self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
+        nothing = GroundSample(*np.empty((5, 0)))
+        # No shape keys: Blender would evaluate them on the whole mesh at each frame.
+        ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale, shape_keys=False)
+        self.take_from(ground)
+
+    def take_from(self, ground: bpy.types.Object) -> None:
+        """Start from the mesh as it is now; it is written as a whole when it is shown next."""
+        mesh = ground_mesh.mesh_of(ground)
+        self._rest = ground_mesh.rest_positions(mesh)
+        self._display = self._rest.copy()
+        self._shading = np.zeros((2, len(self._rest)), dtype=np.float32)
+        self._contact = np.full(len(self._rest), -np.inf, dtype=np.float32)
+        self._age = np.full(len(self._rest), NEVER, dtype=np.float32)
+        self._is_written = False
+
+    def object(self) -> bpy.types.Object | None:
+        """The ground, whatever its name has become; None if it is gone or no longer what live mode made of it."""
+        found = bpy.data.objects.get(self.name)
+        if found is None or found.session_uid != self.uid:
+            found = next((thing for thing in bpy.data.objects if thing.session_uid == self.uid), None)
+        if found is None:
+            return None
+        self.name = found.name
+        mesh = ground_mesh.mesh_of(found)
+        intact = ground_mesh.is_baked(found) and len(mesh.vertices) == len(self._rest)
+        return found if intact else None
+
+    def show(
+        self, ground: bpy.types.Object, playhead: Playhead, windows: Sequence[Window], sigma: float, frame_rate: float
+    ) -> None:
+        """Bring the mesh to the state of a playhead's ground in some windows.
+
+        Parameters
+        ----------
+        ground : bpy.types.Object
+        playhead : Playhead
+        windows : sequence of Window
+            Where its ground may have changed.
+        sigma : float
+            Standard deviation of the display blur [m].
+        frame_rate : float
+            Scene frames per second [Hz].
+        """
+        field = playhead.ground
+        margin = len(gaussian_kernel(sigma / field.cell_size)) // 2 + 1
+        tiles = _tiles_of(windows, margin)
+        for tile in tiles:
+            vertices = self._vertices_of(tile, field.cell_size)
+            if len(vertices.index):
+                window = Window(tile[0] * TILE, tile[1] * TILE, TILE, TILE)
+                self._update(field, window, vertices, sigma)
+                column, row = vertices.cell.T
+                self._contact[vertices.index] = playhead.contact.read(window)[0, row, column]
+        mesh = ground_mesh.mesh_of(ground)
+        if tiles or not self._is_written:
+            for name, values in zip((ground_mesh.COMPRESSION, ground_mesh.RIM), self._shading, strict=True):
+                _write(mesh, name, values)
+            ground_mesh.write_positions(mesh, self._display)
+            self._is_written = True
+        since = (playhead.frame - self._contact[self._reached]) / frame_rate
+        self._age[self._reached] = np.where(np.isfinite(since), since, NEVER)
+        _write(mesh, ground_mesh.AGE, self._age)
+
+    def _vertices_of(self, tile: Tile, cell_size: float) -> _TileVertices:
+        """The vertices over a tile, looked up once."""
+        if self._by_tile is None:
+            self._by_tile = _grouped(np.floor(self._place / cell_size).astype(np.int64) // TILE)
+        if tile not in self._known:
+            inside = self._by_tile.get(tile, np.empty(0, np.intp))
+            at = self._place[inside] / cell_size - np.array(tile) * TILE + 0.5  # from the centre of the cell before it
+            if np.abs(at - np.rint(at)).max(initial=0.0) < ON_CENTRE:
+                at = np.rint(at)
+            corner = np.clip(np.floor(at).astype(np.intp), 0, TILE)
+            cell = np.floor(self._place[inside] / cell_size).astype(np.intp) - np.array(tile) * TILE
+            self._known[tile] = _TileVertices(self._vertices[inside], corner, cell, *(at - corner).T)
+            self._reached = np.concatenate([self._reached, self._vertices[inside]])
+        return self._known[tile]
+
+    def _update(self, field: HeightField, tile: Window, vertices: _TileVertices, sigma: float) -> None:
+        # Whole tiles, so that the rounding of a height does not depend on what else has changed.
+        compression, rim = vertices.interpolate(blurred_window(field, tile.expanded(1), sigma))
+        index = vertices.index
+        self._display[index] = self._rest[index] + (rim - compression)[:, None] * self._up
+        self._shading[:, index] = compression, rim
+
+
+def _write(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
+    """Set an attribute of all vertices (V,)."""
+    attribute: Any = mesh.attributes[name]
+    attribute.data.foreach_set("value", values)
+
+
+def _grouped(tiles: NDArray[np.int64]) -> dict[Tile, Indices]:
+    """Numbers of the places in each tile."""
+    order = np.lexsort(tiles.T)
+    ordered = tiles[order]
+    borders = np.flatnonzero((np.diff(ordered, axis=0) != 0).any(axis=1)) + 1
+    parts = [part for part in np.split(order, borders) if len(part)]
+    return {(int(tiles[part[0], 0]), int(tiles[part[0], 1])): part for part in parts}
+
+
+def _tiles_of(windows: Sequence[Window], margin: int) -> list[Tile]:
+    """The tiles that windows with a margin around them reach into."""
+    tiles = set()
+    for window in windows:
+        around = window.expanded(margin)
+        columns = range(around.column // TILE, (around.column + around.columns - 1) // TILE + 1)
+        rows = range(around.row // TILE, (around.row + around.rows - 1) // TILE + 1)
+        tiles |= {(column, row) for column in columns for row in rows}
+    return sorted(tiles)

@@ -1,0 +1,1 @@
+"""What takes a bake out of Blender, or makes curves of it."""

@@ -1,0 +1,255 @@
+"""The bake as files: which formats there are, what is checked before one is written, and the buttons for it."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+
+from ...core.errors import InputError
+from .. import settings
+from ..baking import bake_report
+from ..operator_base import OnBake, beside_file, reports_errors
+from ..translation import rpt_
+from . import exports, image_exports
+
+LARGEST_IMAGE = 16384
+"""Most pixels along the sides of an image."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file that a bake can be written to.
+
+    Attributes
+    ----------
+    suffix : str
+        Of its files.
+    label, description : str
+        For the user.
+    """
+
+    suffix: str
+    label: str
+    description: str
+
+
+FORMATS = {
+    "ALEMBIC": Format(".abc", "Alembic", "The moving ground"),
+    "USD": Format(".usdc", "USD", "The moving ground with its shading attributes"),
+    "PC2": Format(".pc2", "Point Cache (PC2)", "Positions of the ground's vertices, for a mesh cache"),
+    "EXR": Format(
+        ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map"
+    ),
+    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step"),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a bake is written.
+
+    Attributes
+    ----------
+    format : str
+        One of `FORMATS`.
+    path : Path
+        The file; of image sequences its folder and what their names begin with.
+    start, end : int
+        First and last frame.
+    resolution : int
+        Width and height of images [pixels].
+    uv_map : str
+        Of images; by default the one that is rendered.
+    outdated : bool
+        Whether a bake is written that no longer fits what it was made from.
+    """
+
+    format: str
+    path: Path
+    start: int
+    end: int
+    resolution: int = 2048
+    uv_map: str = ""
+    outdated: bool = False
+
+
+def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
+    """Write the bake on the scene's ground; returns the files.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, it is outdated, or the files cannot be written; says what to do.
+    """
+    ground = _ground(scene, outdated=options.outdated)
+    if options.end < options.start:
+        raise InputError(f"The frames {options.start} to {options.end} are none: give the first one first.")
+    path = options.path
+    if not path.parent.is_dir():
+        raise InputError(f"There is no folder '{path.parent}': create it first, or choose another.")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"Nothing may be written to the folder '{path.parent}': choose another.")
+    is_open = scene == bpy.context.scene  # the one that Blender's exporters write
+    there = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
+    with there:
+        return _write(scene, ground, options)
+
+
+def _write(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+    path, span = options.path, (options.start, options.end)
+    if options.format == "EXR":
+        return image_exports.export_images(
+            scene, ground, path.parent, *span, resolution=options.resolution, uv_map=options.uv_map, name=path.stem
+        )
+    if options.format == "ALEMBIC":
+        exports.export_alembic(scene, ground, path, *span)
+    elif options.format == "USD":
+        exports.export_usd(scene, ground, path, *span)
+    elif options.format == "PC2":
+        exports.export_point_cache(scene, ground, path, *span)
+    else:
+        exports.export_final(scene, ground, path)
+    return [path]
+
+
+def with_suffix(path: Path, kind: str) -> Path:
+    """The path with the suffix of a format in place of that of another one."""
+    known = {one.suffix for one in FORMATS.values()} | {".usd", ".usda"}
+    wanted = FORMATS[kind].suffix
+    if kind == "USD" and path.suffix in (".usd", ".usda"):
+        return path
+    return path.with_suffix(wanted) if path.suffix in known else path.with_name(path.name + wanted)
+
+
+def default_path(scene: bpy.types.Scene, kind: str) -> Path:
+    """A file beside the .blend, named after it and the ground."""
+    ground = scene.softground.ground
+    return with_suffix(beside_file(bpy.path.clean_name(ground.name) if ground else "ground"), kind)
+
+
+def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
+    """The scene's ground, whose bake is fit to be written."""
+    ground: bpy.types.Object | None = scene.softground.ground
+    if ground is None:
+        raise InputError(f"Scene '{scene.name}' has no ground with a bake: press Bake Footprints first.")
+    exports.baked_carrier(ground)
+    reasons = () if outdated else bake_report.stale_reasons(scene)
+    if reasons:
+        raise InputError(
+            f"The bake on ground '{ground.name}' is outdated ({'; '.join(reasons)}): bake again, or allow outdated "
+            "bakes to be exported."
+        )
+    return ground
+
+
+class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
+    """Write the baked ground for other programs: Alembic, USD, a point cache, image sequences or the final mesh"""
+
+    bl_idname = "softground.export"
+    bl_label = "Export Ground"
+    bl_options = {"REGISTER", "PRESET"}
+
+    filepath: StringProperty(name="File", description="File to write", subtype="FILE_PATH")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser shows it in red
+    filter_glob: StringProperty(
+        default=";".join(f"*{one.suffix}" for one in FORMATS.values()) + ";*.usd;*.usda", options={"HIDDEN"}
+    )
+    format: EnumProperty(
+        name="Format",
+        description="Kind of file",
+        items=[(kind, one.label, one.description) for kind, one in FORMATS.items()],
+    )
+    frame_start: IntProperty(name="First Frame", description="First frame to write", default=1)
+    frame_end: IntProperty(name="Last Frame", description="Last frame to write", default=250)
+    resolution: IntProperty(
+        name="Resolution", description="Width and height of the images", default=2048, min=16, max=LARGEST_IMAGE,
+        subtype="PIXEL",
+    )  # fmt: skip
+    uv_map: StringProperty(name="UV Map", description="UV map of the images; the one that is rendered if empty")
+    use_cache: BoolProperty(
+        name="Play It Here",
+        description="Let a Mesh Cache modifier play the file on the ground, in place of the native playback",
+    )
+    outdated: BoolProperty(
+        name="Even If Outdated", description="Export the bake also where it no longer fits what it was made from"
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        scene = settings.scene_of(context)
+        options = scene.softground
+        self.frame_start, self.frame_end = options.frame_start, options.frame_end
+        self.filepath = str(default_path(scene, self.format))
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def check(self, _context: bpy.types.Context) -> bool:
+        """Let the file's suffix follow the format."""
+        path = str(with_suffix(Path(self.filepath), self.format))
+        changed = path != self.filepath
+        self.filepath = path
+        return changed
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "format")
+        if self.format != "OBJ":
+            column = layout.column(align=True)
+            column.prop(self, "frame_start", text="Frame Start")
+            column.prop(self, "frame_end", text="End")
+        if self.format == "EXR":
+            column = layout.column()
+            column.prop(self, "resolution")
+            column.prop_search(self, "uv_map", settings.scene_of(context).softground.ground.data, "uv_layers")
+            column = layout.column(align=True)
+            column.active = False
+            for kind in (image_exports.DISPLACEMENT, image_exports.MASK):
+                column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
+        if self.format == "PC2":
+            layout.prop(self, "use_cache")
+        layout.prop(self, "outdated")
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        set_frames = self.properties.is_property_set("frame_start") or self.properties.is_property_set("frame_end")
+        options = scene.softground
+        start, end = (self.frame_start, self.frame_end) if set_frames else (options.frame_start, options.frame_end)
+        path = Path(bpy.path.abspath(self.filepath)) if self.filepath else default_path(scene, self.format)
+        path = with_suffix(path, self.format)
+        written = export(
+            scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
+        )
+        if self.format == "PC2" and self.use_cache:
+            exports.use_point_cache(options.ground, path, start, settings.time_stretch_of(scene))
+        if len(written) == 1:
+            self.report({"INFO"}, rpt_("Wrote {path}").format(path=written[0]))
+        else:
+            text = rpt_("Wrote {count} images to {folder}")
+            self.report({"INFO"}, text.format(count=len(written), folder=path.parent))
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
+    """Add the ground as it stands after the last step to the scene: a plain mesh of its own, with nothing that moves"""
+
+    bl_idname = "softground.final_mesh"
+    bl_label = "Add Final Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        still = exports.final_mesh(scene, scene.softground.ground)
+        self.report({"INFO"}, rpt_("Added '{name}'").format(name=still.name))
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_export, SOFTGROUND_OT_final_mesh)

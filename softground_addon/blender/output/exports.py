@@ -1,0 +1,238 @@
+"""A bake as a mesh for other programs: point cache, Alembic, USD, and the finished ground as it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...core import point_cache
+from ...core.errors import InputError
+from ...core.files import check_not_full, check_room, replacing
+from ...core.histories import histories
+from ..ground import baked_ground, display_key, ground_mesh, playback
+
+
+def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+    """Write the positions of the ground that carries the bake as a PC2 cache, one sample per frame.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, its record is damaged, or the file cannot be written.
+    """
+    unit_scale = scene.unit_settings.scale_length
+    carrier = baked_carrier(ground)
+    rest = ground_mesh.rest_positions(ground_mesh.mesh_of(carrier))
+    moved = playback.moved_vertices(ground_mesh.mesh_of(carrier))
+    world = ground_mesh.rest_vertices(carrier, unit_scale)[moved]
+    footprints, about = baked_ground.load(ground)
+    over_time = histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
+    up = ground_mesh.up_of(carrier, unit_scale)
+
+    def samples() -> Iterator[NDArray[np.float32]]:
+        for frame in range(start, end + 1):
+            height = over_time.movement.at(frame, len(moved))[:, :1]
+            sample = rest.copy()
+            sample[moved] += (height * up).astype(np.float32)
+            yield sample
+
+    point_cache.write(path, samples(), start_frame=start, points=len(rest), count=end - start + 1)
+
+
+def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stretch: float = 1.0) -> bpy.types.Modifier:
+    """Let the ground that carries the bake play a PC2 cache in place of its native playback.
+
+    The cache counts the scene's frames, its modifier the animation's; see `settings.time_stretch_of`.
+    """
+    carrier = baked_ground.carrier_of(ground)
+    modifier: Any = carrier.modifiers.get(ground_mesh.CACHE) or carrier.modifiers.new(ground_mesh.CACHE, "MESH_CACHE")
+    modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), start
+    modifier.frame_scale = 1 / time_stretch
+    modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"
+    modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"
+    carrier.modifiers.move(list(carrier.modifiers).index(modifier), 0)
+    played = playback.modifier_of(carrier)
+    if played:
+        played.show_viewport = played.show_render = False
+    return modifier
+
+
+def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+    """Write the ground that carries the bake as Alembic, with Blender's exporter.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or the file cannot be written.
+    """
+    carrier = baked_carrier(ground)
+    with _only(scene, carrier, start, end), replacing(path) as partial:
+        shown = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        check_room(path, size_of_alembic(ground_mesh.mesh_of(shown), end - start + 1))  # else Blender ends
+        options = {
+            "selected": True,
+            "start": start,
+            "end": end,
+            "apply_subdiv": True,  # else the ground is written without its last modifier where that subdivides
+            "as_background_job": False,
+            "export_custom_properties": False,
+        }
+        _run(bpy.ops.wm.alembic_export, partial, path, **options)
+
+
+def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
+    """Size of an Alembic file with the mesh's positions and normals at some frames, at most [bytes]."""
+    vertices, corners, maps = len(mesh.vertices), len(mesh.loops), len(mesh.uv_layers)
+    normals = vertices if mesh.normals_domain == "POINT" else corners
+    vector, number, rest_of_frame = 12, 4, 4096
+    once = vector * vertices + number * (corners + len(mesh.polygons)) + maps * 3 * number * corners
+    return once + frames * (vector * (vertices + normals) + rest_of_frame)
+
+
+def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
+    """Write the ground that carries the bake as USD, with Blender's exporter.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, a frame is negative, or the file cannot be written.
+    """
+    if start < 0:
+        raise InputError(
+            f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
+        )
+    with _only(scene, baked_carrier(ground), start, end), replacing(path) as partial:
+        options = {
+            "selected_objects_only": True,
+            "export_subdivision": "TESSELLATE",
+            "export_animation": True,
+            "export_shapekeys": False,  # else the finished ground is written, with nothing that moves
+            "export_materials": False,
+            "export_custom_properties": False,
+        }
+        _run(bpy.ops.wm.usd_export, partial, path, **options)
+
+
+def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Object:
+    """A new object with the ground as it stands at the end of the bake: a plain mesh, no modifiers or shape keys.
+
+    Raises
+    ------
+    InputError
+        If there is no bake.
+    """
+    carrier = baked_carrier(ground)
+    mesh = ground_mesh.mesh_of(carrier).copy()
+    display_key.drop_all(mesh)
+    ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
+    still = bpy.data.objects.new(f"{ground.name} Final", mesh)
+    for name in [attribute.name for attribute in mesh.attributes]:
+        if name == ground_mesh.REST or playback.is_playback_attribute(name):
+            mesh.attributes.remove(mesh.attributes[name])
+    for key in ground_mesh.PROPERTIES:
+        mesh.pop(key, None)
+    still.matrix_world = Matrix(ground_mesh.to_world_of(carrier, 1.0).tolist())
+    scene.collection.objects.link(still)
+    return still
+
+
+def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -> None:
+    """Write the ground as it stands at the end of the bake as Wavefront OBJ, with Blender's exporter.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or the file cannot be written.
+    """
+    still = final_mesh(scene, ground)
+    mesh = ground_mesh.mesh_of(still)
+    try:
+        with _only(scene, still, scene.frame_start, scene.frame_end), replacing(path) as partial:
+            _run(bpy.ops.wm.obj_export, partial, path, export_selected_objects=True, export_materials=False)
+    finally:
+        bpy.data.objects.remove(still)
+        bpy.data.meshes.remove(mesh)
+
+
+def baked_carrier(ground: bpy.types.Object) -> bpy.types.Object:
+    """The object that carries the ground's bake.
+
+    Raises
+    ------
+    InputError
+        If there is no bake.
+    """
+    carrier = baked_ground.carrier_of(ground)
+    if not ground_mesh.is_baked(carrier):
+        raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
+    return carrier
+
+
+@contextmanager
+def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: int) -> Iterator[None]:
+    """An object as all that is selected, shown if it is hidden, and the frames as the scene's; then all as before."""
+    layer = bpy.context.view_layer
+    layer.update()
+    if carrier.name not in layer.objects:
+        raise InputError(f"'{carrier.name}' is not in the current view layer: include its collection first.")
+    hidden = carrier.hide_get(), carrier.hide_viewport, carrier.hide_render
+    selected = [thing for thing in layer.objects if thing.select_get()]
+    active, frames = layer.objects.active, (scene.frame_start, scene.frame_end)
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        for thing in selected:
+            thing.select_set(False)
+        carrier.hide_viewport = carrier.hide_render = False
+        layer.update()
+        carrier.hide_set(False)
+        carrier.select_set(True)
+        if not carrier.select_get():
+            raise InputError(f"'{carrier.name}' is hidden with its collection: show the collection first.")
+        scene.frame_start, scene.frame_end = start, end
+        yield
+    finally:
+        carrier.select_set(False)
+        carrier.hide_set(hidden[0])
+        carrier.hide_viewport, carrier.hide_render = hidden[1:]
+        for thing in selected:
+            thing.select_set(True)
+        layer.objects.active = active
+        scene.frame_start, scene.frame_end = frames
+        scene.frame_set(frame, subframe=subframe)
+
+
+def _run(export: Any, partial: Path, path: Path, **options: Any) -> None:
+    result = set()
+    with written_by_blender(partial, path):
+        result = export(filepath=str(partial), check_existing=False, **options)
+    if "FINISHED" not in result or not partial.is_file():
+        raise InputError(f"'{path}' could not be written by Blender's exporter: see its messages.")
+
+
+@contextmanager
+def written_by_blender(partial: Path, path: Path) -> Iterator[None]:
+    """Blender writes a file: say why it could not, also of a full disk, of which many of its writers tell nothing.
+
+    Raises
+    ------
+    InputError
+        If Blender reports an error.
+    OSError
+        If the disk is full.
+    """
+    failed = ""
+    try:
+        yield
+    except RuntimeError as error:
+        failed = str(error).strip()
+    if partial.is_file():
+        check_not_full(partial)
+    if failed:
+        raise InputError(f"'{path}' could not be written: {failed}")

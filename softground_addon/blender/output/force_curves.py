@@ -1,0 +1,171 @@
+"""The forces of a bake for animators: as animated custom properties of an empty, and as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, StringProperty
+from numpy.typing import NDArray
+
+from ...core import files
+from ...core.footprints import Footprint
+from .. import compat, settings
+from ..ground import baked_ground
+from ..operator_base import OnBake, beside_file, reports_errors
+from ..translation import rpt_
+
+Array = NDArray[np.float64]
+
+FORCE, CONTACT = "force", "contact"
+"""What follows a sole's name in the names of the properties."""
+
+
+def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tuple[str, str], tuple[Array, Array]]:
+    """Normal force [N] and contact (0 or 1) of every sole at scene frames.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    frames : (N,) float array
+
+    Returns
+    -------
+    dict of (character, sole) to two (N,) float arrays
+    """
+    curves: dict[tuple[str, str], tuple[Array, Array]] = {}
+    for footprint in footprints:
+        key = (footprint.character, footprint.sole)
+        force, contact = curves.setdefault(key, (np.zeros(len(frames)), np.zeros(len(frames))))
+        touching = (frames >= footprint.start_frame) & (frames <= footprint.end_frame)
+        force[touching] += np.interp(frames[touching], footprint.load_frames, footprint.load_n)
+        contact[touching] = 1.0
+    return dict(sorted(curves.items()))
+
+
+def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float) -> str:
+    """The forces as comma-separated values, one row per frame and sole."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n"])
+    curves = forces_over_time(footprints, frames)
+    for place, frame in enumerate(frames):
+        for (character, sole), (force, contact) in curves.items():
+            time = round((frame - frames[0]) / frame_rate, 6)
+            rows.writerow([int(frame), time, character, sole, int(contact[place]), round(float(force[place]), 3)])
+    return text.getvalue()
+
+
+def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames: Array) -> list[bpy.types.Object]:
+    """Give each character an empty whose custom properties are its forces, in place of the one it may have.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    footprints : sequence of Footprint
+    frames : (N,) float array
+        Scene frames; the keys are where those are shown if the scene's time is remapped.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        The empties, one per character.
+    """
+    empties: dict[str, bpy.types.Object] = {}
+    times = frames * settings.time_stretch_of(scene)
+    for (character, sole), values in forces_over_time(footprints, frames).items():
+        if character not in empties:
+            empties[character] = _fresh_empty(scene, f"{character} Forces")
+        for what, series in zip((FORCE, CONTACT), values, strict=True):
+            _animate(empties[character], f"{sole} {what}", times, series, constant=what == CONTACT)
+    return list(empties.values())
+
+
+def _fresh_empty(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    empty = scene.objects.get(name)
+    if empty is None or empty.type != "EMPTY":
+        empty = bpy.data.objects.new(name, None)
+        empty.empty_display_size = 0.2
+        scene.collection.objects.link(empty)
+    action = empty.animation_data.action if empty.animation_data else None
+    empty.animation_data_clear()
+    if action and not action.users:
+        bpy.data.actions.remove(action)
+    for key in [key for key in empty.keys() if key.endswith((f" {FORCE}", f" {CONTACT}"))]:  # noqa: SIM118
+        del empty[key]
+    return empty
+
+
+def _animate(thing: bpy.types.Object, name: str, frames: Array, values: Array, *, constant: bool) -> None:
+    """Key a custom property at every frame."""
+    thing[name] = 0.0
+    thing.id_properties_ui(name).update(min=0.0, description="Normal force of the ground in newtons")
+    if constant:
+        thing.id_properties_ui(name).update(max=1.0, description="Whether the sole touches the ground")
+    path = f'["{bpy.utils.escape_identifier(name)}"]'
+    thing.keyframe_insert(path, frame=float(frames[0]))
+    animation: Any = thing.animation_data
+    curve: Any = next(c for c in compat.action_curves(animation.action) if c.data_path == path)
+    curve.keyframe_points.clear()
+    curve.keyframe_points.add(len(frames))
+    curve.keyframe_points.foreach_set("co", np.column_stack([frames, values]).astype(np.float32).ravel())
+    interpolation = curve.keyframe_points[0].bl_rna.properties["interpolation"].enum_items
+    kind = interpolation["CONSTANT" if constant else "LINEAR"].value
+    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), kind, dtype=np.int32))
+    curve.update()
+
+
+def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
+    """The record on the scene's ground, and the frames that it covers."""
+    scene = settings.scene_of(context)
+    footprints, about = baked_ground.load(scene.softground.ground)
+    first, last = about.get("inputs", {}).get("frames", (scene.softground.frame_start, scene.softground.frame_end))
+    return footprints, np.arange(first, last + 1, dtype=float)
+
+
+class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
+    """Put force and contact of every sole on an empty, as animated properties for the Graph Editor and for drivers"""
+
+    bl_idname = "softground.force_curves"
+    bl_label = "Add Force Curves"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        empties = write_curves(settings.scene_of(context), *_baked(context))
+        names = ", ".join(f"'{empty.name}'" for empty in empties)
+        self.report({"INFO"}, rpt_("The forces are on {names}").format(names=names))
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
+    """Write force and contact of every sole at every frame to a table (CSV)"""
+
+    bl_idname = "softground.export_forces"
+    bl_label = "Export Forces"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(name="File", description="Table to write", subtype="FILE_PATH")
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser shows it in red
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        self.filepath = str(beside_file("forces.csv"))
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        footprints, frames = _baked(context)
+        path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
+        files.write_text(path, table(footprints, frames, settings.frame_rate_of(settings.scene_of(context))))
+        self.report({"INFO"}, rpt_("Wrote {path}").format(path=path))
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_force_curves, SOFTGROUND_OT_export_forces)

@@ -1,0 +1,160 @@
+"""A bake as image sequences in the ground's UV space: displacement and masks, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.files import replacing
+from ...core.footprints import NEVER, Footprint
+from ...core.histories import Histories, histories
+from ...core.uv_raster import Pixels, rasterise
+from .. import settings
+from ..ground import baked_ground, ground_mesh, refined_mesh
+from .exports import baked_carrier, written_by_blender
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+DISPLACEMENT, MASK = "displacement", "mask"
+"""Change of height [m] in all channels; and compression [m], rim [m], age [s] in red, green, blue."""
+
+STRAY = 0.02
+"""Pixels farther than this from any footprint's cells are left out of the look-up [m]."""
+
+
+def export_images(
+    scene: bpy.types.Scene,
+    ground: bpy.types.Object,
+    folder: Path,
+    start: int,
+    end: int,
+    *,
+    resolution: int = 2048,
+    uv_map: str = "",
+    name: str = "",
+) -> list[Path]:
+    """Write displacement and mask as OpenEXR sequences of 32-bit floats in the ground's UV space.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    ground : bpy.types.Object
+        Its own UV map is used, also where the detail along the trail carries the bake.
+    folder : Path
+        Gets `<name>_displacement_<frame>.exr` and `<name>_mask_<frame>.exr`.
+    start, end : int
+        First and last frame.
+    resolution : int
+        Width and height [pixels].
+    uv_map : str
+        Name of the UV map; by default the one that is rendered.
+    name : str
+        What the files' names begin with; by default the ground's name.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, no such UV map, or the files cannot be written.
+    """
+    baked_carrier(ground)
+    footprints, about = baked_ground.load(ground)
+    sigma = baked_ground.baked_with(about, "blur_sigma")
+    pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)
+    over_time = histories(footprints, *pixels.position.T, blur_sigma=sigma)
+    if not folder.is_dir():
+        raise InputError(f"There is no folder '{folder}': create it first, or choose another.")
+    stem = name or bpy.path.clean_name(ground.name)
+    paths = []
+    with _image(resolution) as image:
+        for frame in range(start, end + 1):
+            height, compression = over_time.movement.at(frame, len(pixels.index)).T
+            age = _age(over_time, frame, len(pixels.index), scene)
+            mask = np.stack([compression, np.maximum(height + compression, 0.0), age], axis=-1)
+            for kind, channels, empty in (
+                (DISPLACEMENT, np.repeat(height[:, None], 3, axis=1), (0.0, 0.0, 0.0)),
+                (MASK, mask, (0.0, 0.0, NEVER)),
+            ):
+                path = folder / f"{stem}_{kind}_{frame:04d}.exr"
+                _save(image, resolution, pixels.index, channels, empty, path)
+                paths.append(path)
+    return paths
+
+
+def _age(over_time: Histories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
+    visits = over_time.visits
+    latest = np.full(points, -np.inf)
+    begun = visits.start <= frame
+    np.maximum.at(latest, visits.point[begun], np.minimum(visits.end[begun], frame))
+    return np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
+
+
+def _pixels(
+    scene: bpy.types.Scene,
+    ground: bpy.types.Object,
+    footprints: Sequence[Footprint],
+    reach: float,
+    resolution: int,
+    uv_map: str,
+) -> Pixels:
+    """The pixels of the ground's UV map that lie near footprints, and where."""
+    with ground_mesh.undisturbed_copy(ground) as mesh:
+        layers = mesh.uv_layers
+        layer = layers.get(uv_map) if uv_map else next((one for one in layers if one.active_render), None)
+        if layer is None:
+            wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
+            raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
+        surface = refined_mesh.surface_of(mesh, ground_mesh.to_world_of(ground, scene.unit_settings.scale_length))
+        uv = np.empty(len(mesh.loops) * 2, dtype=np.float32)
+        layer.uv.foreach_get("vector", uv)
+    place = surface.vertices[surface.corner_vertex[surface.triangle_corners], :2]
+    near = _near_footprints(footprints, reach, place)
+    corners = uv.reshape(-1, 2).astype(np.float64)[surface.triangle_corners[near]]
+    return rasterise(corners, place[near], resolution, resolution)
+
+
+def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array) -> NDArray[np.bool_]:
+    """Which triangles (T, 3, 2) come near the box around all footprints."""
+    if not footprints:
+        return np.zeros(len(place), dtype=bool)
+    low = np.min([(one.window.column * one.cell_size, one.window.row * one.cell_size) for one in footprints], axis=0)
+    high = np.max(
+        [
+            ((w.column + w.columns) * one.cell_size, (w.row + w.rows) * one.cell_size)
+            for one in footprints
+            for w in (one.window,)
+        ],
+        axis=0,
+    )
+    inside = (place.max(axis=1) > low - reach) & (place.min(axis=1) < high + reach)
+    return np.asarray(inside.all(axis=1))
+
+
+@contextmanager
+def _image(resolution: int) -> Iterator[Any]:
+    image: Any = bpy.data.images.new("SoftGround", resolution, resolution, alpha=False, float_buffer=True, is_data=True)
+    image.file_format = "OPEN_EXR"
+    try:
+        yield image
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _save(
+    image: Any, resolution: int, index: Indices, channels: Array, empty: tuple[float, float, float], path: Path
+) -> None:
+    pixels = np.empty((resolution**2, 4), dtype=np.float32)
+    pixels[:, :3], pixels[:, 3] = empty, 1.0
+    pixels[index, :3] = channels
+    image.pixels.foreach_set(pixels.ravel())
+    with replacing(path) as partial:
+        image.filepath_raw = str(partial)
+        with written_by_blender(partial, path):
+            image.save()

@@ -1,0 +1,283 @@
+"""Hashes of what Blender's data say, by which a change of them is noticed. The same at every frame."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Collection, Container, Iterable, Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+from .. import mesh_arrays
+from ..animation_layer import nla_layer
+from ..compat import action_curves, node_inputs, slot_of
+from ..ground import ground_mesh
+
+_CHANNELS = (
+    "location",
+    "rotation_euler",
+    "rotation_quaternion",
+    "rotation_axis_angle",
+    "scale",
+    "delta_location",
+    "delta_rotation_euler",
+    "delta_rotation_quaternion",
+    "delta_scale",
+)
+"""Properties that place, turn and scale an object."""
+
+_POSE = _CHANNELS[:5]
+"""Those that pose a bone."""
+
+_BONE = ("head_local", "tail_local", "matrix_local")
+"""How a bone lies in the rest pose."""
+
+_KEY_SHAPE = ("interpolation", "easing", "back", "amplitude", "period")
+"""How a curve runs from a key to the next, beside its handles."""
+
+_NO_INPUT = frozenset(
+    ("name", "action", "action_slot", "active", "select", "is_active", "is_override_data", "bake", "bake_directory")
+)
+"""Settings that change nothing of what their owner does."""
+
+_ANSWERS = (nla_layer.RESPONSE, nla_layer.EXTRA, nla_layer.STANDING)
+"""Tracks that hold the ground's answer to the rig, and not what the rig was animated to do."""
+
+_LOOKED_AT = 5000
+"""Vertices whose weights are compared, spread over the mesh: Blender reads weights one by one."""
+
+
+def joined(texts: Iterable[str]) -> str:
+    """One hash of several texts."""
+    return f"{zlib.crc32(chr(10).join(texts).encode()):08x}"
+
+
+def of_topology(mesh: bpy.types.Mesh) -> str:
+    """Which vertices the faces of a mesh join."""
+    corners = mesh_arrays.corner_vertices(mesh)
+    return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.tobytes()):08x}"
+
+
+def of_positions(mesh: bpy.types.Mesh) -> str:
+    """Where the vertices of a mesh are without any bake."""
+    rest = ground_mesh.rest_positions(mesh) + np.float32(0)  # Edit Mode makes negative zeros positive
+    return f"{zlib.crc32(rest.tobytes()):08x}"
+
+
+def of_weights(thing: bpy.types.Object, groups: Container[str]) -> str:
+    """How strongly the vertices of a mesh belong to some of its vertex groups; of a large mesh, a sample of them."""
+    numbers = {group.index: group.name for group in thing.vertex_groups if group.name in groups}
+    vertices = ground_mesh.mesh_of(thing).vertices
+    looked_at = range(0, len(vertices), -(-len(vertices) // _LOOKED_AT)) if numbers and len(vertices) else ()
+    return joined(
+        f"{index} {numbers[member.group]} {member.weight:.6g}"
+        for index in looked_at
+        for member in vertices[index].groups
+        if member.group in numbers
+    )
+
+
+def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
+    """The values of a float attribute of a mesh; nothing where there is none."""
+    attribute: Any = mesh.attributes.get(name)
+    if attribute is None or attribute.data_type != "FLOAT":
+        return ""
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return f"{zlib.crc32(values.tobytes()):08x}"
+
+
+def of_place(things: Iterable[bpy.types.Object]) -> str:
+    """Where objects stand in their parents, but for what their own animation decides."""
+    values = []
+    for one in things:
+        animated = _animated(one)
+        values += [
+            value
+            for channel in _CHANNELS
+            for index, value in enumerate(getattr(one, channel))
+            if (channel, index) not in animated
+        ]
+        values += np.array(one.matrix_parent_inverse).ravel().tolist()
+    return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
+
+
+def of_keys(thing: bpy.types.Object) -> str:
+    """The keys of the user's own actions and strips, and when they are played."""
+    animation = thing.animation_data
+    if animation is None:
+        return ""
+    found = set()
+    action, slot = nla_layer.own_action(thing)
+    if action:
+        found.add(_of_action(action, slot))
+    for track, strip in _own_strips(animation):
+        if strip.action is None:
+            continue
+        digest = _of_action(strip.action, slot_of(strip))
+        if track.name != nla_layer.SOURCE:
+            influence = None if strip.use_animated_influence else strip.influence
+            placed = (strip.frame_start, strip.frame_end, strip.action_frame_start, influence)
+            digest += f"@{placed}"
+        found.add(digest)
+    return " ".join(sorted(found))
+
+
+def of_animation(thing: bpy.types.Object) -> str:
+    """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones."""
+    animated = {path for path, _ in _animated(thing)}
+    told: list[str] = [thing.rotation_mode]
+    animation = thing.animation_data
+    if animation is not None:
+        action, slot = nla_layer.own_action(thing)
+        curves = set(_of_curves(action_curves(action, slot))) if action else set()
+        for track, strip in _own_strips(animation):
+            if strip.action:
+                curves.update(_of_curves(action_curves(strip.action, slot_of(strip))))
+            if track.name != nla_layer.SOURCE:
+                told += [f"{animation.use_nla} {track.is_solo}", *_of_strip(strip)]
+        told += sorted(curves)
+        for driver in animation.drivers:
+            told += _of_driver(driver)
+    for owner in (thing, *(thing.pose.bones if thing.pose else ())):
+        for constraint in owner.constraints:
+            told += of_settings(constraint, animated)
+    if thing.rigid_body is not None:
+        told += of_settings(thing.rigid_body)
+    if thing.pose is not None:
+        told += _of_bones(thing)
+    return joined(told)
+
+
+def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
+    """What is set in a modifier, a constraint or the like, but for what is animated; each Blender has settings more."""
+    yield owner.bl_rna.identifier
+    path = _path(owner) if animated else ""
+    for setting in owner.bl_rna.properties:
+        name = setting.identifier
+        if name in _NO_INPUT or (name.startswith(("show_", "open_")) and name != "show_viewport"):
+            continue
+        if name == "targets":
+            for target in owner.targets:
+                yield from of_settings(target, animated)
+        elif setting.type != "COLLECTION" and not setting.is_readonly and f"{path}.{name}" not in animated:
+            value = getattr(owner, name)
+            if isinstance(value, bpy.types.Texture):
+                yield from of_settings(value)
+            elif setting.type != "POINTER" or isinstance(value, bpy.types.ID):
+                yield f"{name} {_plain(value)}"
+    if isinstance(owner, bpy.types.NodesModifier):
+        yield from (f"{name} {_plain(value)}" for name, value in node_inputs(owner))
+
+
+def _path(owner: Any) -> str:
+    try:
+        return str(owner.path_from_id())
+    except ValueError:  # of what has no path, nothing is animated
+        return ""
+
+
+def _plain(value: Any) -> str:
+    """A custom property's value as text; of data-blocks their name. Booleans become integers when a file is read."""
+    if isinstance(value, bpy.types.ID):
+        return value.name_full
+    if isinstance(value, bool):
+        return str(int(value))
+    return str([_plain(part) for part in value] if hasattr(value, "__len__") and not isinstance(value, str) else value)
+
+
+def _animated(thing: bpy.types.Object) -> set[tuple[str, int]]:
+    """Data paths and indices that something sets at each frame, the ground's answer to the rig included."""
+    animation = thing.animation_data
+    action = animation and animation.action
+    answer = action_curves(action, slot_of(animation)) if action else ()
+    return nla_layer.animated_paths(thing) | {(curve.data_path, curve.array_index) for curve in answer}
+
+
+def _own_strips(animation: bpy.types.AnimData) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
+    """The user's strips that play, with their tracks."""
+    for track in animation.nla_tracks:
+        if track.name not in _ANSWERS and (not track.mute or track.name == nla_layer.SOURCE):
+            yield from ((track, strip) for strip in track.strips)
+
+
+def _of_action(action: bpy.types.Action, slot: Any) -> str:
+    digest = 0
+    for curve in sorted(action_curves(action, slot), key=lambda curve: (curve.data_path, curve.array_index)):
+        digest = zlib.crc32(f"{curve.data_path}[{curve.array_index}]{curve.mute}".encode(), digest)
+        for part in ("co", "handle_left", "handle_right"):
+            values = np.empty(len(curve.keyframe_points) * 2, dtype=np.float32)
+            curve.keyframe_points.foreach_get(part, values)
+            digest = zlib.crc32(values.tobytes(), digest)
+    return f"{digest:08x}"
+
+
+def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
+    """How curves run between and beyond their keys."""
+    for curve in curves:
+        told = [curve.data_path, str(curve.array_index), curve.extrapolation]
+        for part in _KEY_SHAPE:
+            values = np.empty(len(curve.keyframe_points), dtype=np.float32)
+            curve.keyframe_points.foreach_get(part, values)
+            told.append(f"{zlib.crc32(values.tobytes()):08x}")
+        for modifier in curve.modifiers:
+            told += of_settings(modifier)
+        yield joined(told)
+
+
+def _of_strip(strip: bpy.types.NlaStrip) -> Iterator[str]:
+    """How a strip plays its action; by its own curves where these decide."""
+    own = {f"{_path(strip)}.{curve.data_path}" for curve in strip.fcurves}
+    yield from of_settings(strip, own)
+    yield from _of_curves(strip.fcurves)
+    for curve in strip.fcurves:
+        yield from (f"{key.co[0]:.6g} {key.co[1]:.6g}" for key in curve.keyframe_points)
+
+
+def _of_driver(curve: bpy.types.FCurve) -> Iterator[str]:
+    """What a driver computes, and the custom properties that it reads."""
+    driver: Any = curve.driver
+    yield f"{curve.data_path} {curve.array_index} {curve.mute} {driver.type} {driver.expression}"
+    yield from _of_curves([curve])
+    for variable in driver.variables:
+        yield f"{variable.name} {variable.type}"
+        for target in variable.targets:
+            yield f"{target.id.name_full if target.id else ''} {target.data_path} {target.bone_target}"
+            yield f"{target.transform_type} {target.transform_space} {target.rotation_mode} {_value_of(target)}"
+
+
+def _value_of(target: Any) -> str:
+    """The value of a custom property that a driver reads, unless it is animated itself."""
+    path = target.data_path
+    if not path.endswith('"]') or not target.id:
+        return ""
+    if isinstance(target.id, bpy.types.Object) and path in {path for path, _ in _animated(target.id)}:
+        return ""
+    try:
+        return _plain(target.id.path_resolve(path))
+    except ValueError:
+        return "missing"
+
+
+def _of_bones(thing: bpy.types.Object) -> Iterator[str]:
+    """How the bones of an armature lie at rest, and how those are posed that nothing animates."""
+    armature: Any = thing.data
+    yield armature.pose_position
+    for bone in armature.bones:
+        yield f"{bone.name} {bone.parent.name if bone.parent else ''} {bone.use_inherit_rotation}"
+        yield f"{bone.inherit_scale} {bone.use_local_location} {bone.use_relative_parent}"
+    for part in _BONE:
+        values = np.empty(len(armature.bones) * (16 if part == "matrix_local" else 3), dtype=np.float32)
+        armature.bones.foreach_get(part, values)
+        yield f"{zlib.crc32(values.tobytes()):08x}"
+    animated = _animated(thing)
+    for bone in thing.pose.bones:
+        path = bone.path_from_id()
+        pose = [
+            value
+            for channel in _POSE
+            for index, value in enumerate(getattr(bone, channel))
+            if (f"{path}.{channel}", index) not in animated
+        ]
+        yield f"{bone.rotation_mode} {pose}"

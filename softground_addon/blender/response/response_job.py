@@ -1,0 +1,314 @@
+"""The characters' side of a bake: what the settings ask for, the response to the pressed ground, and its layer."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.footprints import Footprint
+from ...core.grounding import Response, responding
+from ...core.heightfield import Terrain
+from ...core.motion import CharacterMotion
+from ...core.performance import Performance, suggested_speed
+from ...core.response import Gaps, GroundingOptions, TiltOptions, at_scene_frames, gaps, mean_sinkage, respond, stood_on
+from ...core.simulation import CharacterLoads
+from ...core.tilt import TiltGains
+from .. import settings
+from ..animation_layer import nla_layer
+from ..characters.character_setup import mapping_of
+from ..jobs import Job, counted
+from ..properties import SoftGroundCharacter
+from .character_keys import controls_of, response_curves
+
+PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
+"""What can be acted in deep ground, as the settings and the core call it."""
+
+NOTICEABLE_LEAN = np.radians(0.25)
+"""A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
+LEAN_PASSES = 4
+"""Most times that the ground is pressed anew by the leaning bodies. The lean of a frame follows from the ground before
+it, so that each pass makes the shot right further on (Picard iteration); two are mostly enough."""
+
+SHARE_OF_WRITING = 0.1
+"""Part of a bake's last stage in which the rigs are read that get a layer."""
+
+
+@dataclass(frozen=True)
+class ResponseOptions:
+    """What the settings ask of the characters; None where something is off."""
+
+    tilt: TiltOptions | None
+    grounding: GroundingOptions | None
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One character's keys, and what the panel says of them."""
+
+    curves: list[nla_layer.LayerCurve]
+    notes: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One character's response and what it did for its feet.
+
+    Attributes
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    response : Response
+    before, after : Gaps
+    sinkage : float
+        Mean depth of the character's prints [m].
+    """
+
+    motion: CharacterMotion
+    response: Response
+    before: Gaps
+    after: Gaps
+    sinkage: float
+
+
+def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
+    """What the scene's settings ask of the characters, None if nothing."""
+    options = scene.softground
+    if options.output == "PRINTS" or not (options.tilt.use or options.grounding.use):
+        return None
+    tilt = grounding = None
+    if options.tilt.use:
+        gains = TiltGains(settings.typed(options.tilt.frequency), settings.typed(options.tilt.damping))
+        tilt = TiltOptions(gains, settings.typed(options.tilt.strength), settings.typed(options.tilt.lateral))
+    if options.grounding.use:
+        grounding = GroundingOptions(
+            settings.typed(options.grounding.align),
+            settings.typed(options.grounding.lock),
+            Performance(**{part: settings.typed(getattr(options.grounding, part)) for part in PERFORMANCE}),
+        )
+    return ResponseOptions(tilt, grounding)
+
+
+def rigged(characters: Iterable[SoftGroundCharacter]) -> list[SoftGroundCharacter]:
+    """Those that can answer the ground: things without a rig cannot."""
+    return [character for character in characters if character.armature]
+
+
+def check_characters(characters: Iterable[SoftGroundCharacter]) -> None:
+    """Raise InputError, naming the remedy, where a character can take no layer."""
+    for character in rigged(characters):
+        nla_layer.check_layerable(character.armature)
+
+
+def standing_on(
+    motions: Sequence[CharacterMotion], terrain: Terrain, options: ResponseOptions | None
+) -> tuple[CharacterMotion, ...]:
+    """The motions as they will walk on the terrain, which is where they press it."""
+    if options is None or options.grounding is None:
+        return tuple(motions)
+    return tuple(motion if motion.centre is not None else stood_on(motion, terrain) for motion in motions)
+
+
+@dataclass(frozen=True)
+class Leaning:
+    """The motions with the lean that the pressed ground gives them, and by how much each leans, (F, 2) [rad]."""
+
+    motions: tuple[CharacterMotion, ...]
+    leans: tuple[NDArray[np.float64], ...]
+
+
+def leaning(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    options: ResponseOptions | None,
+) -> Leaning:
+    """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
+    moved, leans = [], []
+    if options is not None and options.tilt is not None:
+        for of_character, motion in zip(loads, motions, strict=True):
+            touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+            response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
+            moved.append(responding(motion, response))
+            leans.append(response.lean)
+    return Leaning(tuple(moved), tuple(leans))
+
+
+def leans_anew(now: Leaning, before: Leaning | None) -> bool:
+    """Whether a lean differs from the one that pressed the ground by so much that the forces must be found anew."""
+    then = before.leans if before is not None else [np.zeros(2)] * len(now.leans)
+    return any(float(np.abs(lean - was).max()) > NOTICEABLE_LEAN for lean, was in zip(now.leans, then, strict=True))
+
+
+def answers_of(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    options: ResponseOptions | None,
+) -> list[Answer]:
+    """Each rigged character's response to the pressed ground, on top of its source."""
+    answers: list[Answer] = []
+    if options is None:
+        return answers
+    for of_character, motion in zip(loads, motions, strict=True):
+        if motion.centre is not None:
+            continue
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
+        before = gaps(motion, touching, terrain, footprints)
+        after = gaps(responding(motion, response), touching, terrain, footprints)
+        answers.append(Answer(motion, response, before, after, mean_sinkage(footprints, motion.name)))
+    return answers
+
+
+def layers_of(
+    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[Answer]
+) -> Job[list[Layer]]:
+    """The keys of each character's layer; none without answers."""
+    layers: list[Layer] = []
+    for number, (character, answer) in enumerate(zip(rigged(characters), answers, strict=False)):
+        reading = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
+        frames = len(answer.motion.frames)
+        curves = yield from counted(reading, "write", frames, part=number, parts=len(answers), share=SHARE_OF_WRITING)
+        layers.append(Layer(curves, _notes(scene, character, answer)))
+    return layers
+
+
+CARRIER = "softground_carrier"
+"""Note of the bone that carries the body."""
+SPEED = "softground_suggested_speed"
+"""Note of the speed that people would choose on this ground, over that on hard ground."""
+WORST = "softground_worst_gaps"
+"""Note of the frames where a gap is left, as JSON."""
+
+
+def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: Answer) -> dict[str, str]:
+    controls = controls_of(scene, character.armature, mapping_of(character))
+    return {
+        CARRIER: controls.bones[0],
+        WORST: json.dumps(worst_gaps([answer])),
+        SPEED: f"{suggested_speed(answer.sinkage):.3f}",
+    }
+
+
+def put_layers(
+    scene: bpy.types.Scene,
+    characters: Sequence[SoftGroundCharacter],
+    layers: Sequence[Layer],
+) -> None:
+    """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
+    stretch = settings.time_stretch_of(scene)
+    span = scene.softground.frame_start * stretch, scene.softground.frame_end * stretch
+    for number, character in enumerate(rigged(characters)):
+        if number < len(layers) and layers[number].curves:
+            nla_layer.add_layer(character.armature, layers[number].curves, span, layers[number].notes)
+            nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
+        else:
+            nla_layer.remove_layer(character.armature)
+
+
+def remove_layers(scene: bpy.types.Scene) -> bool:
+    """Take the layers off all armatures of the scene; whether there was one."""
+    layered = list(_layered(scene))
+    for armature in layered:
+        nla_layer.remove_layer(armature)
+    for layer in scene.view_layers:
+        layer.update()
+    return bool(layered)
+
+
+def has_layers(scene: bpy.types.Scene) -> bool:
+    """Whether any armature of the scene has a layer."""
+    return any(_layered(scene))
+
+
+def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
+    """Armatures with a layer: of characters, and of what was one when it was baked."""
+    armatures = (thing for thing in scene.objects if thing.type == "ARMATURE" and thing.library is None)
+    return (armature for armature in armatures if nla_layer.has_layer(armature))
+
+
+def gap_table(answers: Sequence[Answer]) -> dict[str, object] | None:
+    """Penetration and float of the standing soles before and after [mm], for the report; None without a response."""
+    if not answers:
+        return None
+    return {
+        when: {answer.motion.name: _statistics(getattr(answer, when)) for answer in answers}
+        for when in ("before", "after")
+    }
+
+
+def gaps_left(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+) -> dict[str, object]:
+    """Penetration and float of the standing soles of characters that do not answer [mm], for the report."""
+    table = {}
+    for of_character, motion in zip(loads, motions, strict=True):
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        table[motion.name] = _statistics(gaps(motion, touching, terrain, footprints))
+    return {"before": table, "after": table}
+
+
+def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
+    """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
+    left = gaps_mm.get("after", gaps_mm["before"])
+    return max((of_character["float"]["p95"] for of_character in left.values()), default=0.0)
+
+
+def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:
+    millimetres = of_soles.heights * 1e3
+    return {
+        name: {
+            "max": round(float(size.max(initial=0.0)), 3),
+            "p95": round(float(np.percentile(size, 95)) if len(size) else 0.0, 3),
+        }
+        for name, size in (("penetration", np.maximum(-millimetres, 0.0)), ("float", np.maximum(millimetres, 0.0)))
+    }
+
+
+NOTICEABLE_GAP_MM = 1.0
+"""Gaps from this on are worth a look [mm]."""
+WORST_GAPS = 10
+"""Frames that the report lists as the worst."""
+
+
+def worst_gaps(answers: Sequence[Answer]) -> list[dict[str, object]]:
+    """The largest gaps that are left, largest first, one for each character, sole and frame."""
+    gaps_left = [
+        (abs(height), answer.motion.name, answer.motion.soles[sole].sole.name, frame, height)
+        for answer in answers
+        for frame, sole, height in zip(answer.after.frames, answer.after.soles, answer.after.heights, strict=True)
+    ]
+    return [
+        {"character": name, "contact": sole, "frame": round(float(frame), 3), "gap_mm": round(float(height) * 1e3, 3)}
+        for _, name, sole, frame, height in sorted(gaps_left, reverse=True)[:WORST_GAPS]
+    ]
+
+
+def warnings(answers: Sequence[Answer]) -> list[str]:
+    """What the user should know about the responses."""
+    return [
+        f"'{answer.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its joints in "
+        "the Character panel."
+        for answer in answers
+        if not answer.response.legs
+    ]
+
+
+def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:
+    """Speed that people would choose on this ground, over that of level hard ground, by character."""
+    return {
+        motion.name: round(suggested_speed(mean_sinkage(footprints, motion.name)), 3)
+        for motion in motions
+        if motion.centre is None
+    }

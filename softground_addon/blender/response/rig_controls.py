@@ -1,0 +1,250 @@
+"""Which bones move a character: the one that carries its body, and the FK bones or IK controls of its legs.
+
+Rigs are read as a graph: a bone goes where its parent goes, or where its constraints copy it from. The bones that are
+mapped to joints mostly sit at the end of that graph; what an animator keys sits at its start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from ...core.errors import InputError
+from ..animation_layer.nla_layer import animated_paths
+from ..characters.rig_mapping import RigMapping
+
+_FOLLOWED = 0.5
+"""Influence from which on a constraint counts."""
+_REPLACING = 0.999
+"""Influence from which on a constraint that copies a whole transform leaves nothing of what was before."""
+
+BODY = "body"
+
+
+@dataclass(frozen=True)
+class Control:
+    """A bone to key.
+
+    Attributes
+    ----------
+    bone : str
+    part : str
+        What it moves with: "body", or "thigh", "shank", "foot", "knee", "arm" and a side, e.g.
+        "thigh_l".
+    carried_by : str
+        The part that its parents move with already; empty if none of them is keyed.
+    moves : bool
+        Whether its location is keyed beside its rotation.
+    """
+
+    bone: str
+    part: str
+    carried_by: str
+    moves: bool
+
+
+@dataclass(frozen=True)
+class RigControls:
+    """What is keyed on a rig, parents first, and what could not be found.
+
+    Attributes
+    ----------
+    controls : tuple of Control
+    sides : tuple of str
+        Legs that can be solved.
+    """
+
+    controls: tuple[Control, ...]
+    sides: tuple[str, ...]
+
+    @property
+    def bones(self) -> list[str]:
+        """Names of the keyed bones."""
+        return [control.bone for control in self.controls]
+
+
+def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mapping: RigMapping) -> RigControls:
+    """The bones to key on a rig.
+
+    Parameters
+    ----------
+    armature : bpy.types.Object
+    evaluated : bpy.types.Object
+        The same as a dependency graph evaluates it: there the influence of switches is known.
+    mapping : RigMapping
+
+    Raises
+    ------
+    InputError
+        If no bone carries the whole body.
+    """
+    rig = _Rig(armature, evaluated)
+    body = _body_control(rig, mapping)
+    parts = {body: BODY}
+    found: list[tuple[str, str, bool]] = [(body, BODY, True)]
+    sides = []
+    for side in "lr":
+        names = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
+        if all(names) and len(set(names)) == 3:
+            leg = _leg_controls(rig, side, names, body)
+            if leg:
+                sides.append(side)
+                found += leg
+                parts |= {bone: part for bone, part, _ in leg}
+        arm = _arm_control(rig, mapping, side)
+        if arm and arm not in parts:
+            found.append((arm, f"arm_{side}", False))
+            parts[arm] = f"arm_{side}"
+    controls = []
+    for bone, part, moves in found:
+        above = (ancestor for ancestor in rig.behind(bone) if ancestor != bone and ancestor in parts)
+        controls.append(Control(bone, part, parts.get(next(above, ""), ""), moves))
+    return RigControls(tuple(controls), tuple(sides))
+
+
+def _body_control(rig: _Rig, mapping: RigMapping) -> str:
+    """The nearest bone behind the hips that also carries both thighs and the head, and that can be moved."""
+    joints = mapping.joints
+    carried = [joints[joint][0] for joint in ("hips", "hip_l", "hip_r", "head", "neck", "spine") if joint in joints]
+    if not carried:
+        carried = [source.bone for source in mapping.soles if source.bone]
+    behind = [list(rig.behind(bone)) for bone in carried]
+    common = [bone for bone in behind[0] if all(bone in chain for chain in behind)]
+    free = [bone for bone in common if rig.is_free(bone) and rig.can_move(bone)]
+    keyed = [bone for bone in free if rig.is_shaped(bone) or bone in rig.keyed]
+    if not free:
+        raise InputError(
+            f"No bone of '{rig.name}' carries its whole body: choose the bone of the hips in the Character panel, or "
+            "switch tilt and grounding off."
+        )
+    return (keyed or free)[0]
+
+
+def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tuple[str, str, bool]]:
+    """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown."""
+    thigh, shin, foot = names
+    trunk = set(rig.behind(body))
+    solver = next(
+        (ik for bone in (foot, shin) for limb in rig.behind(bone) if limb not in trunk for ik in rig.solvers(limb)),
+        None,
+    )
+    if solver is not None:
+        if solver.target != rig.armature or not solver.subtarget:
+            return []
+        target = rig.control_behind(solver.subtarget, trunk)
+        if target is None:
+            return []
+        controls = [(target, f"foot_{side}", True)]
+        if solver.pole_target == rig.armature and solver.pole_subtarget:
+            pole = rig.control_behind(solver.pole_subtarget, trunk)
+            if pole is not None and target not in rig.behind(pole):
+                controls.append((pole, f"knee_{side}", True))
+        return controls
+    bones = [rig.origin(bone) for bone in (thigh, shin, foot)]
+    if len(set(bones)) < 3 or not all(rig.is_free(bone) for bone in bones):
+        return []
+    return [(bone, f"{part}_{side}", False) for bone, part in zip(bones, ("thigh", "shank", "foot"), strict=True)]
+
+
+def _arm_control(rig: _Rig, mapping: RigMapping, side: str) -> str:
+    """The upper arm of an FK arm; empty where there is none."""
+    if f"shoulder_{side}" not in mapping.joints:
+        return ""
+    arm = rig.origin(mapping.joints[f"shoulder_{side}"][0])
+    solved = any(rig.solvers(bone) for bone in (arm, *rig.below(arm)))
+    return arm if rig.is_free(arm) and not solved else ""
+
+
+class _Rig:
+    """An armature's bones as a graph of what follows what."""
+
+    def __init__(self, armature: bpy.types.Object, evaluated: bpy.types.Object) -> None:
+        self.armature, self.name = armature, armature.name
+        self._bones: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in armature.pose.bones}
+        self._evaluated: Mapping[str, bpy.types.PoseBone] = {bone.name: bone for bone in evaluated.pose.bones}
+        self.keyed = {path.split('"')[1] for path, _ in animated_paths(armature) if path.startswith('pose.bones["')}
+        self._shapes = any(bone.custom_shape for bone in armature.pose.bones)
+
+    def behind(self, bone: str) -> Iterator[str]:
+        """The bone, then all that it follows, nearest first."""
+        seen, waiting = {bone}, [bone]
+        while waiting:
+            current = waiting.pop(0)
+            yield current
+            for source in self._followed(current):
+                if source not in seen:
+                    seen.add(source)
+                    waiting.append(source)
+
+    def below(self, bone: str) -> list[str]:
+        """The bones under another one."""
+        return [child.name for child in self._bones[bone].children_recursive]
+
+    def origin(self, bone: str) -> str:
+        """The bone that another one copies, and so on to the first."""
+        for _ in self._bones:
+            copied = [c for c in self._active(bone) if c.type == "COPY_TRANSFORMS" and c.influence >= _REPLACING]
+            if not copied or not copied[-1].subtarget:
+                return bone
+            bone = copied[-1].subtarget
+        return bone
+
+    def solvers(self, bone: str) -> list[Any]:
+        """The bone's constraints that solve a leg."""
+        return [
+            constraint
+            for constraint in self._active(bone)
+            if constraint.type == "IK" and constraint.target is not None and constraint.chain_count != 1
+        ]
+
+    def control_behind(self, bone: str, trunk: set[str]) -> str | None:
+        """The nearest bone behind another, off the trunk, that an animator keys; else the nearest with a shape."""
+        candidates = [name for name in self.behind(bone) if name not in trunk and self.is_free(name)]
+        for kind in (self.keyed.__contains__, self.is_shaped, lambda _: True):
+            found = next((name for name in candidates if kind(name)), None)
+            if found is not None:
+                return found
+        return None
+
+    def is_shaped(self, bone: str) -> bool:
+        """Whether the rig shows the bone as a control."""
+        return not self._shapes or self._bones[bone].custom_shape is not None
+
+    def is_free(self, bone: str) -> bool:
+        """Whether nothing overrides the bone's keys."""
+        return not any(
+            constraint.type in ("COPY_TRANSFORMS", "ARMATURE", "COPY_ROTATION", "COPY_LOCATION", "IK", "DAMPED_TRACK")
+            for constraint in self._active(bone)
+        )
+
+    def can_move(self, bone: str) -> bool:
+        """Whether the bone's location counts."""
+        pose_bone = self._bones[bone]
+        connected = pose_bone.bone.use_connect and pose_bone.parent is not None
+        return not connected and not all(pose_bone.lock_location)
+
+    def _followed(self, bone: str) -> list[str]:
+        sources: list[str] = []
+        for constraint in reversed(self._active(bone)):
+            if constraint.type == "ARMATURE":
+                return sources + [t.subtarget for t in constraint.targets if t.weight > _FOLLOWED and t.subtarget]
+            if constraint.type in ("COPY_TRANSFORMS", "CHILD_OF", "COPY_LOCATION") and constraint.subtarget:
+                sources.append(constraint.subtarget)
+                if constraint.type == "COPY_TRANSFORMS" and constraint.influence >= _REPLACING:
+                    return [name for name in sources if name in self._bones]
+        parent = self._bones[bone].parent
+        return [name for name in (*sources, *([parent.name] if parent else [])) if name in self._bones]
+
+    def _active(self, bone: str) -> list[Any]:
+        """The bone's constraints that act now and refer to bones of this armature, as far as they refer to anything."""
+        own = self._bones[bone].constraints
+        seen = self._evaluated[bone].constraints
+        return [
+            c
+            for c, now in zip(own, seen, strict=True)
+            if not c.mute and c.enabled and now.influence > _FOLLOWED
+            if getattr(c, "target", None) in (None, self.armature) or c.type == "IK"
+        ]
