@@ -232,6 +232,16 @@ def test_a_playback_of_before_groups_were_marked_is_known_by_its_name(scene, foo
     assert playback.modifier_of(ground) == ground.modifiers[0]
 
 
+def test_removal_leaves_nothing_on_a_copy_with_the_same_mesh(scene, footprints):
+    ground = ground_object(scene)
+    bake_onto(ground, footprints)
+    copy = ground.copy()
+    scene.collection.objects.link(copy)
+    playback.remove(ground)
+    assert not copy.modifiers, "there, it would pull the vertices to the origin before frame 0"
+    assert not bpy.data.node_groups
+
+
 @pytest.mark.parametrize("few", [0.0, 1.0])
 @pytest.mark.parametrize("shape_keys", [True, False])
 def test_vertices_that_the_user_adds_stay_where_they_are_put(scene, footprints, monkeypatch, few, shape_keys):

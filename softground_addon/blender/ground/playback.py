@@ -111,13 +111,15 @@ def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
 
 
 def remove(ground: bpy.types.Object) -> None:
-    """Take the playback off a ground; nothing happens where there is none."""
-    while modifier := modifier_of(ground):
-        group = cast("Any", modifier).node_group
-        ground.modifiers.remove(modifier)
-        if not group.users:
-            _remove_group(group)
+    """Take the playback off a ground and copies of it with the same mesh; nothing happens where there is none."""
     mesh = cast("bpy.types.Mesh", ground.data)
+    copies = [thing for thing in bpy.data.objects if thing.data == mesh] if mesh.users > 1 else []
+    for shown in {ground, *copies}:
+        while modifier := modifier_of(shown):
+            group = cast("Any", modifier).node_group
+            shown.modifiers.remove(modifier)
+            if not group.users:
+                _remove_group(group)
     for name in [attribute.name for attribute in mesh.attributes]:
         if is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
