@@ -203,6 +203,26 @@ def test_a_duplicate_of_the_fine_copy_is_the_users_own(scene):
     assert (len(mine.data.vertices), len(mine.modifiers)) == (vertices, 1)
 
 
+def test_a_linked_duplicate_of_the_fine_copy_goes_on_playing_its_bake(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    scene.softground.ground = plane(scene, vertices=2)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    mine = trail_detail.detail_of(scene.softground.ground).copy()
+    scene.collection.objects.link(mine)
+
+    def played(frame):
+        scene.frame_set(frame)
+        return mesh_arrays.positions(mine.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
+
+    first = {frame: played(frame) for frame in (1, 15, 30)}
+    for operator in (bpy.ops.softground.bake, bpy.ops.softground.clear_bake):
+        operator()
+        assert all(np.array_equal(played(frame), heights) for frame, heights in first.items())
+
+
 def test_a_ground_that_was_deleted_in_the_viewport_is_not_baked_on(scene, baked):
     activate(baked)
     bpy.ops.object.delete()

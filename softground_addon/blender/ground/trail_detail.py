@@ -141,7 +141,6 @@ def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:
 
 def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
     """Give the copy a new mesh of the same name; its materials and what the user added to the object stay."""
-    playback.remove(detail)
     old: Any = detail.data
     for place, material in enumerate(old.materials):
         if place < len(mesh.materials):
@@ -149,6 +148,7 @@ def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
         else:
             mesh.materials.append(material)
     detail.data = mesh
+    playback.remove(detail)  # not from the old mesh, which a copy of the user's may show
     name = old.name
     if not old.users:
         bpy.data.meshes.remove(old)
