@@ -88,12 +88,16 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
 
 
 def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
-    """Size of an Alembic file with the mesh's positions and normals at some frames, at most [bytes]."""
+    """Size of an Alembic file with the mesh at some frames, at most [bytes].
+
+    Each frame holds positions, generated coordinates (as the mesh's bounds change with it) and, of a mesh that is not
+    smooth, the normals at its corners.
+    """
     vertices, corners, maps = len(mesh.vertices), len(mesh.loops), len(mesh.uv_layers)
-    normals = vertices if mesh.normals_domain == "POINT" else corners
+    normals = 0 if mesh.normals_domain == "POINT" else corners
     vector, number, rest_of_frame = 12, 4, 4096
     once = vector * vertices + number * (corners + len(mesh.polygons)) + maps * 3 * number * corners
-    return once + frames * (vector * (vertices + normals) + rest_of_frame)
+    return once + frames * (vector * (2 * vertices + normals) + rest_of_frame)
 
 
 def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
