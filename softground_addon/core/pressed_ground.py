@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .cell_keys import AROUND, ROW, Keys, among, keys_at, keys_of
+from .cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from .footprints import NEVER, Footprint, last_contact, recompose
-from .heightfield import TILE, HeightField, SparseGrid
+from .heightfield import PLACES_AT_ONCE, TILE, HeightField, SparseGrid
 from .smoothing import blurred
 
 Array = NDArray[np.float64]
@@ -44,6 +44,32 @@ class GroundSample:
 
 
 @dataclass(frozen=True)
+class TouchedCells:
+    """Where a ground has changed, without how; far smaller than the ground.
+
+    Attributes
+    ----------
+    keys : (C,) int array
+        `cell_keys` of the cells that changed and of those around them, whose look-ups reach them, ascending.
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    keys: Keys
+    cell_size: float
+
+    def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
+        tiles = np.unique(keys_of(cells_of(self.keys) // TILE))  # most places of a large ground lie in none
+        covered = np.zeros(len(x), dtype=bool)
+        for first in range(0, len(x), PLACES_AT_ONCE):
+            place = np.stack([x[first : first + PLACES_AT_ONCE], y[first : first + PLACES_AT_ONCE]], axis=-1)
+            near = np.flatnonzero(among(tiles, keys_at(place, TILE * self.cell_size)))
+            covered[first + near] = among(self.keys, keys_at(place[near], self.cell_size))
+        return covered
+
+
+@dataclass(frozen=True)
 class PressedGround:
     """The ground at one frame.
 
@@ -74,21 +100,8 @@ class PressedGround:
         contact = last_contact(footprints, frame, cell_size)
         return cls(raw, blurred(raw, blur_sigma), contact, frame, frame_rate)
 
-    def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
-        place = np.stack([x, y], axis=-1)
-        near = np.flatnonzero(among(self._tiles(), keys_at(place, TILE * self.smooth.cell_size)))
-        covered = np.zeros(len(place), dtype=bool)
-        covered[near] = among(self._changed(), keys_at(place[near], self.smooth.cell_size))
-        return covered
-
-    def _tiles(self) -> Keys:
-        """Keys of the tiles of the ground and of those beside them."""
-        tiles = np.array(sorted({*self.smooth.tiles, *self.contact.tiles}), dtype=np.int64).reshape(-1, 2)
-        return np.unique(keys_of(tiles)[:, None] + AROUND)
-
-    def _changed(self) -> Keys:
-        """Keys of the cells that changed and of those around them, whose look-ups reach them."""
+    def touched(self) -> TouchedCells:
+        """Where the ground has changed."""
         changed = [
             keys_of(np.argwhere(mask)[:, ::-1] + np.array(tile) * TILE)
             for tile, mask in (
@@ -99,7 +112,11 @@ class PressedGround:
         cells = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *changed]))
         for along in (1, ROW):  # one direction after the other keeps the intermediate sets small
             cells = np.unique(np.concatenate([cells - along, cells, cells + along]))
-        return cells
+        return TouchedCells(cells, self.smooth.cell_size)
+
+    def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
+        return self.touched().covers(x, y)
 
     def sample(self, x: Array, y: Array) -> GroundSample:
         """Look the ground up at places (K,), bilinear between the centres of cells."""

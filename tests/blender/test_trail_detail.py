@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
-from softground_addon.core.refinement import Region, refine
+from softground_addon.core.refinement import refine
+from softground_addon.core.region import Region
 from tests.blender import fingerprints, grounds
 from tests.blender.shots import walker
 

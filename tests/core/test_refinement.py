@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from softground_addon.core.refinement import COARSEST_LEG, Region, Surface, refine
+from softground_addon.core.refinement import COARSEST_LEG, Surface, refine
+from softground_addon.core.region import Region
 
 
 def surface_of(vertices, faces):
@@ -76,8 +77,7 @@ def faces_at_edges(faces):
 
 
 def positions(surface, refinement):
-    sources, weights = refinement.vertex_sources(surface)
-    return np.concatenate([surface.vertices, np.einsum("mk,mki->mi", weights, surface.vertices[sources])])
+    return refinement.at_vertices(surface, surface.vertices)
 
 
 def original_faces(surface):
@@ -132,11 +132,22 @@ def test_corners_lie_in_their_triangle_of_the_surface_at_their_weights(name):
     surface = SURFACES[name]()
     refinement = refine(surface, trail(0.02), 0.02)
     points = positions(surface, refinement)
-    assert (refinement.weights >= 0).all()
-    np.testing.assert_array_equal(refinement.weights.sum(axis=-1), 1)
-    source = surface.vertices[surface.corner_vertex[refinement.corners]]
-    placed = np.einsum("nck,nki->nci", refinement.weights.astype(float), source)
+    weights = np.concatenate([refinement.weights, 1 - refinement.weights.sum(axis=-1, keepdims=True)], axis=-1)
+    assert (weights >= 0).all()
+    source = surface.vertices[surface.triangle_vertices[refinement.source]]
+    placed = np.einsum("nck,nki->nci", weights.astype(float), source)
     np.testing.assert_allclose(placed, points[refinement.triangles], atol=1e-9 * np.abs(points).max())
+
+
+def test_what_corners_carry_goes_along_with_the_places_of_their_vertices():
+    surface = scattered(7)
+    refinement = refine(surface, trail(0.02), 0.02)
+    kept = np.flatnonzero(np.isin(np.repeat(np.arange(len(surface.face_start) - 1), 3), refinement.kept_faces))
+    carried = refinement.at_corners(surface, surface.vertices[surface.corner_vertex], kept)
+    vertex = np.concatenate([surface.corner_vertex[kept], refinement.triangles.ravel()])
+    np.testing.assert_allclose(carried, positions(surface, refinement)[vertex], atol=1e-9)
+    names = refinement.at_corners(surface, surface.corner_vertex, kept)
+    assert set(names[len(kept) :].tolist()) <= set(surface.corner_vertex.tolist()), "whole numbers are not mixed"
 
 
 def test_vertices_are_about_a_cell_apart_in_the_region_and_few_elsewhere():
@@ -170,8 +181,8 @@ def test_faces_away_from_the_trail_are_kept():
     surface = grid(200, 40.0)
     refinement = refine(surface, trail(0.02), 0.02)
     assert len(refinement.kept_faces) > 0.99 * 200**2
-    assert len(np.intersect1d(refinement.kept_faces, refinement.face)) == 0
-    assert len(np.union1d(refinement.kept_faces, refinement.face)) == 200**2
+    assert len(np.intersect1d(refinement.kept_faces, surface.triangle_face[refinement.source])) == 0
+    assert len(np.union1d(refinement.kept_faces, surface.triangle_face[refinement.source])) == 200**2
 
 
 def test_new_edges_know_the_edges_they_are_parts_of():

@@ -88,18 +88,23 @@ def _coverage(vertices: Array, cells: Indices, vertices_in_cells: int, cell_size
     return Coverage(spacing, missed, bool(crowd.max() >= FEW))
 
 
-def wants_detail(
-    ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, motions: Sequence[CharacterMotion]
-) -> bool:
-    """Whether the ground is to be refined along the trail; InputError if it must be and may not."""
+def shortest_sole(motions: Sequence[CharacterMotion]) -> float:
+    """Length of the shortest sole of all characters [m]."""
+    return min(sole.sole.length for motion in motions for sole in motion.soles)
+
+
+def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, sole_length: float) -> bool:
+    """Whether the ground is to be refined along the trail; InputError if it must be and may not.
+
+    `sole_length` is that of the shortest sole [m].
+    """
     if detail == "ALWAYS" or (detail == "AUTO" and cover.is_coarse(cell_size)):
         return True
-    length = min(sole.sole.length for motion in motions for sole in motion.soles)
-    if cover.spacing > COARSEST_SPACING * length:
+    if cover.spacing > COARSEST_SPACING * sole_length:
         raise InputError(
-            f"Ground '{ground.name}' is too coarse: its vertices are more than {COARSEST_SPACING * length * 100:.0f} "
-            f"cm apart under soles of {length * 100:.0f} cm. Set Detail to Automatic in the Ground panel, or Subdivide "
-            "the ground."
+            f"Ground '{ground.name}' is too coarse: its vertices are more than "
+            f"{COARSEST_SPACING * sole_length * 100:.0f} cm apart under soles of {sole_length * 100:.0f} cm. "
+            "Set Detail to Automatic in the Ground panel, or Subdivide the ground."
         )
     return False
 

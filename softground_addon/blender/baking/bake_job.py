@@ -22,8 +22,9 @@ from ...core.cell_limits import check_cell_size
 from ...core.footprints import Footprint
 from ...core.heightfield import Terrain
 from ...core.polylines import polylines_at
-from ...core.pressed_ground import PressedGround
+from ...core.pressed_ground import PressedGround, TouchedCells
 from ...core.refinement import refine
+from ...core.region import Region
 from ...core.simulation import CharacterLoads, simulate
 from ...core.sole_marks import sole_marks
 from .. import settings
@@ -35,7 +36,7 @@ from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
 from ..response import response_job
 from . import bake_report
-from .bake_checks import check_volumes, coverage, coverage_warnings, wants_detail
+from .bake_checks import check_volumes, coverage, coverage_warnings, shortest_sole, wants_detail
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,9 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     moving = bake_report.ground_warnings(options.ground, options.frame_start)
     shot = yield from read_shot(scene)
     movers = staleness.of_movers(scene)
-    yield Progress("sample", 1.0)
+    surface = shot.surface
+    vertices = surface.vertices if surface else None
+    shot_hash = yield from aside("sample", 1.0, report.hash_inputs, shot.motions, vertices)
     sampled = time.perf_counter()
 
     loads, footprints, forces, answers = yield from _press(scene, shot)
@@ -91,28 +94,31 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     gaps = response_job.gap_table(answers)
     if gaps is None:
         gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
+    worst_gaps, gap_warnings = response_job.worst_gaps(answers), response_job.warnings(answers)
     layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
+    if surface and surface.factors is not None:
+        inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
+    input_hash = report.hash_inputs(inputs, shot_hash)
     warnings = bake_report.warnings(
         footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
     )
     offsets_mm = bake_report.offsets_mm(loads)
-    del loads  # they tell of every step of the simulation
-    if shot.surface and shot.surface.factors is not None:
-        inputs["painted_crc32"] = f"{zlib.crc32(shot.surface.factors.tobytes()):08x}"
+    suggested_speed = response_job.suggested_speeds(shot.motions, footprints)
+    sole_length = shortest_sole(shot.motions)
+    # They are as long as the animation, and from here on only the ground counts.
+    shot = replace(shot, motions=())
+    del loads, answers
     written: _Written | None = None
     if write and not response_only and options.output != "RESPONSE":
-        written = yield from _write(scene, shot, footprints, inputs)
-    else:
-        vertices = shot.surface.vertices if shot.surface else None
-        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
+        written = yield from _write(scene, shot, footprints, inputs, input_hash, sole_length)
     if write and options.output != "PRINTS":
         response_job.put_layers(scene, characters, layers)
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
     result = report.build(
         inputs=inputs,
-        input_hash=written.input_hash if written else input_hash,
+        input_hash=input_hash,
         footprints=footprints,
         offsets_mm=offsets_mm,
         timings={
@@ -126,12 +132,12 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
             *warnings,
             *moving,
             *(written.warnings if written else ()),
-            *response_job.warnings(answers),
+            *gap_warnings,
         ],
         forces=forces if options.keep_forces else None,
         gaps_mm=gaps,
-        worst_gaps=response_job.worst_gaps(answers),
-        suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
+        worst_gaps=worst_gaps,
+        suggested_speed=suggested_speed,
     )
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
@@ -146,7 +152,6 @@ class _Written:
 
     ground: bpy.types.Object
     carrier: bpy.types.Object
-    input_hash: str
     error: float
     warnings: list[str]
 
@@ -156,11 +161,13 @@ def _write(
     shot: Shot,
     footprints: Sequence[Footprint],
     inputs: dict[str, object],
+    input_hash: str,
+    sole_length: float,
 ) -> Job[_Written]:
-    """Put the prints on the ground, all of them in the last step."""
+    """Put the prints on the ground, all of them in the last step; the shortest sole is so long [m]."""
     options = scene.softground
     blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
-    frame_rate, unit_scale = shot.motions[0].frame_rate, scene.unit_settings.scale_length
+    frame_rate, unit_scale = settings.frame_rate_of(scene), scene.unit_settings.scale_length
     at_the_end = partial(
         PressedGround.at,
         footprints,
@@ -170,6 +177,7 @@ def _write(
         blur_sigma=blur_sigma,
     )
     pressed = yield from aside("write", 0.1, at_the_end)
+    touched = yield from aside("write", 0.1, pressed.touched)
     warnings: list[str] = []
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         if shot.surface is None:
@@ -179,18 +187,19 @@ def _write(
             yield Progress("write", 0.3)
             ground = drafts.enter_context(created_ground.draft(layout))
             inputs["ground"] = ground.name
-            vertices = layout.vertices
             yield Progress("write", 0.3)
-            place = baked_ground.on_created(scene, ground, layout, pressed)
+            place = baked_ground.on_created(scene, ground, layout, touched)
         else:
             ground, vertices = options.ground, shot.surface.vertices
-            index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, pressed, shot.terrain)
+            index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, touched, shot.terrain)
             cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
             place = baked_ground.on_itself(ground, index, vertices)
-            if wants_detail(ground, cover, options.detail, cell_size, shot.motions):
-                place = yield from _detail(drafts, ground, pressed, shot.terrain, cell_size, unit_scale)
+            if wants_detail(ground, cover, options.detail, cell_size, sole_length):
+                region = trail_detail.region_of(pressed)
+                del pressed  # it takes as much memory as the mesh, and is soon made again
+                place = yield from _detail(drafts, ground, region, touched, shot.terrain, cell_size, unit_scale)
+                pressed = yield from aside("write", 0.4, at_the_end)
             warnings += coverage_warnings(ground, cover, options.detail, cell_size)
-        input_hash = yield from aside("write", 0.5, report.hash_inputs, inputs, shot.motions, vertices)
         stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
         across = place.position[:, :2].T
         sample = yield from aside("write", 0.6, pressed.sample, *across)
@@ -209,25 +218,26 @@ def _write(
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
-    return _Written(ground, carrier, input_hash, over_time.error, warnings)
+    return _Written(ground, carrier, over_time.error, warnings)
 
 
 def _detail(
     drafts: ExitStack,
     ground: bpy.types.Object,
-    pressed: PressedGround,
+    region: Region,
+    touched: TouchedCells,
     terrain: Terrain,
     cell_size: float,
     unit_scale: float,
 ) -> Job[baked_ground.Place]:
     """A draft of the ground refined along the trail, as the place for a bake."""
     surface = trail_detail.surface_of(ground, unit_scale)
-    region = trail_detail.region_of(pressed)
     refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
     draft = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
     yield Progress("write", 0.4)
-    vertices = refinement.vertices(surface)
-    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, pressed, terrain)
+    vertices = refinement.at_vertices(surface, surface.vertices)
+    del refinement
+    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, touched, terrain)
     return baked_ground.on_detail(ground, draft, index, vertices)
 
 

@@ -15,7 +15,7 @@ from ...core import record
 from ...core.errors import InputError
 from ...core.footprints import Footprint
 from ...core.polylines import Polylines
-from ...core.pressed_ground import GroundSample, PressedGround
+from ...core.pressed_ground import GroundSample, TouchedCells
 from ..jobs import Job, Progress
 from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
 from .created_ground import Layout
@@ -78,9 +78,9 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
-def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, pressed: PressedGround) -> Place:
+def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, touched: TouchedCells) -> Place:
     """A ground that is not in the scene yet."""
-    index = np.flatnonzero(pressed.covers(*layout.vertices[:, :2].T))
+    index = np.flatnonzero(touched.covers(*layout.vertices[:, :2].T))
     return Place(index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft), is_draft=True)
 
 

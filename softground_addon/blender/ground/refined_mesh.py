@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -29,9 +29,6 @@ LAYOUT = {
     "BOOLEAN": ("value", 1, np.bool_),
 }
 """How values of each type are read in bulk: property, numbers per element, type. Texts stay behind."""
-
-AT_ONCE = 1 << 16
-"""Triangles that are worked on together: there may be millions, and they are worked on in double precision."""
 
 NOT_COPIED = ("position", "custom_normal")
 """Positions are made first; custom normals are coded against the faces around, which have changed."""
@@ -76,7 +73,7 @@ def build(
     size = np.diff(surface.face_start)
     kept_corners = _runs(surface.face_start[kept], size[kept])
     corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.triangles.ravel()])
-    face_size = np.concatenate([size[kept], np.full(len(refinement.triangles), 3)])
+    face_size = np.concatenate([size[kept], np.full(len(refinement.triangles), 3)]).astype(np.int32)
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     _add_loose_edges(mesh, source)
@@ -84,7 +81,8 @@ def build(
     mesh.loops.foreach_set("vertex_index", corner_vertex)
     mesh.polygons.add(len(face_size))
     mesh.polygons.foreach_set("loop_start", (np.cumsum(face_size) - face_size).astype(np.int32))
-    _copy_positions(mesh, source, surface, refinement)
+    position: Any = mesh.attributes["position"]
+    position.data.foreach_set("vector", refinement.at_vertices(surface, mesh_arrays.positions(source)).ravel())
     mesh.update(calc_edges=True)
 
     for material in source.materials:
@@ -95,12 +93,11 @@ def build(
             continue
         values = _values(attribute)
         if attribute.domain == "POINT":
-            values = np.concatenate([values, _at_new_vertices(values, surface, refinement)])
+            values = refinement.at_vertices(surface, values)
         elif attribute.domain == "CORNER":
-            new = _between(values, refinement.corners, refinement.weights)
-            values = np.concatenate([values[kept_corners], new])
+            values = refinement.at_corners(surface, values, kept_corners)
         elif attribute.domain == "FACE":
-            values = values[np.concatenate([kept, refinement.face])]
+            values = values[np.concatenate([kept, surface.triangle_face[refinement.source]])]
         else:
             values = np.where((edges >= 0).reshape(-1, *[1] * (values.ndim - 1)), values[edges], 0).astype(values.dtype)
         _write(mesh, attribute, values)
@@ -117,14 +114,13 @@ def _copy_vertex_groups(
     """Give the refined mesh the vertex groups of its source, which Blender reads vertex by vertex only."""
     members = [(item.group, vertex.index, item.weight) for vertex in source.vertices for item in vertex.groups]
     of_group, vertex, weight = np.array(members, dtype=np.float64).reshape(-1, 3).T
-    sources, shares = refinement.vertex_sources(surface)
     holder = bpy.data.objects.new("SoftGround Groups", mesh)  # the names are the mesh's, but only objects give them
     for number, name in enumerate(groups):
         group = holder.vertex_groups.new(name=name)
         chosen = of_group == number
         own = np.zeros(len(source.vertices))
         own[vertex[chosen].astype(np.intp)] = weight[chosen]
-        everywhere = np.concatenate([own, (own[sources] * shares).sum(axis=1)]).astype(np.float32)
+        everywhere = refinement.at_vertices(surface, own).astype(np.float32)
         inside = np.flatnonzero(everywhere)
         order = inside[np.argsort(everywhere[inside], kind="stable")]
         levels, first = np.unique(everywhere[order], return_index=True)
@@ -135,32 +131,6 @@ def _copy_vertex_groups(
 
 def _comes_along(name: str) -> bool:
     return name == SEAM or not (name.startswith((".", "softground_")) or name in NOT_COPIED)
-
-
-def _copy_positions(mesh: bpy.types.Mesh, source: bpy.types.Mesh, surface: Surface, refinement: Refinement) -> None:
-    positions = _values(source.attributes["position"])
-    data = cast("Any", mesh.attributes["position"]).data
-    data.foreach_set("vector", np.concatenate([positions, _at_new_vertices(positions, surface, refinement)]).ravel())
-
-
-def _at_new_vertices(values: NDArray[Any], surface: Surface, refinement: Refinement) -> NDArray[Any]:
-    sources, weights = refinement.vertex_sources(surface)
-    return _between(values, sources, weights[:, None])
-
-
-def _between(values: NDArray[Any], sources: Indices, weights: NDArray[np.float32]) -> NDArray[Any]:
-    """Values at C places each among N times three sources (N, 3), with weights (N, C, 3), one after the other.
-
-    Real numbers are interpolated, of others that of the source with the largest weight is taken.
-    """
-    if values.dtype != np.float32:
-        return values[np.take_along_axis(sources, weights.argmax(axis=-1), axis=1).ravel()]
-    mixed = np.empty((*weights.shape[:2], *values.shape[1:]), dtype=np.float32)
-    for first in range(0, len(sources), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
-        given = values[sources[part]].astype(np.float64)
-        mixed[part] = np.einsum("nck,nk...->nc...", weights[part].astype(np.float64), given)
-    return mixed.reshape(-1, *values.shape[1:])
 
 
 def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ...core.cell_keys import cells_at, cells_of, keys_of
 from ...core.pressed_ground import PressedGround
-from ...core.refinement import Refinement, Region, Surface
+from ...core.refinement import Refinement, Surface
+from ...core.region import Region
 from . import ground_mesh, playback, refined_mesh
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from ...core.pressed_ground import PressedGround
 from ...core.refinement import refine
 from .. import jobs, session, settings
 from ..baking import bake_report
-from ..baking.bake_checks import expected_coverage, wants_detail
+from ..baking.bake_checks import expected_coverage, shortest_sole, wants_detail
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, ground_mesh, trail_detail
 from ..ground.created_ground import create_ground, reach_for
@@ -169,12 +169,16 @@ def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
     vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
     footfalls = shot.plan.footfalls
     if footfalls is not None and wants_detail(
-        ground, expected_coverage(vertices, footfalls, cell_size), options.detail, cell_size, shot.motions
+        ground,
+        expected_coverage(vertices, footfalls, cell_size),
+        options.detail,
+        cell_size,
+        shortest_sole(shot.motions),
     ):
         surface = trail_detail.surface_of(ground, unit_scale)
         refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
         with trail_detail.draft(ground, surface, refinement) as draft:
-            ground, vertices = trail_detail.publish(ground, draft), refinement.vertices(surface)
+            ground, vertices = trail_detail.publish(ground, draft), refinement.at_vertices(surface, surface.vertices)
     return LiveGround(ground, vertices, shot, unit_scale)
 
 
