@@ -5,13 +5,88 @@ Positions are given in samples: 2.25 is a quarter of the way from sample 2 to sa
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from .orientation import quaternions
 from .rigid import rotation
 
 Array = NDArray[np.float64]
+
+STRETCH = 512
+"""Samples that are worked out in one go: few enough that what lies between the steps of a formula takes no memory."""
+
+
+class Between(np.lib.mixins.NDArrayOperatorsMixin):
+    """Samples (F, ...) seen at positions between them: an array (K, ...) that is worked out where it is looked at.
+
+    A shot at the simulation's time grid takes many times the memory of its frames, and most of it is looked at for a
+    few steps at a time.
+
+    Parameters
+    ----------
+    samples : (F, ...) float array
+        At least 2.
+    position : (K,) float array
+    method : callable
+        What lies between samples: takes these and positions. It looks at the two samples beside a position and at the
+        neighbours of these, no further.
+    """
+
+    def __init__(self, samples: Array, position: Array, method: Callable[[Array, Array], Array]) -> None:
+        self._samples, self._position, self._method = samples, position, method
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(K, ...)."""
+        return (len(self._position), *self._samples.shape[1:])
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self._samples.ndim
+
+    def __len__(self) -> int:
+        return len(self._position)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Basic indices, or an array of steps and basic indices for the other axes."""
+        steps, *others = index if isinstance(index, tuple) else (index,)
+        if steps is Ellipsis:
+            steps, others = slice(None), [Ellipsis, *others]
+        position = self._position[steps]
+        if position.ndim == 0:
+            return self._at(position[None])[0][tuple(others)]
+        return in_stretches(lambda some: self._at(position[some])[(slice(None), *others)], len(position))
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.asarray(self[:], dtype)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        arrays = [np.asarray(each) if isinstance(each, Between) else each for each in inputs]
+        return getattr(ufunc, method)(*arrays, **options)
+
+    def _at(self, position: Array) -> Array:
+        """All of the samples at some of the positions, from those around them."""
+        if not len(position):
+            return np.empty((0, *self._samples.shape[1:]))
+        first = max(int(position.min()) - 1, 0)
+        return self._method(self._samples[first : int(position.max()) + 3], position - first)
+
+
+def in_stretches(work: Callable[[slice], Array], count: int) -> Array:
+    """What `work` gives for slices of `count` samples, (count, ...): stretch by stretch, which bounds its memory."""
+    first = work(slice(0, STRETCH))
+    if count <= STRETCH:
+        return first
+    whole = np.empty_like(first, shape=(count, *first.shape[1:]))
+    whole[:STRETCH] = first
+    for start in range(STRETCH, count, STRETCH):
+        whole[start : start + STRETCH] = work(slice(start, start + STRETCH))
+    return whole
 
 
 def linear(samples: Array, position: Array) -> Array:

@@ -7,13 +7,16 @@ This is the border between Blender and the physics. Everything that the core kno
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import ceil
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .interpolation import cubic, linear, turning
+from .interpolation import Between, cubic, in_stretches, linear, turning
 from .solids import Solid
 
 Array = NDArray[np.float64]
@@ -122,9 +125,20 @@ class SoleMotion:
     transforms: Array
 
     def landmark_positions(self) -> Array:
-        """World positions of the sole's landmarks, (F, L, 3) [m]."""
-        pose, (x, y, z) = self.transforms[:, self.sole.landmark_patch, :3], self.sole.landmarks.T[..., None]
-        return pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3]
+        """World positions of the sole's landmarks, (F, L, 3) [m]; worked out once, not to be written to."""
+        return self._landmark_positions
+
+    @cached_property
+    def _landmark_positions(self) -> Array:
+        patch, (x, y, z) = self.sole.landmark_patch, self.sole.landmarks.T[..., None]
+
+        def during(steps: slice) -> Array:
+            pose = self.transforms[steps][:, patch, :3]
+            return np.asarray(pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3])
+
+        positions = in_stretches(during, len(self.transforms))
+        positions.flags.writeable = False
+        return positions
 
     def lowest(self) -> Array:
         """Height of the sole's lowest point, (F,) [m]; of a foot, of its lowest landmark."""
@@ -139,9 +153,8 @@ class SoleMotion:
         Between samples a foot moves along a C1 cubic; a solid turns evenly about the shortest way and moves straight,
         so that what rolls keeps its shape and what stops at once does not swing past.
         """
-        if self.sole.solid is None:
-            return dataclasses.replace(self, transforms=orthonormal(cubic(self.transforms, position)))
-        return dataclasses.replace(self, transforms=turning(self.transforms, position))
+        method = turning if self.sole.solid else _rigid_cubic
+        return dataclasses.replace(self, transforms=_between(self.transforms, position, method))
 
 
 @dataclass(frozen=True)
@@ -266,7 +279,7 @@ class CharacterMotion:
             self,
             frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
             soles=tuple(sole.at(position) for sole in self.soles),
-            joints={name: cubic(path, position) for name, path in self.joints.items()},
+            joints={name: _between(path, position, cubic) for name, path in self.joints.items()},
             centre=None if self.centre is None else linear(self.centre, position),
         )
 
@@ -274,6 +287,16 @@ class CharacterMotion:
 def steps_per_frame(frame_rate: float) -> int:
     """Number of simulation steps in a frame, so that a step is at most 1/`SIMULATION_RATE` s long."""
     return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
+
+
+def _between(samples: Array, position: Array, method: Callable[[Array, Array], Array]) -> Array:
+    """Samples at positions between them, for all who look at them an array."""
+    return cast(Array, Between(samples, position, method))
+
+
+def _rigid_cubic(poses: Array, position: Array) -> Array:
+    """Rigid poses along cubics."""
+    return orthonormal(cubic(poses, position))
 
 
 def orthonormal(transforms: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -23,7 +24,7 @@ from .heightfield import HeightField, Terrain, Window
 from .motion import CharacterMotion, SoleMotion, steps_per_frame
 from .pressing import Press
 from .soft_ground import SoftGround
-from .sole_points import sole_points
+from .sole_points import SolePoints, sole_points
 from .sole_stance import SoleStance
 from .solid_stance import SolidStance
 from .stance import Stance, Steps
@@ -175,12 +176,11 @@ class Simulation:
     def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press a motion; see `simulate`."""
         grid = _time_grid(loads)
-        waiting = _stances(loads, grid)
+        waiting = _Waiting(loads, grid)
         active = self._active = []
         start = 1
         for end in grid.shown + 1:
-            while waiting and waiting[0].first < end:
-                active.append(waiting.pop(0))
+            active += waiting.due(int(end))
             frame = float(grid.frames[end - 1])
             changed = self._press.advance(active, start, int(end), frame, grid.timing)
             last = end == grid.shown[-1] + 1
@@ -199,37 +199,87 @@ class Simulation:
             )
 
 
-def _stances(loads: Sequence[CharacterLoads], grid: _TimeGrid) -> list[Stance]:
-    """The stances of all characters by their first step, in the order of the scene where they start together."""
-    stances = []
-    for character, offset in zip(loads, grid.offsets, strict=True):
-        for index, motion in enumerate(character.motion.soles):
-            tracks = list(_tracks(motion, character.contacts.touching[:, index]))
-            points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.solid else None
-            earlier: Stance | None = None
-            for first, end in tracks:
-                begin = max(first, 1 - offset)  # the first step of the grid is a state, it presses nothing
-                if begin == end:
-                    continue
-                during = slice(begin, end)
-                steps = Steps(
-                    begin + offset,
-                    grid.frames[begin + offset : end + offset],
-                    motion.transforms[during],
-                    motion.transforms[max(0, begin - 2) : begin],
-                    character.forces.forces[during, index],
-                    character.contacts.normal[during, index],
-                    character.forces.centre_of_pressure[during, index],
-                )
-                stance: Stance
-                if points is None:
-                    stance = SolidStance(character.motion.name, motion.sole, steps)
-                    stance.earlier = earlier if earlier and earlier.end == first + offset else None
-                else:
-                    stance = SoleStance(character.motion.name, motion.sole, steps, points)
-                earlier = stance
-                stances.append(stance)
-    return sorted(stances, key=lambda stance: stance.first)
+class _Waiting:
+    """Contacts to come, by their first step, in the order of the scene where they start together.
+
+    Each becomes a stance when its time comes: its poses at all steps take memory.
+    """
+
+    def __init__(self, loads: Sequence[CharacterLoads], grid: _TimeGrid) -> None:
+        self._frames = grid.frames
+        self._latest: dict[tuple[int, int], Stance] = {}
+        contacts = [
+            contact
+            for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True))
+            for index in range(len(character.motion.soles))
+            for contact in _contacts(character, number, index, offset)
+        ]
+        self._contacts = deque(sorted(contacts, key=lambda contact: contact.first))
+
+    def due(self, end: int) -> Iterator[Stance]:
+        """The stances that start before a step."""
+        while self._contacts and self._contacts[0].first < end:
+            contact = self._contacts.popleft()
+            stance = contact.stance(self._frames)
+            earlier = self._latest.get(contact.of)
+            if isinstance(stance, SolidStance) and earlier and earlier.end == contact.since:
+                stance.earlier = earlier
+            self._latest[contact.of] = stance
+            yield stance
+
+
+@dataclass(frozen=True)
+class _Contact:
+    """A sole from touching down to leaving.
+
+    Attributes
+    ----------
+    character : CharacterLoads
+    of : (int, int)
+        Number of the character and of its sole.
+    during : slice
+        Its steps, of the character's.
+    since, first : int
+        Steps of the time grid from which it touches, and presses.
+    points : SolePoints or None
+        Of the sole, None of a solid.
+    """
+
+    character: CharacterLoads
+    of: tuple[int, int]
+    during: slice
+    since: int
+    first: int
+    points: SolePoints | None
+
+    def stance(self, frames: Array) -> Stance:
+        """The stance, at steps of the time grid that are at these scene frames."""
+        motion, contacts, forces = self.character.motion, self.character.contacts, self.character.forces
+        index, during = self.of[1], self.during
+        sole, poses = motion.soles[index].sole, motion.soles[index].transforms
+        steps = Steps(
+            self.first,
+            frames[self.first : self.first + during.stop - during.start],
+            poses[during],
+            poses[max(0, during.start - 2) : during.start],
+            forces.forces[during, index],
+            contacts.normal[during, index],
+            forces.centre_of_pressure[during, index],
+        )
+        if self.points is None:
+            return SolidStance(motion.name, sole, steps)
+        return SoleStance(motion.name, sole, steps, self.points)
+
+
+def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
+    """The contacts of a sole of a character, which appears at a step of the time grid."""
+    motion = character.motion.soles[index]
+    tracks = list(_tracks(motion, character.contacts.touching[:, index]))
+    points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.solid else None
+    for since, end in tracks:
+        begin = max(since, 1 - offset)  # the first step of the grid is a state, it presses nothing
+        if begin < end:
+            yield _Contact(character, (number, index), slice(begin, end), since + offset, begin + offset, points)
 
 
 def _tracks(motion: SoleMotion, touching: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .heightfield import Surface, Window
+from .interpolation import in_stretches
 from .motion import Sole, SolePatch
 from .patch_maps import Nodes, covered_fraction
 
@@ -103,9 +104,12 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
     transforms : (F, P, 4, 4) float array
         Its motion, to know how its patches lie to each other when the sole is flat.
     """
-    rotation = transforms[..., :3, :3]
-    alignment = np.einsum("fji,fpji->f", rotation[:, 0], rotation)  # traces of the rotations between the patches
-    flat = transforms[int(alignment.argmax())]
+
+    def alignment(steps: slice) -> Array:
+        rotation = transforms[steps][..., :3, :3]
+        return np.einsum("fji,fpji->f", rotation[:, 0], rotation)  # traces of the rotations between the patches
+
+    flat = transforms[int(in_stretches(alignment, len(transforms)).argmax())]
     patches: list[PatchPoints] = []
     for number, patch in enumerate(sole.patches):
         points = _patch_points(patch)
