@@ -23,7 +23,7 @@ are slivers, as at the pole of a sphere, each has hundreds."""
 LARGEST_TABLE = 1 << 17
 """Triangles in all bins, each as often as it is in one, up to which the bins are made smaller."""
 
-PLACES_AT_ONCE = 1 << 16
+PLACES_AT_ONCE = 1 << 14
 """Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
 
 SAME_LAYER = 1e-3
@@ -127,10 +127,13 @@ class MeshTerrain:
 
     def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Whether no second upward-facing surface lies below the highest one, for each place."""
-        hits = self._surfaces(np.ravel(x), np.ravel(y))
-        top = self.heights(np.ravel(x), np.ravel(y))
+        across, along = np.ravel(x), np.ravel(y)
+        top = self.heights(across, along)
         single = np.ones(np.size(x), dtype=bool)
-        single[hits.point[hits.z < top[hits.point] - SAME_LAYER]] = False
+        for first in range(0, len(single), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            single[part][hits.point[hits.z < top[part][hits.point] - SAME_LAYER]] = False
         return single.reshape(np.shape(x))
 
     def _surfaces(self, x: Array, y: Array) -> _Hits:
