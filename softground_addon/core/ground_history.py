@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,10 @@ class _Print:
     change: NDArray[np.float32]  # (K + 1, cells), 0 at first
 
 
+KEPT = 256
+"""Footprints that are kept laid out over time, which takes as much memory again as they do."""
+
+
 class GroundHistory:
     """The ground as it stood at the scene frames of a bake.
 
@@ -37,7 +42,8 @@ class GroundHistory:
     def __init__(self, terrain: Terrain, footprints: Sequence[Footprint] = ()) -> None:
         self.terrain = terrain
         self._cell_size = footprints[0].cell_size if footprints else 1.0
-        self._prints = [_series(footprint) for footprint in footprints]
+        self._footprints = footprints
+        self._print = lru_cache(KEPT)(lambda number: _series(footprints[number]))
 
     def heights(self, x: Array, y: Array, frame: Array) -> Array:
         """Heights at places and frames, arrays of one shape [m]; NaN where there is no ground."""
@@ -49,15 +55,16 @@ class GroundHistory:
         column, row = np.ravel(x) / self._cell_size - 0.5, np.ravel(y) / self._cell_size - 0.5
         when = np.ravel(frame)
         total = np.zeros(len(when))
-        for footprint in self._prints:
+        for number, footprint in enumerate(self._footprints):
             window = footprint.window
             u, v = column - window.column, row - window.row
             near = np.flatnonzero(
-                (u > -1) & (u < window.columns) & (v > -1) & (v < window.rows) & (when >= footprint.frames[0] - 1e-6)
+                (u > -1) & (u < window.columns) & (v > -1) & (v < window.rows) & (when >= footprint.start_frame - 1e-6)
             )
             if len(near):
-                step = np.searchsorted(footprint.frames, when[near] + 1e-6, side="right")
-                total[near] += _bilinear(footprint, step, u[near], v[near])
+                series = self._print(number)
+                step = np.searchsorted(series.frames, when[near] + 1e-6, side="right")
+                total[near] += _bilinear(series, step, u[near], v[near])
         return total.reshape(shape)
 
 

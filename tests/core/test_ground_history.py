@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from softground_addon.core import ground_history
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.footprints import recompose
 from softground_addon.core.ground_history import GroundHistory
@@ -45,3 +46,11 @@ def test_every_place_may_be_asked_for_its_own_frame(footprints):
     single = [history.change(place[:1], place[1:2], np.array([frame]))[0] for frame in frames.ravel()]
     assert together.ravel() == pytest.approx(single)
     assert together[0, 0] == 0.0 > together[1, 1]
+
+
+def test_how_many_footprints_are_kept_laid_out_changes_nothing(footprints, monkeypatch):
+    rng = np.random.default_rng(2)
+    x, y, frame = rng.uniform(-0.3, 2.5, 500), rng.uniform(-0.3, 0.3, 500), rng.uniform(0, 60, 500)
+    of_all = GroundHistory(FlatTerrain(), footprints).change(x, y, frame)
+    monkeypatch.setattr(ground_history, "KEPT", 1)
+    np.testing.assert_array_equal(GroundHistory(FlatTerrain(), footprints).change(x, y, frame), of_all)

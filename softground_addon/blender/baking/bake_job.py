@@ -134,7 +134,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
             *(written.warnings if written else ()),
             *gap_warnings,
         ],
-        forces=forces if options.keep_forces else None,
+        forces=forces,
         gaps_mm=gaps,
         worst_gaps=worst_gaps,
         suggested_speed=suggested_speed,
@@ -251,8 +251,8 @@ def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Ar
 
 def _press(
     scene: bpy.types.Scene, shot: Shot
-) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object], list[response_job.Answer]]]:
-    """Loads, footprints and forces of a shot, and how its characters answer.
+) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object] | None, list[response_job.Answer]]]:
+    """Loads, footprints and, on request, forces of a shot, and how its characters answer.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
     lean that the pressed ground gives is the lean that pressed it.
@@ -278,19 +278,20 @@ def _press(
 
 def _simulate(
     scene: bpy.types.Scene, shot: Shot, loads: Sequence[CharacterLoads]
-) -> Job[tuple[list[Footprint], dict[str, object]]]:
-    """The footprints in the order of their first contact, and the force on each sole at each frame [N]."""
+) -> Job[tuple[list[Footprint], dict[str, object] | None]]:
+    """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
     check_cell_size(loads, settings.cell_size_of(scene))
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
-    count = max(len(motion.frames) for motion in shot.motions)
+    count, wanted = max(len(motion.frames) for motion in shot.motions), scene.softground.keep_forces
     for result in simulate(loads, ground_of(scene, shot), settings.cell_size_of(scene)):
         footprints += result.footprints
         frames.append(result.frame)
-        forces.append(result.forces)
+        if wanted:
+            forces.append(result.forces)
         yield Progress("simulate", len(frames) / count)
     footprints.sort(
         key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
     )
-    return footprints, bake_report.force_table(loads, frames, forces)
+    return footprints, bake_report.force_table(loads, frames, forces) if wanted else None
