@@ -84,16 +84,15 @@ def test_a_blend_shows_both_surfaces_by_what_is_painted(scene):
         ensure_blend("snow", "lava")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("surface", SURFACES)
-def test_a_pressed_spot_renders_differently_from_an_untouched_one(scene, ensure_material, tmp_path, surface):
+@pytest.fixture
+def spot(scene, tmp_path):
+    """Two faces, of which the right one is pressed, and what is seen of them from above."""
     import bpy
 
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1, size=0.2)
     ground = bpy.context.object
     pressed = ground.data.attributes.new("softground_compression", "FLOAT", "POINT")
     pressed.data.foreach_set("value", [0.02 if vertex.co.x > 0.01 else 0.0 for vertex in ground.data.vertices])
-    ground.data.materials.append(ensure_material(surface))
     scene.world = bpy.data.worlds.new("World")
     scene.world.use_nodes = True
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -108,12 +107,39 @@ def test_a_pressed_spot_renders_differently_from_an_untouched_one(scene, ensure_
     scene.render.resolution_x = scene.render.resolution_y = 48
     scene.view_settings.view_transform = "Standard"
     scene.render.filepath = str(tmp_path / "spot.png")
-    bpy.ops.render.render(write_still=True)
-    picture = bpy.data.images.load(scene.render.filepath)
-    pixels = np.empty(48 * 48 * 4, dtype=np.float32)
-    picture.pixels.foreach_get(pixels)
-    rgb = pixels.reshape(48, 48, 4)[..., :3]
+
+    def seen():
+        bpy.ops.render.render(write_still=True)
+        picture = bpy.data.images.load(scene.render.filepath)
+        pixels = np.empty(48 * 48 * 4, dtype=np.float32)
+        picture.pixels.foreach_get(pixels)
+        bpy.data.images.remove(picture)
+        return pixels.reshape(48, 48, 4)[..., :3]
+
+    return ground, seen
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", SURFACES)
+def test_a_pressed_spot_renders_differently_from_an_untouched_one(spot, ensure_material, surface):
+    ground, seen = spot
+    ground.data.materials.append(ensure_material(surface))
+    rgb = seen()
     left, right = rgb[:, 4:16].mean(axis=(0, 1)), rgb[:, -16:-4].mean(axis=(0, 1))
     assert rgb.max() > 0.05
     assert rgb.mean(axis=(0, 1))[1] > 0.3 * rgb.mean(axis=(0, 1))[0]  # not the pink of a broken shader
     assert np.abs(left - right).max() > 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", SURFACES)
+def test_a_tread_is_seen_where_a_sole_has_pressed_and_not_before(spot, ensure_material, surface):
+    ground, seen = spot
+    ground.data.materials.append(ensure_material(surface))
+    without = seen()
+    marks = ground.data.attributes.new("softground_sole", "FLOAT_VECTOR", "POINT")
+    places = [(vertex.co.y, 0.0, 0.004) for vertex in ground.data.vertices]
+    marks.data.foreach_set("vector", np.ravel(places))
+    change = np.abs(seen() - without).mean(axis=(0, 2))
+    assert change[-16:].mean() > 0.01
+    assert change[:20].mean() < 0.2 * change[-16:].mean()  # light below the snow's surface goes astray

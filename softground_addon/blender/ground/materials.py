@@ -233,24 +233,25 @@ def _material(
 
 def _ground(graph: Graph) -> Ground:
     compression = graph.attribute(COMPRESSION)
+    pressed = graph.ramp(compression, 0.0004, 0.004)
     return Ground(
         place=graph.out(graph.node("ShaderNodeNewGeometry")),
-        pressed=graph.ramp(compression, 0.0004, 0.004),
+        pressed=pressed,
         deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
-        tread=_tread(graph),
+        tread=_tread(graph, pressed),
     )
 
 
-def _tread(graph: Graph) -> Socket:
-    """Ridges that bow across the print where the sole has grooves, beside a plain edge [m]."""
+def _tread(graph: Graph, pressed: Socket) -> Socket:
+    """Ridges that bow across the print where the sole has grooves, beside a plain edge [m]; they come with the foot."""
     place = graph.node("ShaderNodeAttribute", attribute_name=SOLE)
     separate = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(place, 1)})
     along, across, depth = (graph.out(separate, axis) for axis in range(3))
     aside = graph.math("ABSOLUTE", across, 0.0)
     phase = graph.math("FRACT", (along + aside * 0.35) * (1.0 / TREAD_PITCH), 0.0)
     ridge = graph.ramp(graph.math("ABSOLUTE", phase + -0.5, 0.0), 0.12, 0.24, 1.0, 0.0)
-    return ridge * graph.ramp(aside, 0.030, 0.034, 1.0, 0.0) * depth
+    return ridge * graph.ramp(aside, 0.030, 0.034, 1.0, 0.0) * depth * pressed
 
 
 def _shaded(graph: Graph, look: Look) -> tuple[Socket, Socket]:
