@@ -65,6 +65,15 @@ class Histories:
     visits: Visits
     error: float
 
+    def stretched(self, factor: float) -> Histories:
+        """The same on a clock that counts `factor` frames where this one counts 1."""
+        ramps, visits = self.movement, self.visits
+        return Histories(
+            replace(ramps, start=factor * ramps.start, end=factor * ramps.end),
+            replace(visits, start=factor * visits.start, end=factor * visits.end),
+            self.error,
+        )
+
 
 def histories(
     footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE

@@ -1,14 +1,15 @@
 """Timelines as polylines over time, the form in which Blender's nodes sample them.
 
 Between two points all is linear; where something jumps, two points share a frame. The pressure of a contact, which
-timelines tell by its frames and its peak, becomes points too. They are made part by part of the ground, so that only
-what is kept of them takes memory everywhere at once.
+timelines tell by its frames and its peak, becomes points too. Some thirty places lie end to end on one: fewer polylines
+are looked up faster. They are made part by part of the ground, so that only what is kept of them takes memory
+everywhere at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,68 +23,20 @@ from .timelines import NO_VISIT, Timelines, timelines
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Integers = NDArray[np.int32]
 Floats = NDArray[np.float32]
 
 LOADING = 0.2
 """Part of a contact over which the pressure rises, and again falls: about that of a walking step."""
 
+NARROW = 2.0**-30
+"""Scale of heights across a polyline, so small that the length along it is the time to the last bit."""
 
-@dataclass(frozen=True)
-class Polylines:
-    """The state of P places over time, as R points.
-
-    Attributes
-    ----------
-    point : (P,) int array
-        The places.
-    first : (P + 1,) int array
-        Where the points of each place begin, and of the last end.
-    frame : (R,) float32 array
-        Frames since the first of the place, ascending.
-    state : (R, 4) float32 array
-        Change of the displayed height [m], displayed compression [m], last frame of the latest contact that has begun
-        (`timelines.NO_VISIT` where there was none), and the pressure [Pa].
-    start, end : (P,) float32 arrays
-        First and last frame of each place: before, nothing has happened to it; after, all but the pressure, which is
-        none, stays as it is at the last.
-    error : float
-        Largest error of a displayed height, at any place and frame [m].
-    """
-
-    point: Indices
-    first: Indices
-    frame: Floats
-    state: Floats
-    start: Floats
-    end: Floats
-    error: float
-
-    def stretched(self, factor: float) -> Polylines:
-        """The same on a clock that counts `factor` frames where this one counts 1."""
-        if factor == 1.0:
-            return self
-        state = self.state.copy()
-        contact = state[:, 2]
-        contact[contact < NO_VISIT] *= factor
-        frame, start, end = (factor * frames for frames in (self.frame, self.start, self.end))
-        return replace(self, frame=frame, start=start, end=end, state=state)
-
-    def end_to_end(self) -> tuple[Indices, Array]:
-        """Number of the string that each place is on if they are strung together, and where on it that begins [frames].
-
-        The gap behind each is at least a frame. Strings begin no place beyond `STRING`.
-        """
-        last = self.frame[self.first[1:] - 1].astype(np.float64)
-        begin = np.cumsum(np.ceil(last) + 1.0) - np.ceil(last) - 1.0
-        _, first, string = np.unique(begin // STRING, return_index=True, return_inverse=True)
-        return string, begin - begin[first[string]]
-
-
-STRING = 512.0
-"""Length up to which places are strung together [frames]: in single precision it is known to a `TICK`."""
+LENGTH = 512.0
+"""Up to here places begin on a polyline [frames]: in single precision its length is known to a `TICK`."""
 
 TICK = 2.0**-14
-"""Of the time along a string [frames]."""
+"""Of the time along a polyline [frames]."""
 
 VISITS_AT_ONCE = 40_000
 """Footprints' cells over places whose histories are worked out together: about a hundred megabytes."""
@@ -92,25 +45,105 @@ PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
 
 
+@dataclass(frozen=True)
+class Polylines:
+    """The state of places over time, as R points of S polylines; the places of each lie end to end.
+
+    Attributes
+    ----------
+    size : (S,) int array
+        Points of each polyline.
+    position : (R, 3) float32 array
+        Time along the polyline [frames]; change of the displayed height, and displayed compression [m], both times
+        `NARROW`.
+    contact : (R,) float32 array
+        While a contact lasts its pressure [Pa], after it minus the time since [s], before the first -`NO_VISIT`.
+    """
+
+    size: Indices
+    position: Floats
+    contact: Floats
+
+
+@dataclass(frozen=True)
+class Spans:
+    """When something happens to each of P places, and where it lies on the polylines.
+
+    Attributes
+    ----------
+    point : (P,) int array
+        The places.
+    start, end : (P,) float32 arrays
+        First and last frame of each place: before, nothing has happened to it; after, all but the time since the
+        contact stays as it is at the last, where nothing presses any more.
+    polyline : (P,) int32 array
+        Which of the polylines it lies on.
+    offset : (P,) float32 array
+        Where on that it starts [frames].
+    last_height : (P,) float32 array
+        Change of the displayed height at the last frame [m].
+    last_contact : (P,) float32 array
+        Last frame of the last contact; `timelines.NO_VISIT` where there was none.
+    frame_rate : float
+        Frames per second [Hz].
+    error : float
+        Largest error of a displayed height, at any place and frame [m].
+    """
+
+    point: Indices
+    start: Floats
+    end: Floats
+    polyline: Integers
+    offset: Floats
+    last_height: Floats
+    last_contact: Floats
+    frame_rate: float
+    error: float
+
+
 def polylines_at(
-    footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
-) -> Polylines:
-    """The record as polylines at given places; what it is given is what `histories.histories` takes."""
-    sizes, error = [np.zeros(0, dtype=np.intp)], 0.0
+    footprints: Sequence[Footprint],
+    x: Array,
+    y: Array,
+    *,
+    blur_sigma: float,
+    frame_rate: float,
+    time_stretch: float = 1.0,
+    tolerance: float = TOLERANCE,
+) -> tuple[Spans, Polylines]:
+    """The record as polylines at given places.
+
+    Parameters
+    ----------
+    footprints, x, y, blur_sigma, tolerance
+        See `histories.histories`.
+    frame_rate : float
+        Frames of the footprints per second [Hz].
+    time_stretch : float
+        Frames of the polylines for each frame of the footprints.
+    """
+    sizes, count, error = [np.zeros(0, dtype=np.intp)], 0, 0.0
     whole: dict[str, tuple[type, bytearray]] = {
-        "point": (np.intp, bytearray()),
-        **{name: (np.float32, bytearray()) for name in ("frame", "state", "start", "end")},
+        name: (kind, bytearray())
+        for kind, names in (
+            (np.intp, ("point",)),
+            (np.int32, ("polyline",)),
+            (np.float32, ("start", "end", "offset", "last_height", "last_contact", "position", "contact")),
+        )
+        for name in names
     }  # grown in place: put together at the end, everything would be there twice
     for places in _parts(footprints, x, y):
-        part = polylines(histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance))
-        part = replace(part, point=places[part.point])
-        for name, (_, grown) in whole.items():
-            grown.extend(getattr(part, name).tobytes())
-        sizes.append(np.diff(part.first))
-        error = max(error, part.error)
+        over_time = histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance)
+        spans, lines = polylines(over_time.stretched(time_stretch), frame_rate * time_stretch)
+        part = vars(spans) | vars(lines) | {"point": places[spans.point], "polyline": spans.polyline + count}
+        for name, (kind, grown) in whole.items():
+            grown.extend(part[name].astype(kind, copy=False).tobytes())
+        sizes.append(lines.size)
+        count += len(lines.size)
+        error = max(error, spans.error)
     arrays: dict[str, NDArray[Any]] = {name: np.frombuffer(grown, kind) for name, (kind, grown) in whole.items()}
-    arrays["state"] = arrays["state"].reshape(-1, 4)
-    return Polylines(first=np.concatenate([[0], np.cumsum(np.concatenate(sizes))]), error=error, **arrays)
+    lines = Polylines(np.concatenate(sizes), arrays.pop("position").reshape(-1, 3), arrays.pop("contact"))
+    return Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error), lines
 
 
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
@@ -123,8 +156,8 @@ def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]
     return np.split(order, np.flatnonzero(np.diff(so_far // VISITS_AT_ONCE)) + 1)
 
 
-def polylines(over_time: Histories) -> Polylines:
-    """The histories as polylines.
+def polylines(over_time: Histories, frame_rate: float) -> tuple[Spans, Polylines]:
+    """The histories as polylines; their frames per second tell how long a contact has been over.
 
     Examples
     --------
@@ -133,8 +166,8 @@ def polylines(over_time: Histories) -> Polylines:
     >>> from softground_addon.core.histories import Visits
     >>> from softground_addon.core.ramps import Ramps
     >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
-    >>> lines = polylines(Histories(Ramps.joined([], 2), visits, 0.0))
-    >>> lines.start.tolist(), lines.frame.tolist(), lines.state[:, 3].tolist()
+    >>> spans, lines = polylines(Histories(Ramps.joined([], 2), visits, 0.0), 24.0)
+    >>> spans.start.tolist(), lines.position[:, 0].tolist(), lines.contact.tolist()
     ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
     """
     table = timelines(over_time)
@@ -143,22 +176,41 @@ def polylines(over_time: Histories) -> Polylines:
     jump = np.flatnonzero(table.frame == table.visit_start)
     jump = jump[np.isin(jump, table.first, invert=True)]
     # A point on either side of each jump: that before belongs to the contact of the row before.
-    points = np.concatenate([jump - 1, row])
+    rows = np.concatenate([jump - 1, row])
     when = np.concatenate([table.frame[jump], frame])
     after = np.repeat([0, 1], [len(jump), len(row)])
-    order = np.lexsort((after, when, place[points]))
-    points, when = points[order], when[order]
-    size = np.bincount(place[points], minlength=len(table.point))
-    start = table.frame[table.first[:-1]]
-    return Polylines(
+    order = np.lexsort((after, when, place[rows]))
+    rows, when = rows[order], when[order]
+    size = np.bincount(place[rows], minlength=len(table.point))
+    last = table.first[1:] - 1
+    start, end = table.frame[table.first[:-1]], table.frame[last]
+    polyline, offset = _end_to_end(end - start)
+    position = np.empty((len(rows), 3), dtype=np.float32)
+    position[:, 0] = np.round((when + np.repeat(offset - start, size)) / TICK) * TICK
+    position[:, 1:] = _movement(table, rows, when) * NARROW
+    spans = Spans(
         point=table.point,
-        first=np.concatenate([[0], np.cumsum(size)]),
-        frame=(when - np.repeat(start, size)).astype(np.float32),
-        state=_states(table, points, when),
         start=start.astype(np.float32),
-        end=table.frame[table.first[1:] - 1].astype(np.float32),
+        end=end.astype(np.float32),
+        polyline=polyline.astype(np.int32),
+        offset=offset.astype(np.float32),
+        last_height=table.movement[last, 0].astype(np.float32),
+        last_contact=table.visit_end[last].astype(np.float32),
+        frame_rate=frame_rate,
         error=over_time.error,
     )
+    sizes = np.bincount(polyline, size).astype(np.intp)
+    return spans, Polylines(sizes, position, _contact(table, rows, when, frame_rate))
+
+
+def _end_to_end(length: Array) -> tuple[Indices, Array]:
+    """Which polyline each place of some length is on if they are laid end to end, and where on it that begins [frames].
+
+    The gap behind each is at least a frame. Polylines begin no place beyond `LENGTH`.
+    """
+    begin = np.cumsum(np.ceil(length) + 1.0) - np.ceil(length) - 1.0
+    _, first, polyline = np.unique(begin // LENGTH, return_index=True, return_inverse=True)
+    return polyline, begin - begin[first[polyline]]
 
 
 def _with_turns(table: Timelines, place: Indices) -> tuple[Indices, Array]:
@@ -178,20 +230,20 @@ def _with_turns(table: Timelines, place: Indices) -> tuple[Indices, Array]:
     return row[kept], when[order][kept]
 
 
-def _states(table: Timelines, row: Indices, frame: Array) -> Floats:
-    """The states at given frames, each between a row and the next, (N, 4)."""
+def _movement(table: Timelines, row: Indices, frame: Array) -> Array:
+    """Height and compression at given frames, each between a row and the next, (N, 2)."""
     following = np.minimum(row + 1, max(len(table.frame) - 1, 0))
     run = table.frame[following] - table.frame[row]
     since = frame - table.frame[row]
-    share = np.divide(since, run, out=np.zeros(len(row)), where=since > 0)
+    share = np.divide(since, run, out=np.zeros(len(row)), where=since > 0)[:, None]
+    moved: Array = table.movement[row] + share * (table.movement[following] - table.movement[row])
+    return moved
+
+
+def _contact(table: Timelines, row: Indices, frame: Array, frame_rate: float) -> Floats:
+    """See `Polylines.contact`, at given frames, each between a row and the next, (N,)."""
     begin, end = table.visit_start[row], table.visit_end[row]
     passed = np.divide(frame - begin, end - begin, out=np.zeros(len(row)), where=end > begin)
-    loaded = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0)
-    return np.stack(
-        [
-            *(values[row] + share * (values[following] - values[row]) for values in table.movement.T),
-            end,
-            loaded * table.pressure[row],
-        ],
-        axis=-1,
-    ).astype(np.float32)
+    pressure = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0) * table.pressure[row]
+    contact = np.where(frame < end, pressure, (end - frame) / frame_rate)
+    return np.where(begin < NO_VISIT, contact, -NO_VISIT).astype(np.float32)

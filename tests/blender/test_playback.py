@@ -50,9 +50,9 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True
     place = surface.vertices[index, :2].T
     ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
-    lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma)
-    with playback.timelines(lines, 30.0) as table:
-        playback.attach(ground, index[lines.point], lines, table, up=up, frame_rate=30.0)
+    spans, lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma, frame_rate=30.0)
+    with playback.timelines(lines) as table:
+        playback.attach(ground, index[spans.point], spans, table, up=up)
     return surface
 
 

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 
 from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.histories import Histories, Visits, histories
-from softground_addon.core.polylines import LOADING, STRING, TICK, polylines, polylines_at
+from softground_addon.core.polylines import LENGTH, LOADING, NARROW, TICK, polylines, polylines_at
 from softground_addon.core.ramps import QUANTUM, Ramps
 from softground_addon.core.timelines import NO_VISIT, timelines
 from tests.core.walkers import pressed, walk
 
 NO_RAMPS = Ramps.joined([], 2)
 POINTS = 4
+RATE = 30.0
 
 
 def random_ramps(rng, count):
@@ -32,15 +33,29 @@ def random_visits(rng, count):
     return Visits(point[order], start[order], end[order], rng.uniform(1, 9, count))
 
 
-def sampled(lines, place, frame):
-    """What a sampled spline gives: the ends beyond the ends, between points what lies between."""
-    points = slice(lines.first[place], lines.first[place + 1])
-    since, state = lines.frame[points].astype(float), lines.state[points].astype(float)
-    after = int(np.searchsorted(since, frame - lines.start[place], side="right"))
-    if after in (0, len(since)):
-        return state[min(after, len(since) - 1)]
-    share = (frame - lines.start[place] - since[after - 1]) / (since[after] - since[after - 1])
-    return state[after - 1] + share * (state[after] - state[after - 1])
+def points_of(spans, lines, place):
+    """The points of a place's polyline from its start to its end: all of them are at whole ticks."""
+    first = np.concatenate([[0], np.cumsum(lines.size)])[spans.polyline[place]]
+    points = np.arange(first, first + lines.size[spans.polyline[place]])
+    along = lines.position[points, 0].astype(float)
+    end = spans.offset[place] + float(spans.end[place]) - float(spans.start[place])
+    return points[(along >= spans.offset[place]) & (along <= end + 0.25)]
+
+
+def sampled(spans, lines, place, frame):
+    """What a sampled spline gives for a place: time along it, height, compression and contact."""
+    first = np.concatenate([[0], np.cumsum(lines.size)])[spans.polyline[place]]
+    points = slice(first, first + lines.size[spans.polyline[place]])
+    position, contact = lines.position[points].astype(float), lines.contact[points].astype(float)
+    step = np.linalg.norm(np.diff(lines.position[points], axis=0), axis=1)  # single precision, as Blender has it
+    along = np.concatenate([np.zeros(1, dtype=np.float32), np.cumsum(step, dtype=np.float32)]).astype(float)
+    values = np.concatenate([position[:, 1:] / NARROW, contact[:, None]], axis=-1)
+    length = float(spans.offset[place]) + max(frame - float(spans.start[place]), 0.0)
+    after = int(np.searchsorted(along, length, side="right"))
+    if after in (0, len(along)):
+        return values[min(after, len(along) - 1)]
+    share = (length - along[after - 1]) / (along[after] - along[after - 1])
+    return values[after - 1] + share * (values[after] - values[after - 1])
 
 
 @settings(max_examples=60)
@@ -48,58 +63,73 @@ def sampled(lines, place, frame):
 def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts):
     rng = np.random.default_rng(seed)
     movement, visits = random_ramps(rng, ramps), random_visits(rng, contacts)
-    lines = polylines(Histories(movement, visits, 0.0))
-    assert (np.diff(lines.frame)[np.diff(np.repeat(lines.point, np.diff(lines.first))) == 0] >= 0).all()
-    for place, point in enumerate(lines.point):
-        for frame in rng.uniform(lines.start[place], lines.end[place], 15):
-            height, sunk, contact_end, pressure = sampled(lines, place, frame)
-            assert [height, sunk] == pytest.approx(movement.at(frame, POINTS)[point], abs=2 * QUANTUM)
+    spans, lines = polylines(Histories(movement, visits, 0.0), RATE)
+    steepest = np.abs(movement.change / (movement.end - movement.start)[:, None]).sum(initial=0.0)
+    along = lines.position[:, 0]
+    assert (np.diff(along)[np.diff(np.repeat(np.arange(len(lines.size)), lines.size)) == 0] >= 0).all()
+    for place, point in enumerate(spans.point):
+        for frame in rng.uniform(spans.start[place], spans.end[place], 15):
+            height, sunk, contact = sampled(spans, lines, place, frame)
+            assert [height, sunk] == pytest.approx(movement.at(frame, POINTS)[point], abs=2 * QUANTUM + steepest * TICK)
             begun = np.flatnonzero((visits.point == point) & (visits.start <= frame))
             if not len(begun):
-                assert (contact_end, pressure) == (NO_VISIT, 0.0)
+                assert contact == -NO_VISIT
                 continue
             start, end = visits.start[begun[-1]], visits.end[begun].max()
             passed = np.clip((frame - start) / (end - start), 0.0, 1.0) if end > start else 0.0
             loaded = np.clip(min(passed, 1.0 - passed) / LOADING, 0.0, 1.0)
-            assert contact_end == pytest.approx(end, abs=1e-4)
-            assert pressure == pytest.approx(visits.pressure[begun[-1]] * loaded, abs=1e-4)
+            pressure, age = visits.pressure[begun[-1]] * loaded, max(frame - end, 0.0) / RATE
+            steep = visits.pressure[begun[-1]] / (LOADING * (end - start)) if end > start else 0.0
+            assert contact == pytest.approx(pressure - age, abs=1e-4 + steep * TICK)
 
 
-def test_at_the_end_nothing_presses_any_more():
+def test_at_the_end_nothing_presses_any_more_and_all_is_told_without_a_look():
     rng = np.random.default_rng(1)
-    lines = polylines(Histories(random_ramps(rng, 9), random_visits(rng, 20), 0.0))
-    assert (lines.state[lines.first[1:] - 1, 3] == 0.0).all()
+    movement, visits = random_ramps(rng, 9), random_visits(rng, 20)
+    spans, lines = polylines(Histories(movement, visits, 0.0), RATE)
+    for place, point in enumerate(spans.point):
+        height, _, contact = sampled(spans, lines, place, spans.end[place])
+        assert contact <= 0.0
+        assert spans.last_height[place] == height == movement.at(1e6, POINTS)[point, 0]
+        assert spans.last_contact[place] == max(visits.end[visits.point == point], default=NO_VISIT)
 
 
 def test_a_contact_adds_three_points_at_most_to_those_of_its_timeline():
     rng = np.random.default_rng(2)
     visits = random_visits(rng, 150)
     over_time = Histories(random_ramps(rng, 40), visits, 0.0)
-    assert len(polylines(over_time).frame) <= len(timelines(over_time).frame) + 3 * len(visits.point)
+    _, lines = polylines(over_time, RATE)
+    assert len(lines.position) <= len(timelines(over_time).frame) + 3 * len(visits.point)
 
 
 def test_nothing_makes_no_polylines():
     nobody = Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
-    lines = polylines(Histories(NO_RAMPS, nobody, 0.0))
-    assert lines.first.tolist() == [0]
-    assert lines.state.shape == (0, 4)
+    for spans, lines in (polylines(Histories(NO_RAMPS, nobody, 0.0), RATE), at([], np.zeros(3), np.zeros(3))):
+        assert len(spans.point) == len(lines.size) == len(lines.contact) == 0
+        assert lines.position.shape == (0, 3)
+
+
+def at(footprints, x, y, time_stretch=1.0):
+    return polylines_at(footprints, x, y, blur_sigma=0.005, frame_rate=RATE, time_stretch=time_stretch)
 
 
 def test_made_part_by_part_they_are_the_same(monkeypatch):
     _, footprints = pressed(walk(steps=5), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
     x, y = np.random.default_rng(0).uniform((-0.3, -0.3), (2.5, 0.3), (3000, 2)).T
-    whole = polylines(histories(footprints, x, y, blur_sigma=0.005))
+    whole, its_lines = polylines(histories(footprints, x, y, blur_sigma=0.005), RATE)
     monkeypatch.setattr("softground_addon.core.polylines.VISITS_AT_ONCE", 400)
-    parts = polylines_at(footprints, x, y, blur_sigma=0.005)
+    parts, lines = at(footprints, x, y)
     assert parts.error == pytest.approx(whole.error)
+    assert len(lines.size) > len(its_lines.size)
     order = np.argsort(parts.point)
-    np.testing.assert_array_equal(parts.point[order], whole.point)
-    np.testing.assert_array_equal(parts.start[order], whole.start)
-    np.testing.assert_array_equal(parts.end[order], whole.end)
+    for name in ("point", "start", "end", "last_height", "last_contact"):
+        np.testing.assert_array_equal(getattr(parts, name)[order], getattr(whole, name))
     for place, number in enumerate(order.tolist()):
-        mine, theirs = (slice(*lines.first[k : k + 2]) for lines, k in ((parts, number), (whole, place)))
-        np.testing.assert_array_equal(parts.frame[mine], whole.frame[theirs])
-        np.testing.assert_allclose(parts.state[mine], whole.state[theirs], rtol=1e-6, atol=1e-6)
+        mine, theirs = points_of(parts, lines, number), points_of(whole, its_lines, place)
+        along = lines.position[mine, 0] - parts.offset[number], its_lines.position[theirs, 0] - whole.offset[place]
+        np.testing.assert_array_equal(*along)
+        np.testing.assert_array_equal(lines.position[mine, 1:], its_lines.position[theirs, 1:])
+        np.testing.assert_array_equal(lines.contact[mine], its_lines.contact[theirs])
 
 
 def trodden(footprint, times):
@@ -125,43 +155,48 @@ def test_ground_that_is_stepped_on_again_and_again_takes_little_more_memory_than
         steps = trodden(footprints[0], times)
         tracemalloc.start()
         try:
-            lines = polylines_at(steps, x, y, blur_sigma=0.005)
+            _, lines = at(steps, x, y)
             peak = tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
-        return lines.frame.nbytes + lines.state.nbytes, peak
+        return lines.position.nbytes + lines.contact.nbytes, peak
 
     (few, before), (many, after) = played_and_peak(6), played_and_peak(12)
     assert after - before < 1.5 * (many - few)
 
 
 def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_stays_away():
-    visits = Visits(np.array([0]), np.array([4.0]), np.array([6.0]), np.array([1e4]))
-    heights = Ramps(
-        np.array([0, 1]), np.array([2.0, 2.0]), np.array([8.0, 8.0]), np.array([[-0.01, 0.01], [-0.02, 0.02]])
-    )
-    lines = polylines(Histories(heights, visits, 0.0))
-    slow = lines.stretched(0.5)
-    for name in ("frame", "start", "end"):
-        assert getattr(slow, name).tolist() == (getattr(lines, name) / 2).tolist()
-    assert slow.state[:, :2].tolist() == lines.state[:, :2].tolist()
-    assert set(lines.state[:, 2].tolist()) == {6.0, NO_VISIT}
-    assert set(slow.state[:, 2].tolist()) == {3.0, NO_VISIT}
+    _, footprints = pressed(walk(steps=3), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
+    x, y = np.random.default_rng(4).uniform((-0.3, -0.3), (1.6, 0.3), (300, 2)).T
+    factor = 2.5
+    spans, lines = at(footprints, x, y)
+    slow, slow_lines = at(footprints, x, y, factor)
+    assert slow.frame_rate == factor * spans.frame_rate
+    for name in ("start", "end"):
+        np.testing.assert_allclose(getattr(slow, name), factor * getattr(spans, name), rtol=1e-6)
+    visited = spans.last_contact < NO_VISIT
+    np.testing.assert_allclose(slow.last_contact[visited], factor * spans.last_contact[visited], rtol=1e-6)
+    assert (slow.last_contact[~visited] == NO_VISIT).all()
+    for place in range(0, len(spans.point), 7):
+        for frame in np.linspace(spans.start[place], spans.end[place], 9)[1:-1] + 0.01:
+            expected = sampled(spans, lines, place, frame)
+            assert sampled(slow, slow_lines, place, factor * frame) == pytest.approx(expected, rel=1e-3, abs=1e-5)
 
 
-def test_strung_together_no_place_reaches_into_another_and_all_times_are_known_to_a_tick():
+def test_end_to_end_no_place_reaches_into_another_and_all_times_are_known_to_a_tick():
     rng = np.random.default_rng(3)
     start = rng.uniform(0, 2000, 600)
     heights = Ramps(np.arange(600), start, start + rng.uniform(0.25, 90, 600), rng.integers(1, 9, (600, 2)) * QUANTUM)
-    lines = polylines(Histories(heights, random_visits(rng, 0), 0.0))
-    string, offset = lines.end_to_end()
-    assert string.tolist() == sorted(string.tolist())
-    assert set(string.tolist()) == set(range(string[-1] + 1))
-    last = lines.frame[lines.first[1:] - 1]
-    for number in range(string[-1] + 1):
-        begin, end = offset[string == number], (offset + last)[string == number]
+    spans, lines = polylines(Histories(heights, random_visits(rng, 0), 0.0), RATE)
+    assert spans.polyline.tolist() == sorted(spans.polyline.tolist())
+    assert set(spans.polyline.tolist()) == set(range(len(lines.size)))
+    assert lines.size.sum() == len(lines.position)
+    last = spans.end - spans.start
+    for number in range(len(lines.size)):
+        begin = spans.offset[spans.polyline == number]
+        end = (spans.offset + last)[spans.polyline == number]
         assert begin[0] == 0.0
         assert (begin[1:] >= end[:-1] + 1.0).all()
-        assert begin[-1] <= STRING
+        assert begin[-1] <= LENGTH
         assert (np.spacing(end) <= TICK).all()
-    assert string[-1] < len(start) * 46 / STRING + 2
+    assert len(lines.size) < len(start) * 47 / LENGTH + 2

@@ -29,7 +29,7 @@ from ...core.simulation import CharacterLoads, simulate
 from ...core.sole_marks import sole_marks
 from .. import settings
 from ..characters.character_setup import characters_of
-from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
 from ..ground.materials import drafted
 from ..jobs import Job, Progress, aside
 from ..reading import staleness
@@ -204,21 +204,30 @@ def _write(
         across = place.position[:, :2].T
         sample = yield from aside("write", 0.6, pressed.sample, *across)
         del pressed  # the cells take as much memory as what is still to come
-        over_time = yield from aside("write", 0.7, partial(polylines_at, footprints, *across, blur_sigma=blur_sigma))
+        over_time = partial(
+            polylines_at,
+            footprints,
+            *across,
+            blur_sigma=blur_sigma,
+            frame_rate=frame_rate,
+            time_stretch=settings.time_stretch_of(scene),  # nodes count the animation's frames
+        )
+        spans, lines = yield from aside("write", 0.7, over_time)
+        table = drafts.enter_context(playback.timelines(lines))
+        del lines  # they are large, and all is in the table
         marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
         yield Progress("write", 0.9)
         carrier = yield from baked_ground.write(
             place,
             sample,
-            over_time,
+            spans,
+            table,
             stored,
-            frame_rate=frame_rate,
             unit_scale=unit_scale,
-            time_stretch=settings.time_stretch_of(scene),
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
-    return _Written(ground, carrier, over_time.error, warnings)
+    return _Written(ground, carrier, spans.error, warnings)
 
 
 def _detail(

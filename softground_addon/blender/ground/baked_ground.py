@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core import record
 from ...core.errors import InputError
 from ...core.footprints import Footprint
-from ...core.polylines import Polylines
+from ...core.polylines import Spans
 from ...core.pressed_ground import GroundSample, TouchedCells
 from ..jobs import Job, Progress
 from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
@@ -103,12 +103,11 @@ def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Plac
 def write(
     place: Place,
     sample: GroundSample,
-    over_time: Polylines,
+    spans: Spans,
+    table: bpy.types.Object,
     stored: bytes,
     *,
-    frame_rate: float,
     unit_scale: float,
-    time_stretch: float = 1.0,
     shape_keys: bool = True,
 ) -> Job[bpy.types.Object]:
     """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
@@ -120,34 +119,28 @@ def write(
     place : Place
     sample : GroundSample
         The finished ground at the place's positions.
-    over_time : Polylines
+    spans : Spans
         Of the place's positions.
+    table : bpy.types.Object
+        The polylines that these lie on, from `playback.timelines`.
     stored : bytes
         The footprints, from `core.record`.
-    frame_rate : float
-        Scene frames per second [Hz].
     unit_scale : float
         Metres per Blender unit.
-    time_stretch : float
-        See `settings.time_stretch_of`.
     shape_keys : bool
         See `ground_mesh.write`.
     """
-    # Nodes count the animation's frames.
-    lines, frame_rate = over_time.stretched(time_stretch), frame_rate * time_stretch
-    sample = sample.moved_at(lines.point)  # what no line moves stays exactly where it is
+    sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
     up = ground_mesh.up_of(place.carrier, unit_scale)
-    with playback.timelines(lines, frame_rate) as table:
+    if not place.is_draft:
+        place.publish()
+    ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+    if place.is_draft:
         yield Progress("write", 0.9)
-        if not place.is_draft:
-            place.publish()
-        ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
-        if place.is_draft:
-            yield Progress("write", 0.9)
-        playback.attach(place.carrier, place.index[lines.point], lines, table, up=up, frame_rate=frame_rate)
-        if place.is_draft:
-            yield Progress("write", 0.9)
-            place.publish()
+    playback.attach(place.carrier, place.index[spans.point], spans, table, up=up)
+    if place.is_draft:
+        yield Progress("write", 0.9)
+        place.publish()
     return place.carrier
 
 

@@ -10,8 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.footprints import NEVER
-from ...core.polylines import TICK, Polylines
+from ...core.polylines import Polylines, Spans
 from ...core.timelines import NO_VISIT
 from ..compat import straighten
 from . import playback_nodes as nodes
@@ -40,16 +39,10 @@ FEW = 1 / 64
 
 
 @contextmanager
-def timelines(lines: Polylines, frame_rate: float) -> Iterator[bpy.types.Object]:
-    """An object that holds timelines as splines and is in no scene; it is taken away if nothing has come to use it.
-
-    Parameters
-    ----------
-    lines : Polylines
-    frame_rate : float
-        Their frames per second [Hz].
-    """
-    table = _table_object(lines, frame_rate)
+def timelines(lines: Polylines) -> Iterator[bpy.types.Object]:
+    """An object that holds timelines as splines and is in no scene; it is taken away if nothing has come to use it."""
+    table = _table_object(lines)
+    del lines  # they are large, and all is in the table
     try:
         yield table
     finally:
@@ -60,11 +53,10 @@ def timelines(lines: Polylines, frame_rate: float) -> Iterator[bpy.types.Object]
 def attach(
     ground: bpy.types.Object,
     vertices: Indices,
-    lines: Polylines,
+    spans: Spans,
     table: bpy.types.Object,
     *,
     up: Array,
-    frame_rate: float,
 ) -> bpy.types.Modifier:
     """Let timelines play a ground, in place of those that may play it.
 
@@ -75,23 +67,21 @@ def attach(
     ----------
     ground : bpy.types.Object
     vertices : (P,) int array
-        Vertex of its mesh that each of the polylines is of.
-    lines : Polylines
+        Vertex of its mesh that each of the spans is of.
+    spans : Spans
     table : bpy.types.Object
-        The same as an object, from `timelines`.
+        The polylines that these lie on, from `timelines`.
     up : (3,) float array
         World up in the ground's own space and units, of the length of one metre.
-    frame_rate : float
-        Frames of the polylines per second [Hz].
     """
     remove(ground)
     mesh = cast("bpy.types.Mesh", ground.data)
-    _write_attributes(mesh, vertices, lines)
+    _write_attributes(mesh, vertices, spans)
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = nodes.build(
         table=table,
         up=up.tolist(),
-        frame_rate=frame_rate,
+        frame_rate=spans.frame_rate,
         few=len(vertices) < FEW * len(mesh.vertices),
         settled=mesh.shape_keys is None,
     )
@@ -159,21 +149,19 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
     return np.zeros(0, dtype=np.intp) if moved is None else np.flatnonzero(moved)
 
 
-def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, lines: Polylines) -> None:
-    """Store of which vertices (P,) the polylines are, and what is known of them without a look into these."""
-    spline, offset = lines.end_to_end()
-    last = lines.state[lines.first[1:] - 1]
+def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> None:
+    """Store of which vertices (P,) the spans are."""
     active = mesh.attributes.active_index
     for name, kind, values, elsewhere in (
-        (nodes.MOVED, "BOOLEAN", np.ones(len(vertex), dtype=bool), False),
-        (nodes.START, "FLOAT", lines.start, -NO_VISIT),
-        (nodes.END, "FLOAT", lines.end, -NO_VISIT),
-        (nodes.SPLINE, "INT", spline, 0),
-        (nodes.OFFSET, "FLOAT", offset, 0.0),
-        (nodes.LAST_CONTACT, "FLOAT", last[:, 2], NO_VISIT),
+        (nodes.MOVED, "BOOLEAN", True, False),
+        (nodes.START, "FLOAT", spans.start, -NO_VISIT),
+        (nodes.END, "FLOAT", spans.end, -NO_VISIT),
+        (nodes.SPLINE, "INT", spans.polyline, 0),
+        (nodes.OFFSET, "FLOAT", spans.offset, 0.0),
+        (nodes.LAST_CONTACT, "FLOAT", spans.last_contact, NO_VISIT),
         # What is there is overwritten faster than made.
-        (nodes.PRESSURE, "FLOAT", last[:, 3], 0.0),
-        *([(nodes.LAST_HEIGHT, "FLOAT", last[:, 0], 0.0)] if mesh.shape_keys else []),
+        (nodes.PRESSURE, "FLOAT", 0.0, 0.0),
+        *([(nodes.LAST_HEIGHT, "FLOAT", spans.last_height, 0.0)] if mesh.shape_keys else []),
     ):
         whole = np.full(len(mesh.vertices), elsewhere, dtype=_TYPE[kind])
         whole[vertex] = values
@@ -181,38 +169,17 @@ def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, lines: Polylines) -
     mesh.attributes.active_index = active  # the one that the user has active stays so
 
 
-def _table_object(lines: Polylines, frame_rate: float) -> bpy.types.Object:
-    """The polylines as splines, laid end to end: fewer are looked up faster and take less memory."""
+def _table_object(lines: Polylines) -> bpy.types.Object:
+    """The polylines as splines."""
     splines = bpy.data.hair_curves.new(TABLE)
-    spline, offset = lines.end_to_end()
-    size = np.diff(lines.first)
-    if len(size):
-        splines.add_curves(np.bincount(spline, size).astype(int).tolist())
-        along: Any = splines.attributes["position"]
-        along.data.foreach_set("vector", _positions(lines.frame + np.repeat(offset, size)))
-    height, compression, _, pressure = lines.state.T
-    _store(splines, nodes.HEIGHT, "FLOAT", height.copy())
-    _store(splines, nodes.COMPRESSION, "FLOAT", compression.copy())
-    _store(splines, nodes.AGE, "FLOAT", _ages(lines, frame_rate))
-    _store(splines, nodes.PRESSURE, "FLOAT", pressure.copy())
-    if len(size):
+    if len(lines.size):
+        splines.add_curves(lines.size.tolist())
+        position: Any = splines.attributes["position"]
+        position.data.foreach_set("vector", lines.position.ravel())
+    _store(splines, nodes.CONTACT, "FLOAT", lines.contact)
+    if len(lines.size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
-
-
-def _positions(along: Array) -> NDArray[np.float32]:
-    """Coordinates of points (R,) along the splines, one after the other."""
-    position = np.zeros((len(along), 3), dtype=np.float32)
-    position[:, 0] = np.round(along / TICK) * TICK
-    return position.ravel()
-
-
-def _ages(lines: Polylines, frame_rate: float) -> NDArray[np.float32]:
-    """Time since the last contact at each point of the polylines, (R,) [s]."""
-    contact_end = lines.state[:, 2]
-    since = lines.frame + np.repeat(lines.start, np.diff(lines.first)) - contact_end
-    age: Array = np.where(contact_end < NO_VISIT, np.maximum(since, 0.0) / frame_rate, NEVER)
-    return age.astype(np.float32)
 
 
 def _store(geometry: Any, name: str, kind: str, values: NDArray[Any]) -> None:

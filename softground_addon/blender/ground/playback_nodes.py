@@ -14,6 +14,8 @@ from typing import Any
 import bpy
 
 from ...core.footprints import NEVER
+from ...core.polylines import NARROW
+from ...core.timelines import NO_VISIT
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"
@@ -30,8 +32,8 @@ LAST_HEIGHT, LAST_CONTACT = "softground_last_height", "softground_last_contact"
 """Height at which a vertex comes to rest [m], and last frame of its last contact."""
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
-HEIGHT = "softground_height"
-"""Of a point of a spline, beside compression, age and pressure; along the spline runs the time in frames."""
+CONTACT = "softground_contact"
+"""Of a spline's points; see `core.polylines.Polylines`, also for the height and compression in their positions."""
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
@@ -75,7 +77,8 @@ def build(
     timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
 
     graph.next_row()
-    rest, height = graph.attribute(REST, "FLOAT_VECTOR"), timelines.now(HEIGHT)
+    rest = graph.attribute(REST, "FLOAT_VECTOR")
+    height, compression = timelines.movement()
     if not settled:
         at_rest = graph.both(moved, graph.compare("LESS_EQUAL", end, frame))
         geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
@@ -87,16 +90,19 @@ def build(
     last = graph.attribute(LAST_CONTACT)
     aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
     shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
-    compression = timelines.now(COMPRESSION)
     rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
-    age = graph.choose("FLOAT", waiting, timelines.now(AGE), NEVER)
-    for name, value, untouched in ((COMPRESSION, compression, 0.0), (RIM, rim, 0.0), (AGE, age, NEVER)):
+    contact = timelines.contact()
+    untouched = graph.compare("LESS_THAN", contact, -NO_VISIT / 2)
+    if few:
+        untouched = graph.either(waiting, untouched)
+    age = graph.choose("FLOAT", untouched, graph.math("MAXIMUM", graph.math("MULTIPLY", contact, -1.0), 0.0), NEVER)
+    for name, value, at_first in ((COMPRESSION, compression, 0.0), (RIM, rim, 0.0), (AGE, age, NEVER)):
         graph.next_row()
         if not few:
-            shaded = graph.store(shaded, name, untouched, waiting)
+            shaded = graph.store(shaded, name, at_first, waiting)
         shaded = graph.store(shaded, name, value, looked_up)
     graph.next_row()
-    shaded = graph.store(shaded, PRESSURE, timelines.now(PRESSURE), looked_up)
+    shaded = graph.store(shaded, PRESSURE, graph.math("MAXIMUM", contact, 0.0), looked_up)
     graph.finish(graph.choose("GEOMETRY", graph.with_shading, geometry, shaded))
     return graph.tree
 
@@ -124,8 +130,18 @@ class _Timelines:
         self._graph, self._splines, self._length = graph, info.outputs["Geometry"], length
         self._number = graph.attribute(SPLINE, "INT")
 
-    def now(self, name: str) -> Any:
-        return self._graph.sample(self._splines, name, self._number, self._length)
+    def movement(self) -> tuple[Any, Any]:
+        """Change of the displayed height, and displayed compression [m]."""
+        graph = self._graph
+        node = graph.sample(self._splines, self._number, self._length)
+        _, height, compression = graph.separated(node.outputs["Position"])
+        return graph.math("MULTIPLY", height, 1 / NARROW), graph.math("MULTIPLY", compression, 1 / NARROW)
+
+    def contact(self) -> Any:
+        """See `core.polylines.Polylines`."""
+        node = self._graph.sample(self._splines, self._number, self._length)
+        self._graph.link(self._graph.attribute(CONTACT), node.inputs["Value"])
+        return node.outputs["Value"]
 
 
 class _Graph:
@@ -206,8 +222,14 @@ class _Graph:
         return node.outputs["Value"]
 
     def both(self, first: Any, second: Any) -> Any:
+        return self._logic("AND", first, second)
+
+    def either(self, first: Any, second: Any) -> Any:
+        return self._logic("OR", first, second)
+
+    def _logic(self, operation: str, first: Any, second: Any) -> Any:
         node = self.node("FunctionNodeBooleanMath")
-        node.operation = "AND"
+        node.operation = operation
         self.link(first, node.inputs[0])
         self.link(second, node.inputs[1])
         return node.outputs["Boolean"]
@@ -226,15 +248,19 @@ class _Graph:
         self.link(factor, node.inputs["Scale"])
         return node.outputs["Vector"]
 
-    def sample(self, splines: Any, name: str, number: Any, length: Any) -> Any:
-        """A number of the points of a spline, at a length along it."""
+    def separated(self, vector: Any) -> list[Any]:
+        node = self.node("ShaderNodeSeparateXYZ")
+        self.link(vector, node.inputs["Vector"])
+        return list(node.outputs)
+
+    def sample(self, splines: Any, number: Any, length: Any) -> Any:
+        """A node that looks at one of the splines, at a length along it."""
         node = self.node("GeometryNodeSampleCurve")
         node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
         self.link(splines, node.inputs["Curves"])
-        self.link(self.attribute(name), node.inputs["Value"])
         self.link(length, node.inputs["Length"])
         self.link(number, node.inputs["Curve Index"])
-        return node.outputs["Value"]
+        return node
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
         node = self.node("GeometryNodeSwitch")

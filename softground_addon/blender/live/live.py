@@ -25,7 +25,7 @@ from .. import jobs, session, settings
 from ..baking import bake_report
 from ..baking.bake_checks import expected_coverage, shortest_sole, wants_detail
 from ..characters.character_setup import characters_of
-from ..ground import baked_ground, ground_mesh, trail_detail
+from ..ground import baked_ground, ground_mesh, playback, trail_detail
 from ..ground.created_ground import create_ground, reach_for
 from ..operator_base import reports_errors
 from ..reading import analysis, staleness
@@ -133,18 +133,24 @@ class LiveMode:
         stored = record.dump(footprints, {"inputs": so_far, "input_hash": ""})
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
-        over_time = polylines_at(footprints, *across, blur_sigma=sigma)
-        writing = baked_ground.write(
-            place,
-            pressed.sample(*across),
-            over_time,
-            stored,
+        spans, lines = polylines_at(
+            footprints,
+            *across,
+            blur_sigma=sigma,
             frame_rate=self._frame_rate,
-            unit_scale=unit_scale,
             time_stretch=settings.time_stretch_of(scene),
-            shape_keys=scene.softground.shape_keys,
         )
-        carrier = jobs.run(writing)
+        with playback.timelines(lines) as table:
+            writing = baked_ground.write(
+                place,
+                pressed.sample(*across),
+                spans,
+                table,
+                stored,
+                unit_scale=unit_scale,
+                shape_keys=scene.softground.shape_keys,
+            )
+            carrier = jobs.run(writing)
         ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
         staleness.store(inputs, scene)
 
