@@ -14,18 +14,21 @@ from .errors import InputError
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Another name in the same folder to write to; it takes the place of `path` when the block ends well.
+    """Another name in the same folder to write to; it takes the place and mode of `path` when all went well.
 
     Raises
     ------
     InputError
-        If the folder is missing or cannot be written, or the disk is full. `path` is then as it was.
+        If the folder is missing or cannot be written, the file is protected, or the disk is full. `path` is then as it
+        was.
     """
     partial = _partial(path)
     try:
         yield partial
         with partial.open("r+b") as written:  # Windows syncs only what may be written
             os.fsync(written.fileno())
+        if path.exists():
+            shutil.copymode(path, partial)
         partial.replace(path)
     except OSError as error:
         raise _not_written(path, error) from error
@@ -40,7 +43,7 @@ def check_place(path: Path) -> None:
     Raises
     ------
     InputError
-        If the folder is missing or cannot be written, or something else than a file has that name.
+        If the folder is missing or cannot be written, the file is protected, or something else has that name.
     """
     if not path.parent.is_dir():
         raise InputError(f"The folder of '{path}' does not exist: create it first.")
@@ -93,6 +96,8 @@ def _partial(path: Path) -> Path:
     """The name under which a file is written until it is whole."""
     if path.exists() and not path.is_file():
         raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise InputError(f"'{path}' is write-protected: choose another name, or let it be written.")
     return path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
 
 

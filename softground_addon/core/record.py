@@ -20,8 +20,8 @@ FORMAT = 1
 
 _TEXT = "record.json"
 _DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError),  # of the archive
-    *(KeyError, ValueError, TypeError, RecursionError),  # of the text
+    *(zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError),  # of the archive: also "encrypted"
+    *(KeyError, ValueError, TypeError),  # of the text; too deep a nesting is a RuntimeError
     *(SyntaxError, tokenize.TokenError, MemoryError),  # of an array's header: what numpy cannot read, and absurd sizes
 )
 """What reading a damaged record may raise."""

@@ -189,6 +189,14 @@ def test_a_record_that_claims_to_be_huge_is_refused(stored):
         record.load(rezipped(stored, name, member[:10] + lie.encode() + member[10 + len(header) :]))
 
 
+def test_a_record_that_claims_to_be_encrypted_is_refused(stored):
+    """As one flipped bit of the archive's directory makes it."""
+    spoiled = bytearray(stored)
+    spoiled[stored.index(b"PK\x01\x02") + 8] |= 1
+    with pytest.raises(InputError, match="damaged"):
+        record.load(bytes(spoiled))
+
+
 def test_json_nested_without_end_is_refused(stored):
     with pytest.raises(InputError):
         record.load(rezipped(stored, "record.json", b"[" * 100_000))

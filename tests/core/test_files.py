@@ -1,5 +1,7 @@
 """Files are written whole or not at all."""
 
+import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,25 @@ def test_a_full_disk_is_named_and_leaves_the_old_file(tmp_path: Path):
     path.write_text("old")
     with pytest.raises(InputError, match="free disk space"):
         write_to_full_disk(path, full)
+    assert path.read_text() == "old"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions")
+def test_a_file_that_a_group_may_write_stays_so(tmp_path: Path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    path.chmod(0o664)
+    write_text(path, "new")
+    assert (path.read_text(), path.stat().st_mode & 0o777) == ("new", 0o664)
+
+
+def test_a_file_that_is_protected_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    monkeypatch.setattr(os, "access", lambda place, _mode: place != path)  # root may write anything
+    for write in (check_place, partial(write_text, text="new")):
+        with pytest.raises(InputError, match=r"a\.json' is write-protected"):
+            write(path)
     assert path.read_text() == "old"
 
 

@@ -80,6 +80,7 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
             "selected": True,
             "start": start,
             "end": end,
+            "orcos": False,  # generated coordinates, at each frame anew as the mesh's bounds change
             "apply_subdiv": True,  # else the ground is written without its last modifier where that subdivides
             "as_background_job": False,
             "export_custom_properties": False,
@@ -90,14 +91,13 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
 def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
     """Size of an Alembic file with the mesh at some frames, at most [bytes].
 
-    Each frame holds positions, generated coordinates (as the mesh's bounds change with it) and, of a mesh that is not
-    smooth, the normals at its corners.
+    Each frame holds positions and, of a mesh that is not smooth, the normals at its corners.
     """
     vertices, corners, maps = len(mesh.vertices), len(mesh.loops), len(mesh.uv_layers)
     normals = 0 if mesh.normals_domain == "POINT" else corners
-    vector, number, rest_of_frame = 12, 4, 4096
+    vector, number, rest_of_frame = 12, 4, 512
     once = vector * vertices + number * (corners + len(mesh.polygons)) + maps * 3 * number * corners
-    return once + frames * (vector * (2 * vertices + normals) + rest_of_frame)
+    return once + frames * (vector * (vertices + normals) + rest_of_frame)
 
 
 def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
