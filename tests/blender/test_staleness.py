@@ -6,10 +6,11 @@ import bpy
 import pytest
 
 from softground_addon.blender.baking import bake_report
+from softground_addon.blender.characters.character_setup import add_object_contacts
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import analysis, staleness
-from tests.blender import shots
+from tests.blender import rigs, shots
 from tests.blender.grounds import plane
 
 
@@ -327,6 +328,46 @@ def test_the_response_to_the_ground_is_no_change_at_any_frame(scene, uses_nla):
     for frame in (1, 17, 40):
         scene.frame_set(frame)
         assert bake_report.stale_reasons(scene) == ()
+
+
+def move_cane(_scene):
+    bpy.data.objects["Cane"].delta_location.z += 0.01
+
+
+def rekey_cane(_scene):
+    action_curves(bpy.data.objects["Cane"].animation_data.action)[0].keyframe_points[0].co.y += 0.1
+
+
+def let_cane_follow(_scene):
+    cane = bpy.data.objects["Cane"]
+    cane.constraints.new("COPY_LOCATION").target = bpy.data.objects["Walker"]
+
+
+@pytest.mark.parametrize(
+    ("change", "messages"),
+    [
+        (move_cane, ("'Cane' or a parent of it was moved",)),
+        (rekey_cane, ("The animation of 'Cane' has changed",)),
+        (let_cane_follow, ("The rig of 'Cane', or what it follows, has changed",)),
+    ],
+)
+def test_what_a_rigged_character_leans_on_is_compared_as_well(scene, change, messages):
+    shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.softground.tilt.use = scene.softground.grounding.use = True
+    scene.softground.output, scene.softground.cell_size = "BOTH", 0.02
+    bpy.ops.mesh.primitive_cone_add(vertices=8, radius1=0.02, depth=0.9)
+    cane = bpy.context.active_object
+    cane.name = "Cane"
+    rigs.key(cane, "location", {1: (0.3, 0, 0.45), 40: (0.3, 0, 0.45)})
+    add_object_contacts(scene, scene.softground.characters[0], [cane])
+    bpy.ops.softground.bake()
+    for frame in (1, 17, 40):
+        scene.frame_set(frame)
+        assert bake_report.stale_reasons(scene) == ()
+    change(scene)
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(scene) == messages
 
 
 def test_another_blender_compares_what_it_knows_as_the_one_that_baked(rigged):

@@ -259,7 +259,8 @@ def movers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The armatures and objects whose animation a bake of the scene reads."""
     movers: list[bpy.types.Object] = []
     for character in characters_of(scene):
-        movers += [character.armature] if character.armature else [s.object for s in character.soles if s.object]
+        movers += [character.armature] if character.armature else []
+        movers += [sole.object for sole in character.soles if sole.object]
     return movers
 
 
