@@ -42,32 +42,33 @@ _SERIES = {
 }
 
 
-def to_arrays(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, NDArray[Any]]]:
+def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, list[NDArray[Any]]]]:
     """The record as texts and a few flat arrays of 64-bit floats and 32-bit integers, to be stored as native data.
 
     Returns
     -------
     names : list of dict
         Character and sole of each footprint.
-    arrays : dict of str to (N,) array
-        `numbers`, `position` and `window` of all footprints, one after the other; each series likewise, with
-        `<series>.count` saying how many of its values belong to each footprint.
+    arrays : dict of str to list of (N,) arrays
+        The parts of each array, one after the other, which are the footprints' own: put together, they would be there
+        twice. `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count`
+        saying how many of its values belong to each footprint.
     """
     names = [{key: getattr(footprint, key) for key in _TEXTS} for footprint in footprints]
-    arrays: dict[str, NDArray[Any]] = {
-        "numbers": np.array([[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]).ravel(),
+    arrays: dict[str, list[NDArray[Any]]] = {
+        "numbers": [np.array([[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]).ravel()],
     }
     for key, (_, kind) in _VECTORS.items():
-        arrays[key] = np.array([getattr(footprint, key) for footprint in footprints], kind).ravel()
+        arrays[key] = [np.array([getattr(footprint, key) for footprint in footprints], kind).ravel()]
     for key, kind in _SERIES.items():
         parts = [attrgetter(key)(footprint) for footprint in footprints]
-        arrays[key] = np.concatenate([np.empty(0, kind), *parts]).astype(kind)
-        arrays[f"{key}.count"] = np.array([len(part) for part in parts], np.int32)
+        arrays[key] = [np.empty(0, kind), *(np.asarray(part, kind) for part in parts)]
+        arrays[f"{key}.count"] = [np.array([len(part) for part in parts], np.int32)]
     return names, arrays
 
 
 def from_arrays(names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]) -> list[Footprint]:
-    """The record from what `to_arrays` gave.
+    """The record from what `to_parts` gave, each array put together.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .errors import InputError
-from .footprint_arrays import from_arrays, to_arrays
+from .footprint_arrays import from_arrays, to_parts
 from .footprints import Footprint
 
 FORMAT = 1
@@ -34,15 +34,20 @@ _FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
 
 def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
     """The footprints and what is known about them (numbers and texts, for JSON) as bytes."""
-    names, arrays = to_arrays(footprints)
+    names, arrays = to_parts(footprints)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         text = json.dumps({"format": FORMAT, "footprints": names, "about": dict(about)}, ensure_ascii=False)
         archive.writestr(zipfile.ZipInfo(_TEXT, _FIXED_DATE), text, zipfile.ZIP_DEFLATED)
-        for key, values in arrays.items():
-            member = io.BytesIO()
-            np.save(member, values, allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE), member.getvalue(), zipfile.ZIP_DEFLATED)
+        for key, parts in arrays.items():
+            entry = zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w") as member:
+                size = sum(len(part) for part in parts)
+                header = {"descr": parts[0].dtype.str, "fortran_order": False, "shape": (size,)}
+                np.lib.format.write_array_header_1_0(member, header)
+                for part in parts:
+                    member.write(part.tobytes())
     return buffer.getvalue()
 
 
