@@ -42,7 +42,8 @@ class GroundHistory:
     def __init__(self, terrain: Terrain, footprints: Sequence[Footprint] = ()) -> None:
         self.terrain = terrain
         self._cell_size = footprints[0].cell_size if footprints else 1.0
-        self._footprints = footprints
+        self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
+        self._starts = np.array([footprint.start_frame for footprint in footprints])
         self._print = lru_cache(KEPT)(lambda number: _series(footprints[number]))
 
     def heights(self, x: Array, y: Array, frame: Array) -> Array:
@@ -55,17 +56,29 @@ class GroundHistory:
         column, row = np.ravel(x) / self._cell_size - 0.5, np.ravel(y) / self._cell_size - 0.5
         when = np.ravel(frame)
         total = np.zeros(len(when))
-        for number, footprint in enumerate(self._footprints):
-            window = footprint.window
-            u, v = column - window.column, row - window.row
-            near = np.flatnonzero(
-                (u > -1) & (u < window.columns) & (v > -1) & (v < window.rows) & (when >= footprint.start_frame - 1e-6)
-            )
+        for number in self._reached(column, row, when):
+            first_column, first_row, columns, rows = self._windows[number]
+            u, v = column - first_column, row - first_row
+            begun = when >= self._starts[number] - 1e-6
+            near = np.flatnonzero((u > -1) & (u < columns) & (v > -1) & (v < rows) & begun)
             if len(near):
                 series = self._print(number)
                 step = np.searchsorted(series.frames, when[near] + 1e-6, side="right")
                 total[near] += _bilinear(series, step, u[near], v[near])
         return total.reshape(shape)
+
+    def _reached(self, column: Array, row: Array, when: Array) -> list[int]:
+        """Footprints that may lie at places, in cells from the centre of the first, before given frames."""
+        if not len(when):
+            return []
+        first_column, first_row, columns, rows = self._windows.T
+        return np.flatnonzero(
+            (column.max() > first_column - 1)
+            & (column.min() < first_column + columns)
+            & (row.max() > first_row - 1)
+            & (row.min() < first_row + rows)
+            & (when.max() >= self._starts - 1e-6)
+        ).tolist()
 
 
 def _series(footprint: Footprint) -> _Print:

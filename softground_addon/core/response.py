@@ -14,7 +14,8 @@ from .footprints import Footprint
 from .ground_history import GroundHistory
 from .grounding import Response, heel_rises, leg_soles, responding, settle
 from .heightfield import FlatTerrain, Terrain
-from .motion import CharacterMotion
+from .interpolation import in_stretches
+from .motion import CharacterMotion, SoleMotion
 from .performance import (
     BENT,
     DEPTH_TIME,
@@ -219,12 +220,22 @@ def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: 
     frames, soles, heights = [], [], []
     for index, sole in enumerate(motion.soles):
         stands = np.flatnonzero(touching[:, index])
-        clearance = lowest_clearance(posed_points(sole)[stands], history, motion.frames[stands])
+        clearance = _clearance(sole, stands, motion.frames[stands], history)
         known = np.isfinite(clearance)
         frames.append(motion.frames[stands][known])
         soles.append(np.full(int(known.sum()), index))
         heights.append(clearance[known])
     return Gaps(np.concatenate(frames), np.concatenate(soles), np.concatenate(heights))
+
+
+def _clearance(sole: SoleMotion, samples: NDArray[np.intp], frames: Array, history: GroundHistory) -> Array:
+    """Height of a sole's lowest point above the ground at some of its samples, which are at these frames, (K,) [m]."""
+
+    def during(part: slice) -> Array:
+        points = posed_points(replace(sole, transforms=sole.transforms[samples[part]]))
+        return lowest_clearance(points, history, frames[part])
+
+    return in_stretches(during, len(samples))
 
 
 def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
