@@ -92,6 +92,22 @@ def test_asking_again_replaces_the_curves(baked):
     assert len(action_curves(empty.animation_data.action)) == 4
 
 
+def test_asking_again_leaves_what_the_user_has_animated_of_the_empty(baked):
+    bpy.ops.softground.force_curves()
+    empty = bpy.data.objects["Walker Forces"]
+    for frame, height in ((1, 0.0), (40, 2.0)):
+        empty.location.z = height
+        empty.keyframe_insert("location", index=2, frame=frame)
+    empty["mine"] = 7.0
+    empty.keyframe_insert('["mine"]', frame=1)
+    bpy.ops.softground.force_curves()
+    curves = action_curves(empty.animation_data.action)
+    assert sorted(curve.data_path for curve in curves if "foot" not in curve.data_path) == ['["mine"]', "location"]
+    assert len(curves) == 6
+    baked.frame_set(40)
+    assert (empty.location.z, empty["mine"]) == (2.0, 7.0)
+
+
 def test_the_rig_and_its_action_stay_untouched(baked):
     before = fingerprints.of_file()
     bpy.ops.softground.force_curves()

@@ -87,18 +87,27 @@ def write_curves(scene: bpy.types.Scene, footprints: Sequence[Footprint], frames
 
 
 def _fresh_empty(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    """The empty of that name without any forces; how else the user has animated it stays."""
     empty = scene.objects.get(name)
     if empty is None or empty.type != "EMPTY":
         empty = bpy.data.objects.new(name, None)
         empty.empty_display_size = 0.2
         scene.collection.objects.link(empty)
-    action = empty.animation_data.action if empty.animation_data else None
-    empty.animation_data_clear()
-    if action and not action.users:
-        bpy.data.actions.remove(action)
-    for key in [key for key in empty.keys() if key.endswith((f" {FORCE}", f" {CONTACT}"))]:  # noqa: SIM118
+    earlier = [key for key in empty.keys() if key.endswith((f" {FORCE}", f" {CONTACT}"))]  # noqa: SIM118
+    paths = {_path_of(key) for key in earlier}
+    animation: Any = empty.animation_data
+    if animation and animation.action and (compat.slot_of(animation) or not compat.HAS_SLOTS):
+        curves = compat.channels_of(animation.action, compat.slot_of(animation))
+        for curve in [curve for curve in curves if curve.data_path in paths]:
+            curves.remove(curve)
+    for key in earlier:
         del empty[key]
     return empty
+
+
+def _path_of(name: str) -> str:
+    """Data path of a custom property."""
+    return f'["{bpy.utils.escape_identifier(name)}"]'
 
 
 def _animate(thing: bpy.types.Object, name: str, frames: Array, values: Array, *, constant: bool) -> None:
@@ -107,10 +116,11 @@ def _animate(thing: bpy.types.Object, name: str, frames: Array, values: Array, *
     thing.id_properties_ui(name).update(min=0.0, description="Normal force of the ground in newtons")
     if constant:
         thing.id_properties_ui(name).update(max=1.0, description="Whether the sole touches the ground")
-    path = f'["{bpy.utils.escape_identifier(name)}"]'
+    path = _path_of(name)
     thing.keyframe_insert(path, frame=float(frames[0]))
     animation: Any = thing.animation_data
-    curve: Any = next(c for c in compat.action_curves(animation.action) if c.data_path == path)
+    curves = compat.action_curves(animation.action, compat.slot_of(animation))
+    curve: Any = next(curve for curve in curves if curve.data_path == path)
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", np.column_stack([frames, values]).astype(np.float32).ravel())
