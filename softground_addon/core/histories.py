@@ -6,7 +6,7 @@ the ground. Time and memory follow the number of footprints, not the length of t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,9 +92,9 @@ def histories(
         time, they share it.
     """
     places = _Places(x, y)
-    footprints = _near(footprints, places, blur_sigma)
-    spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
+    footprints = _near(footprints, places, kernels)
+    spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
     movements: list[Ramps] = []
     visits: list[Visits] = []
@@ -155,20 +155,18 @@ def _inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.
     return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)
 
 
-def _near(footprints: Sequence[Footprint], places: _Places, blur_sigma: float) -> list[Footprint]:
+def _near(footprints: Sequence[Footprint], places: _Places, kernels: Mapping[float, Array]) -> list[Footprint]:
     """The footprints that may reach some of the places."""
-    if not len(places.x):
+    if not len(places.x) or not footprints:
         return []
+    margin = {size: _margin(kernel) for size, kernel in kernels.items()}
+    windows = [(footprint.window, footprint.cell_size) for footprint in footprints]
+    first = np.array([(window.column, window.row) for window, _ in windows])
+    cells = np.array([(window.columns, window.rows) for window, _ in windows])
+    size, reach = np.array([(size, margin[size]) for _, size in windows]).T[..., None]
     low, high = (np.array([bound(places.x), bound(places.y)]) for bound in (np.min, np.max))
-    near = []
-    for footprint in footprints:
-        size, window = footprint.cell_size, footprint.window
-        reach = _margin(gaussian_kernel(blur_sigma / size)) * size
-        first = np.array([window.column, window.row]) * size - reach
-        last = first + np.array([window.columns, window.rows]) * size + 2 * reach
-        if (first <= high).all() and (last >= low).all():
-            near.append(footprint)
-    return near
+    near = ((first - reach) * size <= high) & ((first + cells + reach) * size >= low)
+    return [footprints[number] for number in np.flatnonzero(near.all(axis=1))]
 
 
 def _margin(kernel: Array) -> int:

@@ -38,8 +38,8 @@ LENGTH = 512.0
 TICK = 2.0**-14
 """Of the time along a polyline [frames]."""
 
-VISITS_AT_ONCE = 40_000
-"""Footprints' cells over places whose histories are worked out together: about a hundred megabytes."""
+VISITS_AT_ONCE = 5_000
+"""Footprints' cells over places whose histories are worked out together: some ten megabytes."""
 
 PART = 1.0
 """Side of the squares by which places are put together [m]: as large as a few footprints."""
