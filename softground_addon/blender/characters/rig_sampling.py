@@ -149,10 +149,10 @@ def _evaluate(
     with source as name:
         for frame in _simulated_before(scene, frames.start) if simulated else ():
             with handlers_silent():
-                _still_there(name).frame_set(frame)
+                still_there(name).frame_set(frame)
             yield 0
         for done, frame in enumerate(frames):
-            temporary = _still_there(name)
+            temporary = still_there(name)
             with handlers_silent(), without_layer(object_named(armature)) if armature else nullcontext():
                 temporary.frame_set(frame)
                 depsgraph = temporary.view_layers[0].depsgraph
@@ -243,7 +243,8 @@ def _simulated_before(scene: bpy.types.Scene, first: int) -> range:
     return range(world.point_cache.frame_start, first) if world and not world.point_cache.is_baked else range(0)
 
 
-def _still_there(name: str) -> bpy.types.Scene:
+def still_there(name: str) -> bpy.types.Scene:
+    """The scene of that name, in which a rig is being read; InputError if an undo or a new file has taken it away."""
     scene = bpy.data.scenes.get(name)
     if scene is None:
         raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")

@@ -9,9 +9,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InputError
 from ..animation_layer.nla_layer import without_layer
-from ..characters.rig_sampling import handlers_silent, object_named, sampling_scene
+from ..characters.rig_sampling import handlers_silent, object_named, sampling_scene, still_there
 
 Array = NDArray[np.float64]
 
@@ -62,12 +61,12 @@ def sample_poses(
     world = np.empty((len(frames), 4, 4))
     with sampling_scene(scene, name, bones, []) as scene_name:
         for done, frame in enumerate(frames):
-            temporary = bpy.data.scenes.get(scene_name)
-            if temporary is None:
-                raise InputError("The rig cannot be read any further: the scene was undone or reloaded. Start again.")
+            temporary = still_there(scene_name)
             with handlers_silent(), without_layer(object_named(name)):
                 temporary.frame_set(int(frame))
-                evaluated = object_named(name).evaluated_get(temporary.view_layers[0].depsgraph)
+                depsgraph = temporary.view_layers[0].depsgraph
+                assert depsgraph is not None
+                evaluated = object_named(name).evaluated_get(depsgraph)
                 world[done] = evaluated.matrix_world
                 pose = evaluated.pose.bones
                 if done == 0:
