@@ -10,6 +10,7 @@ import bpy
 from . import handlers, properties, session
 from .command_line import cli
 from .interface import (
+    bake_result,
     character_editing,
     forecast,
     ground_options_panel,
@@ -43,6 +44,7 @@ CLASSES = (
     *export_formats.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *bake_result.CLASSES,
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
 )

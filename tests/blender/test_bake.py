@@ -95,7 +95,7 @@ def test_a_mass_or_cells_that_do_not_suit_the_size_of_the_body_are_pointed_out(w
     walk.softground.cell_size = 0.05
     mass, cells = sorted(bake(walk).report["warnings"])
     assert "weighs 3 kg" in mass
-    assert "cells long: set the cell size to 0.01" in cells
+    assert "cells long: set the cell size to 1" in cells
 
 
 def test_a_character_that_does_not_move_is_pointed_out(walk):

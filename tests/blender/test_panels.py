@@ -8,7 +8,7 @@ import pytest
 
 from softground_addon.blender import jobs, registration
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.interface import panels, preset_menu
+from softground_addon.blender.interface import bake_result, panels, preset_menu
 from softground_addon.blender.reading import analysis
 from softground_addon.core import presets
 from tests.blender.shots import import_motion, walker
@@ -224,3 +224,31 @@ def test_a_ground_that_changes_over_time_is_told_of_before_any_bake(shot):
     options.ground.modifiers.new("Swell", "WAVE")
     options.frame_start = 7
     assert labels(panels._changing_ground, options) == ["'Swell' changes its shape", "Taken as it is at frame 7"]
+
+
+def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
+    def buttons():
+        layout = MagicMock()
+        bake_result._warnings(layout, bake_result.warnings_of(shot))
+        return [call.kwargs["text"] for call in layout.mock_calls]
+
+    assert buttons() == []
+    character = shot.softground.characters[0]
+    character.mass = 5000.0
+    bpy.ops.softground.bake()
+    assert buttons() == ["1 Warning"]
+    told = bake_result.SOFTGROUND_OT_show_warnings.description(bpy.context, None)
+    assert "weighs 5e+03 kg" in told
+    menu = MagicMock()
+    bake_result._draw_warnings(menu, bpy.context)
+    lines = [call.kwargs["text"] for call in menu.layout.column().label.mock_calls]
+    assert " ".join(lines) == told
+    assert max(map(len, lines)) <= 90
+    character.mass = 77.5
+    bpy.ops.softground.bake()
+    assert buttons() == []
+    character.mass = 5000.0
+    bpy.ops.softground.bake()
+    bpy.ops.softground.clear_bake()
+    assert buttons() == []
+    assert not bpy.ops.softground.show_warnings.poll()

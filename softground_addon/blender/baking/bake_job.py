@@ -141,6 +141,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     )
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
+        ground_mesh.note_warnings(written.carrier, result["warnings"])
         staleness.store(bake_report.inputs_of(scene), scene, movers)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))

@@ -67,7 +67,7 @@ def warnings(
         if length < FEW_CELLS * cell_size:
             found.append(
                 f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long: set the cell size to "
-                f"{length / ENOUGH_CELLS:.2g} m to see their shape."
+                f"{length / ENOUGH_CELLS * 100:.2g} cm to see their shape."
             )
         if motion.centre is not None:
             continue  # a thing has no legs to go by

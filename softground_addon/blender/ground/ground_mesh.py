@@ -7,7 +7,7 @@ footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, cast
@@ -37,7 +37,8 @@ SOLE = "softground_sole"
 """Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
 RECORD = "softground_record"
 SUMMARY = "softground_summary"
-PROPERTIES = (RECORD, SUMMARY, "softground_fingerprints")
+WARNINGS = "softground_warnings"
+PROPERTIES = (RECORD, SUMMARY, WARNINGS, "softground_fingerprints")
 """Properties of a mesh that carries a bake."""
 
 CACHE = "SoftGround Cache"
@@ -108,6 +109,16 @@ def summary_of(ground: bpy.types.Object) -> dict[str, float]:
     """What the bake that is on this ground came to, for display; empty if there is none."""
     summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
     return summary.to_dict() if summary else {}
+
+
+def note_warnings(ground: bpy.types.Object, warnings: Sequence[str]) -> None:
+    """Keep with a bake what the user should know of it."""
+    mesh_of(ground)[WARNINGS] = "\n".join(warnings)
+
+
+def warnings_of(ground: bpy.types.Object) -> list[str]:
+    """What the user should know of the bake that is on this ground."""
+    return str(mesh_of(ground).get(WARNINGS, "")).splitlines() if ground.type == "MESH" else []
 
 
 def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:

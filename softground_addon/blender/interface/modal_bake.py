@@ -213,9 +213,6 @@ class SOFTGROUND_OT_bake(_Bake):
 
     def _show(self, result: bake_job.BakeResult) -> None:
         totals: Any = result.report["totals"]
-        warnings: Any = result.report["warnings"]
-        for warning in warnings:
-            self.report({"WARNING"}, warning)
         text = rpt_("{steps} steps, deepest print {depth:.1f} cm").format(
             steps=totals["steps"], depth=totals["max_depth_m"] * 100
         )
@@ -224,6 +221,9 @@ class SOFTGROUND_OT_bake(_Bake):
         if steps and all(now < step["frame_start"] for step in steps):  # the ground looks as it did before
             text += rpt_(". Press Play to see them")
         self.report({"INFO"}, text)
+        warnings: Any = result.report["warnings"]
+        for warning in warnings:  # the status bar shows the last that is told
+            self.report({"WARNING"}, warning)
 
 
 class SOFTGROUND_OT_sink_feet(_Bake):

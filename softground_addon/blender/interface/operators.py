@@ -76,9 +76,9 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
         plan = jobs.run(shots.fit_ground(scene))
         with analysis.own_changes(scene):
             ground = create_ground(scene, plan)
+        self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
         for warning in plan.warnings:
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
         return {"FINISHED"}
 
 

@@ -9,12 +9,10 @@ import bpy
 from ...core.cell_limits import BYTES_PER_CELL
 from ...core.motion import JOINTS
 from .. import session, settings
-from ..baking import bake_report
 from ..characters.character_setup import is_set_up, is_thing
 from ..ground import baked_ground, ground_checks, ground_mesh
-from ..response import response_job
 from ..translation import iface_
-from . import forecast
+from . import bake_result, forecast
 from .character_editing import active_character, active_sole
 
 CATEGORY = "SoftGround"
@@ -279,8 +277,7 @@ class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
         layout.operator("softground.clear_bake", icon="TRASH")
         summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
         if summary:
-            _result(layout, summary)
-            _floating_feet(layout, options, summary)
+            bake_result.draw(layout, options, summary)
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
 
@@ -332,35 +329,6 @@ class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
         column.operator("softground.force_curves", icon="GRAPH")
         column.operator("softground.export_forces", icon="EXPORT")
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
-
-
-def _result(layout: Any, summary: Any) -> None:
-    """What the bake that is on the ground came to."""
-    box = layout.box().column(align=True)
-    rows = [
-        ("Steps", f"{summary['steps']:.0f}"),
-        ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
-        ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
-    ]
-    if "seconds" in summary:  # live mode takes none
-        rows.append(("Bake Time", f"{summary['seconds']:.1f} s"))
-    for label, value in rows:
-        row = box.split(factor=0.5)
-        row.alignment = "RIGHT"
-        row.label(text=label)
-        row.alignment = "LEFT"
-        row.label(text=value, translate=False)
-
-
-def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
-    """How far the feet are above the prints that they made, and a button that lets them down."""
-    floating = summary.get(bake_report.FLOATING, 0.0)
-    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
-        return
-    box = layout.box().column(align=True)
-    box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
-    box.label(text="above their prints", icon="BLANK1")
-    box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
 
 
 def _changing_ground(layout: Any, options: Any) -> None:

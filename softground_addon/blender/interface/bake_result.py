@@ -1,0 +1,102 @@
+"""The sidebar's part on what the bake that is on the ground came to."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from .. import settings
+from ..baking import bake_report
+from ..ground import baked_ground, ground_mesh
+from ..operator_base import OnBake
+from ..response import response_job
+from ..translation import iface_
+
+
+def draw(layout: Any, options: Any, summary: Any) -> None:
+    """Show the summary of a bake, how many warnings there are, and feet that float."""
+    _result(layout, summary)
+    _warnings(layout, ground_mesh.warnings_of(baked_ground.carrier_of(options.ground)))
+    _floating_feet(layout, options, summary)
+
+
+def _result(layout: Any, summary: Any) -> None:
+    """What the bake that is on the ground came to."""
+    box = layout.box().column(align=True)
+    rows = [
+        ("Steps", f"{summary['steps']:.0f}"),
+        ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
+        ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
+    ]
+    if "seconds" in summary:  # live mode takes none
+        rows.append(("Bake Time", f"{summary['seconds']:.1f} s"))
+    for label, value in rows:
+        row = box.split(factor=0.5)
+        row.alignment = "RIGHT"
+        row.label(text=label)
+        row.alignment = "LEFT"
+        row.label(text=value, translate=False)
+
+
+def _warnings(layout: Any, warnings: Sequence[str]) -> None:
+    """How many things a bake has warned of; they are long, and shown when asked for."""
+    if warnings:
+        text = iface_("{count} Warnings" if len(warnings) > 1 else "1 Warning").format(count=len(warnings))
+        layout.operator("softground.show_warnings", text=text, icon="ERROR", translate=False)
+
+
+def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
+    """How far the feet are above the prints that they made, and a button that lets them down."""
+    floating = summary.get(bake_report.FLOATING, 0.0)
+    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
+        return
+    box = layout.box().column(align=True)
+    box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.label(text="above their prints", icon="BLANK1")
+    box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
+
+
+class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
+    """Show what the bake has found, and what to do about it"""
+
+    bl_idname = "softground.show_warnings"
+    bl_label = "Warnings of the Bake"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, _properties: Any) -> str:
+        """The warnings themselves."""
+        return "\n".join(warnings_of(settings.scene_of(context)))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.popup_menu(_draw_warnings, title=self.bl_label, icon="ERROR")
+        return {"FINISHED"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for warning in warnings_of(settings.scene_of(context)):
+            self.report({"WARNING"}, warning)
+        return {"FINISHED"}
+
+
+def _draw_warnings(menu: Any, context: bpy.types.Context) -> None:
+    """One after the other, in lines that fit on a screen."""
+    for warning in warnings_of(settings.scene_of(context)):
+        column = menu.layout.column()
+        for line in textwrap.wrap(warning, _WARNING_WIDTH):
+            column.label(text=line, translate=False)
+
+
+_WARNING_WIDTH = 90
+"""Letters in a line of a warning."""
+
+
+def warnings_of(scene: bpy.types.Scene) -> list[str]:
+    """What the user should know of the bake on the scene's ground."""
+    ground = scene.softground.ground
+    return ground_mesh.warnings_of(baked_ground.carrier_of(ground)) if ground else []
+
+
+CLASSES = (SOFTGROUND_OT_show_warnings,)
