@@ -269,6 +269,29 @@ def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):
         np.testing.assert_allclose(mask[..., 2], sample.age.reshape(shape), atol=1e-5)
 
 
+def scale_uv(ground, factor, shift):
+    layer = ground.data.uv_layers["UVMap"]
+    values = np.empty(len(layer.uv) * 2, dtype=np.float32)
+    layer.uv.foreach_get("vector", values)
+    layer.uv.foreach_set("vector", values * factor + np.float32(shift))
+
+
+@pytest.mark.parametrize(
+    ("factor", "shift", "is_written"),
+    [(10.0, 0.0, False), (1.0, 1.0, False), (1.0, 0.02, True), (0.5, 0.0, True)],
+    ids=["tiled", "another tile", "a margin outside", "a corner"],
+)
+def test_images_are_refused_where_prints_would_be_missing(scene, ground, tmp_path, factor, shift, is_written):
+    scale_uv(ground, factor, shift)
+    if is_written:
+        image_exports.export_images(scene, ground, tmp_path, 40, 40, resolution=256)
+        assert read_image(tmp_path / "Field_displacement_0040.exr")[..., 0].min() < -0.03
+        return
+    with pytest.raises(InputError, match=r"Prints on ground 'Field' would be missing, as UV map 'UVMap'"):
+        image_exports.export_images(scene, ground, tmp_path, 40, 40, resolution=256)
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground):
     carrier = baked_ground.carrier_of(ground)
     still = exports.final_mesh(scene, ground)

@@ -15,6 +15,7 @@ from ...core.errors import InputError
 from ...core.files import replacing
 from ...core.footprints import NEVER, Footprint
 from ...core.histories import Histories, histories
+from ...core.triangles import barycentric
 from ...core.uv_raster import Pixels, rasterise
 from .. import settings
 from ..ground import baked_ground, ground_mesh, refined_mesh
@@ -28,6 +29,9 @@ DISPLACEMENT, MASK = "displacement", "mask"
 
 STRAY = 0.02
 """Pixels farther than this from any footprint's cells are left out of the look-up [m]."""
+
+PROBES = 64
+"""Cells of a footprint that are looked up in the UV map before it is used, about."""
 
 
 def export_images(
@@ -62,7 +66,7 @@ def export_images(
     Raises
     ------
     InputError
-        If there is no bake, no such UV map, or the files cannot be written.
+        If there is no bake, no such UV map, prints lie outside of its image, or the files cannot be written.
     """
     baked_carrier(ground)
     footprints, about = baked_ground.load(ground)
@@ -112,12 +116,36 @@ def _pixels(
             wanted = f"no UV map '{uv_map}'" if uv_map else "no UV map"
             raise InputError(f"Ground '{ground.name}' has {wanted}: unwrap it first (Edit Mode, U), or choose another.")
         surface = refined_mesh.surface_of(mesh, ground_mesh.to_world_of(ground, scene.unit_settings.scale_length))
-        uv = np.empty(len(mesh.loops) * 2, dtype=np.float32)
+        name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)
     place = surface.vertices[surface.corner_vertex[surface.triangle_corners], :2]
     near = _near_footprints(footprints, reach, place)
     corners = uv.reshape(-1, 2).astype(np.float64)[surface.triangle_corners[near]]
+    if _leaves_image(footprints, corners, place[near], 0.5 / resolution):
+        raise InputError(
+            f"Prints on ground '{ground.name}' would be missing, as UV map '{name}' has them outside of the image (0 to 1): "
+            "choose a UV map that holds all of them, or unwrap another one."
+        )
     return rasterise(corners, place[near], resolution, resolution)
+
+
+def _leaves_image(footprints: Sequence[Footprint], uv: Array, place: Array, slack: float) -> bool:
+    """Whether some of what is stepped on lies in triangles (T, 3, 2) at a place in the UV map outside of the image."""
+    pokes_out = ((uv < -slack) | (uv > 1 + slack)).any(axis=(1, 2))
+    uv, place = uv[pokes_out], place[pokes_out]
+    for footprint in footprints if len(uv) else ():
+        cells = footprint.contact_cells[:: len(footprint.contact_cells) // PROBES + 1]
+        row, column = np.divmod(cells, footprint.window.columns)
+        origin = (footprint.window.column + 0.5, footprint.window.row + 0.5)
+        points = (np.stack([column, row], axis=-1) + origin) * footprint.cell_size
+        near = ((place.max(axis=1) > points.min(axis=0)) & (place.min(axis=1) < points.max(axis=0))).all(axis=1)
+        triangle = np.repeat(np.flatnonzero(near), len(points))
+        u, v, inside = barycentric(place[triangle], np.tile(points, (np.count_nonzero(near), 1)))
+        weights = np.stack([1 - u - v, u, v], axis=-1)[inside]
+        there = np.einsum("nk,nki->ni", weights, uv[triangle[inside]])
+        if ((there < -slack) | (there > 1 + slack)).any():
+            return True
+    return False
 
 
 def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array) -> NDArray[np.bool_]:
