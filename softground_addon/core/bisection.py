@@ -47,12 +47,16 @@ def _edges(corner: Numbers, points: int) -> tuple[Numbers, Numbers]:
     return pairs.astype(np.int32), edge.reshape(-1, 3).astype(np.int32)
 
 
-def _halved(values: NDArray[Any], triangles: Indices, *parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Values at the corners of triangles (T, 3) after some were cut in two: the first part in its place, the second
-    behind all."""
-    first, second = parts
-    values[triangles] = np.stack(first, axis=1)
-    return np.concatenate([values, np.stack(second, axis=1)])
+def _lengthened(values: NDArray[Any], more: int) -> NDArray[Any]:
+    """Values (N, ...) with room for more behind them."""
+    longer = np.empty((len(values) + more, *values.shape[1:]), dtype=values.dtype)
+    longer[: len(values)] = values
+    return longer
+
+
+def _stacked(*parts: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
+    """Values at three corners side by side, (N, 3), of each of the parts."""
+    return [np.stack(part, axis=1) for part in parts]
 
 
 def counted(many: int, first: int = 0) -> Numbers:
@@ -122,7 +126,7 @@ class Bisection:
 
     def run(self, region: Region, leg: float) -> None:
         """Cut until no triangle with a longer leg reaches into the region."""
-        fresh = np.arange(len(self.corner))
+        fresh = counted(len(self.corner))
         while True:
             parts = [fresh[first : first + AT_ONCE] for first in range(0, len(fresh), AT_ONCE)]
             wanted = np.concatenate([fresh[:0], *(self._wanted(part, region, leg) for part in parts)])
@@ -134,7 +138,7 @@ class Bisection:
             self._cut_edges(np.flatnonzero(marked))
             fresh = self._cut_triangles()
 
-    def _wanted(self, triangles: Indices, region: Region, leg: float) -> Indices:
+    def _wanted(self, triangles: Numbers, region: Region, leg: float) -> Numbers:
         """Those triangles that are too large and reach into the region."""
         long = triangles[longest_sides(self.points, self.corner[triangles]) > leg * np.sqrt(2)]
         place = self.points[self.corner[long], :2]
@@ -162,32 +166,45 @@ class Bisection:
         self.half = np.concatenate([self.half, np.full(len(ends), -1, dtype=np.int32)])
         return added
 
-    def _cut_triangles(self) -> Indices:
+    def _cut_triangles(self) -> Numbers:
         """Cut every triangle whose base is cut, and again where a part's base is; returns the parts."""
-        parts = [np.zeros(0, dtype=np.intp)]
-        candidates = np.arange(len(self.corner))
+        is_part = np.zeros(len(self.corner), dtype=bool)
+        candidates = counted(len(self.corner))
         while True:
             cut = candidates[self.half[self.edge[candidates, 0]] >= 0]
             if not len(cut):
-                return np.unique(np.concatenate(parts))
-            candidates = np.concatenate([cut, len(self.corner) + np.arange(len(cut))])
+                return np.flatnonzero(is_part).astype(np.int32)
+            is_part[cut] = True
+            is_part = np.concatenate([is_part, np.ones(len(cut), dtype=bool)])
+            candidates = np.concatenate([cut, counted(len(cut), len(self.corner))])
             self._halve(cut)
-            parts.append(candidates)
 
-    def _halve(self, triangles: Indices) -> None:
-        apex, left, right = self.corner[triangles].T
-        base, by_right, by_left = self.edge[triangles].T  # edges opposite apex, left and right
-        middle = self.ends[self.half[base], 1]
-        across = self._add_edges(np.stack([apex, middle], axis=-1), np.full(len(triangles), -1, dtype=np.int32))
-        at_left = self.half[base] + (self.ends[base, 0] != left)
-        at_right = self.half[base] + (self.ends[base, 0] != right)
-        self.corner = _halved(self.corner, triangles, (middle, apex, left), (middle, right, apex))
-        self.edge = _halved(self.edge, triangles, (by_left, at_left, across), (by_right, across, at_right))
-        for corner, weight in enumerate(self.weight):
-            apex, left, right = weight[triangles].T
-            between = (left + right) / 2
-            self.weight[corner] = _halved(weight, triangles, (between, apex, left), (between, right, apex))
-        self.source = np.concatenate([self.source, self.source[triangles]])
+    def _halve(self, triangles: Numbers) -> None:
+        """Cut triangles in two: the first part takes their place, the second comes behind all."""
+        first_across, behind, more = len(self.ends), len(self.corner), len(triangles)
+        for name in ("corner", "edge", "source"):
+            setattr(self, name, _lengthened(getattr(self, name), more))
+        for number in range(len(self.weight)):
+            self.weight[number] = _lengthened(self.weight[number], more)
+        across_ends = np.empty((more, 2), dtype=np.int32)
+        for begin in range(0, more, AT_ONCE):
+            whole = triangles[begin : begin + AT_ONCE]
+            part = slice(behind + begin, behind + begin + len(whole))
+            apex, left, right = self.corner[whole].T
+            base, by_right, by_left = self.edge[whole].T  # edges opposite apex, left and right
+            middle = self.ends[self.half[base], 1]
+            across = counted(len(whole), first_across + begin)
+            across_ends[begin : begin + AT_ONCE] = np.stack([apex, middle], axis=-1)
+            at_left = self.half[base] + (self.ends[base, 0] != left)
+            at_right = self.half[base] + (self.ends[base, 0] != right)
+            self.corner[whole], self.corner[part] = _stacked((middle, apex, left), (middle, right, apex))
+            self.edge[whole], self.edge[part] = _stacked((by_left, at_left, across), (by_right, across, at_right))
+            for weight in self.weight:
+                apex, left, right = weight[whole].T
+                between = (left + right) / 2
+                weight[whole], weight[part] = _stacked((between, apex, left), (between, right, apex))
+            self.source[part] = self.source[whole]
+        self._add_edges(across_ends, np.full(more, -1, dtype=np.int32))
 
     def cut_edges(self) -> Indices:
         """The given edges that were cut, as ascending pairs of vertices, (E, 2)."""

@@ -215,13 +215,15 @@ def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
 
 def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
     """The refinement by a mesh that was made from the chosen triangles of a surface; it is of no use afterwards."""
-    del mesh.edge
+    leaves = mesh.leaves_of_roots()
+    leaf_ends, leaf_roots = mesh.ends[leaves], mesh.roots[mesh.root[leaves]]
+    del mesh.edge, mesh.ends, mesh.root, mesh.half
     given = len(mesh.vertex)
     face = surface.triangle_face[chosen]
     parts = np.bincount(mesh.source, minlength=len(chosen))
     changed = np.zeros(len(surface.face_start) - 1, dtype=bool)
     changed[face[parts > 1]] = True
-    ours = np.flatnonzero(changed[face[mesh.source]])
+    ours = np.flatnonzero(changed[face[mesh.source]]).astype(np.int32)
     place = along_curve(mesh.points[:, :2])
     begin = reduce(np.minimum, (place[mesh.corner[ours, number]] for number in range(3)))
     ours = ours[np.argsort(begin, kind="stable")]
@@ -233,7 +235,6 @@ def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
     vertex[by_place] = np.arange(len(surface.vertices), len(surface.vertices) + len(by_place))
     first = np.zeros(len(mesh.points), dtype=np.int32)
     first[corner.ravel()[::-1]] = np.arange(corner.size)[::-1]
-    leaves = mesh.leaves_of_roots()
     weights = np.empty((len(ours), 3, 2), dtype=np.float32)
     for number in (1, 0):
         weights[:, :, number] = mesh.weight.pop()[ours]
@@ -243,6 +244,6 @@ def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
         source=chosen[mesh.source[ours]].astype(np.int32),
         weights=weights,
         new_vertex=first[by_place],
-        edges=vertex[mesh.ends[leaves]].astype(np.intp),
-        edge_of=mesh.vertex[mesh.roots[mesh.root[leaves]]],
+        edges=vertex[leaf_ends].astype(np.intp),
+        edge_of=mesh.vertex[leaf_roots],
     )

@@ -73,14 +73,16 @@ def build(
     size = np.diff(surface.face_start)
     kept_corners = _runs(surface.face_start[kept], size[kept])
     corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.triangles.ravel()])
-    face_size = np.concatenate([size[kept], np.full(len(refinement.triangles), 3)]).astype(np.int32)
+    corner_count, kept_size = len(corner_vertex), size[kept]
+    face_start = np.concatenate([np.cumsum(kept_size) - kept_size, np.arange(len(kept_corners), corner_count, 3)])
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     _add_loose_edges(mesh, source)
-    mesh.loops.add(len(corner_vertex))
+    mesh.loops.add(corner_count)
     mesh.loops.foreach_set("vertex_index", corner_vertex)
-    mesh.polygons.add(len(face_size))
-    mesh.polygons.foreach_set("loop_start", (np.cumsum(face_size) - face_size).astype(np.int32))
+    mesh.polygons.add(len(face_start))
+    mesh.polygons.foreach_set("loop_start", face_start.astype(np.int32))
+    del corner_vertex, face_start
     position: Any = mesh.attributes["position"]
     position.data.foreach_set("vector", refinement.at_vertices(surface, mesh_arrays.positions(source)).ravel())
     mesh.update(calc_edges=True)
