@@ -123,8 +123,8 @@ def _pixels(
     corners = uv.reshape(-1, 2).astype(np.float64)[surface.triangle_corners[near]]
     if _leaves_image(footprints, corners, place[near], 0.5 / resolution):
         raise InputError(
-            f"Prints on ground '{ground.name}' would be missing, as UV map '{name}' has them outside of the image (0 to 1): "
-            "choose a UV map that holds all of them, or unwrap another one."
+            f"Prints on ground '{ground.name}' would be missing, as UV map '{name}' has them outside of the image "
+            "(0 to 1): choose a UV map that holds all of them, or unwrap another one."
         )
     return rasterise(corners, place[near], resolution, resolution)
 
