@@ -6,36 +6,20 @@ from typing import Any
 
 import bpy
 
-from .. import session, settings
+from .. import settings
 from ..ground import painted_ground
-from .panels import CATEGORY
+from .panel_base import SidebarPanel
 
 
-class _Panel:
-    bl_space_type: Any = "VIEW_3D"
-    bl_region_type: Any = "UI"
-    bl_category = CATEGORY
-    bl_options: Any = {"DEFAULT_CLOSED"}
-
-    layout: Any
-
-    def column(self) -> bpy.types.UILayout:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.enabled = not session.current().is_baking
-        column: bpy.types.UILayout = layout.column()
-        return column
-
-
-class SOFTGROUND_PT_behaviour(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_behaviour(SidebarPanel, bpy.types.Panel):
     """Rims that lean, sand that slides, snow that hardens: each is off at 0"""
 
     bl_label = "Behavior"
     bl_parent_id = "SOFTGROUND_PT_material"
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.column()
+        column = self.fields().column()
         options = settings.scene_of(context).softground
         column.prop(options, "pressure")
         for field in ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress_kpa", "firm_depth_cm"):
@@ -43,18 +27,19 @@ class SOFTGROUND_PT_behaviour(_Panel, bpy.types.Panel):
         column.prop(options, "tread_mm")
 
 
-class SOFTGROUND_PT_painted(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_painted(SidebarPanel, bpy.types.Panel):
     """Vertex groups or float attributes of the ground by which its material is multiplied"""
 
     bl_label = "Painted"
     bl_parent_id = "SOFTGROUND_PT_ground"
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return settings.scene_of(context).softground.ground is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.column()
+        column = self.fields().column()
         options = settings.scene_of(context).softground
         for field in ("stiffness", "layer_depth", "rim"):
             row = column.row()

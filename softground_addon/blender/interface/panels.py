@@ -14,24 +14,7 @@ from ..ground import baked_ground, ground_checks, ground_mesh
 from ..translation import iface_
 from . import bake_result, forecast
 from .character_editing import active_character, active_sole
-
-CATEGORY = "SoftGround"
-
-
-class _Panel:
-    bl_space_type: Any = "VIEW_3D"
-    bl_region_type: Any = "UI"
-    bl_category = CATEGORY
-
-    layout: Any
-
-    def column(self) -> bpy.types.UILayout:
-        """The layout in Blender's property style; greyed while a bake runs."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.enabled = not session.current().is_baking
-        return layout
+from .panel_base import SidebarPanel
 
 
 class SOFTGROUND_UL_characters(bpy.types.UIList):
@@ -71,13 +54,13 @@ class SOFTGROUND_UL_soles(bpy.types.UIList):
         layout.label(text=item.bone or (item.object.name if item.object else ""), translate=False)
 
 
-class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
     """Who walks"""
 
     bl_label = "Character"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         options = settings.scene_of(context).softground
         if not options.characters:
             column = layout.column()
@@ -99,7 +82,7 @@ class SOFTGROUND_PT_character(_Panel, bpy.types.Panel):
             layout.prop(character, "force_model")
 
 
-class _OfCharacter(_Panel):
+class _OfCharacter(SidebarPanel):
     bl_parent_id = "SOFTGROUND_PT_character"
     bl_options: Any = {"DEFAULT_CLOSED"}
 
@@ -116,7 +99,7 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
     bl_label = "Soles"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         scene = settings.scene_of(context)
         character = active_character(scene)
         row = layout.row()
@@ -152,7 +135,7 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
         return bool(character and character.armature)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         character = active_character(settings.scene_of(context))
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
         column = layout.column(align=True)
@@ -181,13 +164,13 @@ def _joint_label(joint: str) -> str:
     return f"{label} {side.upper()}" if side else label
 
 
-class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
     """What gives way"""
 
     bl_label = "Ground"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         options = settings.scene_of(context).softground
         column = layout.column()
         column.prop(options, "ground")
@@ -204,14 +187,14 @@ class SOFTGROUND_PT_ground(_Panel, bpy.types.Panel):
             _note(layout, _estimate(foretold.analysis.area, settings.cell_size_of(settings.scene_of(context))))
 
 
-class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
     """How it gives way"""
 
     bl_label = "Material"
     bl_parent_id = "SOFTGROUND_PT_ground"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         scene = settings.scene_of(context)
         material = scene.softground.material
         row = layout.row(align=True)
@@ -237,7 +220,7 @@ class SOFTGROUND_PT_material(_Panel, bpy.types.Panel):
         row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
 
 
-class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_material_details(SidebarPanel, bpy.types.Panel):
     """The layer, its rim and its look"""
 
     bl_label = "Details"
@@ -245,20 +228,20 @@ class SOFTGROUND_PT_material_details(_Panel, bpy.types.Panel):
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.column().column()
+        column = self.fields().column()
         material = settings.scene_of(context).softground.material
         for field in ("layer_depth_cm", "rim_reach_cm", "blur_sigma_cm"):
             column.prop(material, field)
         column.prop(material, "surface")
 
 
-class SOFTGROUND_PT_bake(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
     """Press the prints"""
 
     bl_label = "Bake"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         state = session.current()
         options = settings.scene_of(context).softground
         column = layout.column(align=True)
@@ -294,7 +277,7 @@ def _live_buttons(layout: Any, state: Any) -> None:
     row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
 
 
-class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):
     """What to see in the viewport"""
 
     bl_label = "Overlay"
@@ -306,7 +289,7 @@ class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
         self.layout.operator("softground.overlay", text="", icon=icon, depress=shown, emboss=False)
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         state = session.current()
         layout.active = state.show_overlay
         column = layout.column(align=True, heading="Show")
@@ -314,14 +297,14 @@ class SOFTGROUND_PT_overlay(_Panel, bpy.types.Panel):
             column.prop(state, part)
 
 
-class SOFTGROUND_PT_output(_Panel, bpy.types.Panel):
+class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
     """What to take out of a bake"""
 
     bl_label = "Output"
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.column()
+        layout = self.fields()
         column = layout.column(align=True)
         column.operator("softground.export", icon="EXPORT")
         column.operator("softground.final_mesh", icon="MESH_DATA")

@@ -9,12 +9,12 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty
 
 from ...core.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
-from .. import session, settings
+from .. import settings
 from ..animation_layer import nla_layer
 from ..response import response_job
 from ..translation import iface_
 from .character_editing import active_character
-from .panels import CATEGORY
+from .panel_base import SidebarPanel
 
 _SHOWN = 5
 """Frames with gaps that the panel lists."""
@@ -92,15 +92,12 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_PT_response(bpy.types.Panel):
+class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
     """How the character answers the ground that gives way"""
 
     bl_label = "Response"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
     bl_parent_id = "SOFTGROUND_PT_character"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -109,10 +106,7 @@ class SOFTGROUND_PT_response(bpy.types.Panel):
         return bool(character and character.armature)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout: Any = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.enabled = not session.current().is_baking
+        layout = self.fields()
         scene = settings.scene_of(context)
         options, character = scene.softground, active_character(scene)
         layout.prop(options, "output")
