@@ -82,6 +82,20 @@ def test_a_point_cache_holds_the_frames_asked_for_and_can_play_on_the_ground(sce
     assert_stands_as_recorded(ground, 32, played(carrier, 32))
 
 
+def test_a_point_cache_that_plays_on_the_ground_moves_with_its_blend(scene, tmp_path):
+    bpy.ops.softground.export(filepath=str(tmp_path / "walk.pc2"), format="PC2", use_cache=True)
+    native = played(baked_ground.carrier_of(scene.softground.ground), 33)
+    bpy.ops.wm.save_mainfile()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for name in ("shot.blend", "walk.pc2"):
+        (tmp_path / name).rename(elsewhere / name)
+    bpy.ops.wm.open_mainfile(filepath=str(elsewhere / "shot.blend"))
+    carrier = baked_ground.carrier_of(bpy.context.scene.softground.ground)
+    assert np.ptp(native[:, 2]) > 0.02
+    assert np.array_equal(played(carrier, 33), native)
+
+
 def test_images_are_named_after_the_file_that_was_chosen(scene, tmp_path):
     path = tmp_path / "prints.exr"
     bpy.ops.softground.export(filepath=str(path), format="EXR", frame_start=39, frame_end=40, resolution=64)

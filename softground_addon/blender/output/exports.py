@@ -53,7 +53,7 @@ def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stret
     """
     carrier = baked_ground.carrier_of(ground)
     modifier: Any = carrier.modifiers.get(ground_mesh.CACHE) or carrier.modifiers.new(ground_mesh.CACHE, "MESH_CACHE")
-    modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), start
+    modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", _from_here(path), start
     modifier.frame_scale = 1 / time_stretch
     modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"
     modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"
@@ -62,6 +62,16 @@ def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stret
     if played:
         played.show_viewport = played.show_render = False
     return modifier
+
+
+def _from_here(path: Path) -> str:
+    """A path as Blender keeps it: relative to the open file where that can be, so that both can be moved together."""
+    if not bpy.data.filepath:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path))
+    except ValueError:  # another drive of Windows
+        return str(path)
 
 
 def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
