@@ -56,13 +56,13 @@ def joined(texts: Iterable[str]) -> str:
 def of_topology(mesh: bpy.types.Mesh) -> str:
     """Which vertices the faces of a mesh join."""
     corners = mesh_arrays.corner_vertices(mesh)
-    return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners):08x}"
+    return f"{len(mesh.vertices)}-{len(mesh.polygons)}-{zlib.crc32(corners.data):08x}"
 
 
 def of_positions(mesh: bpy.types.Mesh) -> str:
     """Where the vertices of a mesh are without any bake."""
     rest = ground_mesh.rest_positions(mesh) + np.float32(0)  # Edit Mode makes negative zeros positive
-    return f"{zlib.crc32(rest):08x}"
+    return f"{zlib.crc32(rest.data):08x}"
 
 
 def of_weights(thing: bpy.types.Object, groups: Container[str]) -> str:
@@ -85,7 +85,7 @@ def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
         return ""
     values = np.empty(len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("value", values)
-    return f"{zlib.crc32(values):08x}"
+    return f"{zlib.crc32(values.data):08x}"
 
 
 def of_place(things: Iterable[bpy.types.Object]) -> str:
@@ -220,7 +220,7 @@ def _of_curves(curves: Iterable[bpy.types.FCurve]) -> Iterator[str]:
         for part in _KEY_SHAPE:
             values = np.empty(len(curve.keyframe_points), dtype=np.float32)
             curve.keyframe_points.foreach_get(part, values)
-            told.append(f"{zlib.crc32(values):08x}")
+            told.append(f"{zlib.crc32(values.data):08x}")
         for modifier in curve.modifiers:
             told += of_settings(modifier)
         yield joined(told)
@@ -270,7 +270,7 @@ def _of_bones(thing: bpy.types.Object) -> Iterator[str]:
     for part in _BONE:
         values = np.empty(len(armature.bones) * (16 if part == "matrix_local" else 3), dtype=np.float32)
         armature.bones.foreach_get(part, values)
-        yield f"{zlib.crc32(values):08x}"
+        yield f"{zlib.crc32(values.data):08x}"
     animated = _animated(thing)
     for bone in thing.pose.bones:
         path = bone.path_from_id()
