@@ -20,6 +20,7 @@ from ...core.foot_attitude import (
     reflection,
     standing_up,
 )
+from ...core.interpolation import in_stretches
 from ...core.motion import Array, CharacterMotion, SoleMotion
 from ...core.rigid import displacement, nearest_rotation, unit
 from ...core.soles import PlacedSole, solid_sole
@@ -42,20 +43,43 @@ _SAME_SIZE = 0.2
 
 @dataclass(frozen=True)
 class Recording:
-    """World matrices of bones and objects over time [m], as evaluated; a bone's y axis points from head to tail.
+    """Where bones and objects are over time, as evaluated; a bone's y axis points from head to tail.
 
     Attributes
     ----------
     frames : (F,) float array
-    bones, things : mapping of str to (F, 4, 4) float array
-        By name.
-    armature : (F, 4, 4) float array
+    bones : tuple of str
+        Names.
+    poses : (F, bones, 4, 4) float32 array
+        Transposed matrices of the bones in the armature's space, as Blender gives them [Blender units].
+    world : (F, 4, 4) float array
+        Of the armature [Blender units].
+    things : mapping of str to (F, 4, 4) float array
+        World matrices of the objects by their names [m].
+    metre : float
+        Blender unit [m].
     """
 
     frames: Array
-    bones: Mapping[str, Array]
+    bones: tuple[str, ...]
+    poses: NDArray[np.float32]
+    world: Array
     things: Mapping[str, Array]
-    armature: Array
+    metre: float
+
+    @property
+    def armature(self) -> Array:
+        """World matrices of the armature, (F, 4, 4) [m]."""
+        return self._in_metres(self.world.copy())
+
+    def bone(self, name: str) -> Array:
+        """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
+        pose = self.poses[:, self.bones.index(name)].astype(float)
+        return self._in_metres(self.world @ np.swapaxes(pose, -1, -2))
+
+    def _in_metres(self, matrices: Array) -> Array:
+        matrices[..., :3, :] *= self.metre
+        return matrices
 
 
 def assemble_motion(
@@ -123,7 +147,7 @@ def assemble_motion(
         frame_rate=frame_rate,
         soles=tuple(motions[source.name] for source in mapping.soles),
         joints={
-            joint: along_bone(recording.bones[bone], 0.0 if end == "head" else armature.data.bones[bone].length)
+            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else armature.data.bones[bone].length)
             for joint, (bone, end) in mapping.joints.items()
         },
         gravity=gravity,
@@ -156,7 +180,7 @@ def _limb_motions(
             vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
         middle = vertices.mean(axis=0)
         sole = solid_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
-        transforms = _rigid_motion(recording.bones[source.bone], rest.matrix(source.bone))
+        transforms = _rigid_motion(recording.bone(source.bone), rest.matrix(source.bone))
         transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
         motions[source.name] = SoleMotion(sole, transforms[:, None])
     return motions
@@ -199,7 +223,8 @@ class _Foot:
     def of(cls, source: SoleSource, recording: Recording, rest: RestPose) -> _Foot:
         last = source.toe_bone or source.bone
         hinge = (last, "head") if source.toe_bone else (last, "tail")
-        matrices = recording.bones[source.bone]
+        matrices = recording.bone(source.bone)
+        last_matrices = recording.bone(last) if source.toe_bone else matrices
         motion = _rigid_motion(matrices, rest.matrix(source.bone))
         length = rest.armature.data.bones[source.bone].length
         return cls(
@@ -208,12 +233,9 @@ class _Foot:
             hinge=rest.end(*hinge),
             tip=rest.end(last, "tail"),
             motion=motion,
-            toe_motion=_rigid_motion(recording.bones[last], rest.matrix(last)) if source.toe_bone else motion,
+            toe_motion=_rigid_motion(last_matrices, rest.matrix(last)) if source.toe_bone else motion,
             path=np.stack(
-                [
-                    matrices[:, :3, 3],
-                    along_bone(recording.bones[last], 0.0) if source.toe_bone else along_bone(matrices, length),
-                ],
+                [matrices[:, :3, 3], along_bone(last_matrices, 0.0 if source.toe_bone else length)],
                 axis=1,
             ),
         )
@@ -324,5 +346,6 @@ def _evened(sizes: Sequence[FootSize], feet: Sequence[_Foot], planted: Sequence[
 
 def _rigid_motion(matrices: Array, rest: Array) -> Array:
     """Rigid transforms that carry the rest pose to each sample, exact at the bone's head; scaling is left out."""
-    turn = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(rest[:3, :3]))
+    back = np.linalg.inv(rest[:3, :3])
+    turn = in_stretches(lambda some: nearest_rotation(matrices[some, :3, :3] @ back), len(matrices))
     return displacement(turn, rest[:3, 3], matrices[:, :3, 3])

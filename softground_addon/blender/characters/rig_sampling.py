@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from itertools import chain
 
 import bpy
 import numpy as np
@@ -141,7 +142,7 @@ def _evaluate(
     scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], things: Sequence[str]
 ) -> Generator[int, None, Recording]:
     """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
-    bone_matrices = np.empty((len(frames), len(bones), 4, 4))
+    poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
     thing_matrices = np.empty((len(frames), len(things), 4, 4))
     armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
     simulated = any(is_simulated(object_named(thing)) for thing in things)
@@ -165,21 +166,21 @@ def _evaluate(
                         places = [pose.find(bone) for bone in bones]
                         buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
                     pose.foreach_get("matrix", buffer.reshape(-1))
-                    bone_matrices[done] = buffer[places]
+                    poses[done] = buffer[places]
             for place, thing in enumerate(things):
                 thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1
     yield len(frames)
 
     metre = scene.unit_settings.scale_length
-    bone_matrices = armature_matrices[:, None] @ np.swapaxes(bone_matrices, -1, -2)  # foreach_get goes by columns
-    for matrices in (bone_matrices, thing_matrices, armature_matrices):
-        matrices[..., :3, :] *= metre
+    thing_matrices[..., :3, :] *= metre
     return Recording(
         frames=np.array(frames, dtype=float),
-        bones={bone: bone_matrices[:, place] for place, bone in enumerate(bones)},
+        bones=tuple(bones),
+        poses=poses,
+        world=armature_matrices,
         things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
-        armature=armature_matrices,
+        metre=metre,
     )
 
 
@@ -325,7 +326,7 @@ def is_animated(armature: bpy.types.Object) -> bool:
 
 
 def _check_finite(name: str, recording: Recording) -> None:
-    for matrices in (recording.armature, *recording.bones.values(), *recording.things.values()):
+    for matrices in chain([recording.armature], map(recording.bone, recording.bones), recording.things.values()):
         bad = ~(np.abs(matrices) <= _FARTHEST).all(axis=(1, 2))
         if bad.any():
             raise InputError(
