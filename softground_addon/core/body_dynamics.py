@@ -93,7 +93,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
         Steps at which nothing seems to touch. Where they are flights and tell that contacts are brief, the cut-off is
         raised to suit them.
     """
-    sampled, frame_step = motion.on_frames, _frame_step(motion)
+    sampled, frame_step = motion.on_frames, motion.frame_step
     points = mass_points(motion.at_frames())
     usual = _usual_cutoff(motion)
     path = np.zeros((len(sampled), 6))
@@ -135,14 +135,9 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     return BodyDynamics(centre, force, body.moment, points, cutoff)
 
 
-def _frame_step(motion: CharacterMotion) -> float:
-    """Time between the scene frames among the steps [s]."""
-    return motion.at_frames().time_step
-
-
 def _usual_cutoff(motion: CharacterMotion) -> float:
     """Cut-off for a body of this size at this frame rate [Hz]."""
-    return min(CUTOFF / (2 * np.pi * motion.pendulum_time), HIGHEST_CUTOFF / _frame_step(motion))
+    return min(CUTOFF / (2 * np.pi * motion.pendulum_time), HIGHEST_CUTOFF / motion.frame_step)
 
 
 def _falling_freely(
@@ -153,7 +148,7 @@ def _falling_freely(
     A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
     the shaking of soft tissue through: both show as a force where there is none.
     """
-    step, usual = _frame_step(motion), _usual_cutoff(motion)
+    step, usual = motion.frame_step, _usual_cutoff(motion)
     fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * motion.time_step)))
     parts, flying = body.points.part_centres(), flying[motion.on_frames]
     highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))

@@ -192,17 +192,20 @@ def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Trac
     clearance, normals = clearances(sole, terrain, reach=SLOPE_PROBE * motion.leg_length)
     now = np.arange(len(clearance))
     lowest = clearance.argmin(axis=1)
-    velocity = _velocities(sole.landmark_positions(), motion.time_step)
-    return _Track(clearance[now, lowest], velocity[now, lowest], clearance, normals[now, lowest])
+    velocity = _velocities(sole.landmark_positions(), lowest, motion.time_step)
+    return _Track(clearance[now, lowest], velocity, clearance, normals[now, lowest])
 
 
-def _velocities(points: Array, step: float) -> Array:
-    """Velocity of each point, (N, L, 3) [m/s]: the slower of the steps before and after, so that a jump of the pose
-    does not widen."""
+def _velocities(points: Array, chosen: NDArray[np.intp], step: float) -> Array:
+    """Velocity at each step of the chosen one (N,) of some points (N, L, 3), (N, 3) [m/s]: the slower of the steps
+    before and after, so that a jump of the pose does not widen."""
     if len(points) < 2:
-        return np.zeros_like(points)
-    stride = np.diff(points, axis=0) / step
-    before, after = np.concatenate([stride[:1], stride]), np.concatenate([stride, stride[-1:]])
+        return np.zeros_like(points[:, 0])
+    now, last = np.arange(len(points)), len(points) - 2
+    before, after = (
+        (points[start + 1, chosen] - points[start, chosen]) / step
+        for start in (np.maximum(now - 1, 0), np.minimum(now, last))
+    )
     slower = np.linalg.norm(before, axis=-1, keepdims=True) < np.linalg.norm(after, axis=-1, keepdims=True)
     return np.where(slower, before, after)
 

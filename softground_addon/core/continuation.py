@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import runs
-from .interpolation import cubic
+from .interpolation import cubic, in_stretches
 from .motion import CharacterMotion, orthonormal
 
 Array = NDArray[np.float64]
@@ -79,16 +79,27 @@ def continued(motion: CharacterMotion) -> tuple[CharacterMotion, slice]:
 
 def _most_like(motion: CharacterMotion, frame: int, others: NDArray[np.intp]) -> int | None:
     """The one of `others` whose pose and velocity are most like those at an end of the motion, if any are alike."""
-    points = np.stack(
-        [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)], axis=1
-    )
-    points = points - points.mean(axis=1, keepdims=True) * (1.0, 1.0, 0.0)
-    step = np.diff(points, axis=0) / motion.time_step
-    # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
-    velocity = np.concatenate([step, step[-1:]]) if frame == 0 else np.concatenate([step[:1], step])
+    paths = [*motion.joints.values(), *(sole.landmark_positions().mean(axis=1) for sole in motion.soles)]
+    count = len(motion.frames)
+
+    def points(frames: NDArray[np.intp]) -> Array:
+        places = np.stack([path[frames] for path in paths], axis=1)
+        return places - places.mean(axis=1, keepdims=True) * (1.0, 1.0, 0.0)
+
+    def velocity(frames: NDArray[np.intp]) -> Array:
+        # One-sided, as at the end itself: from the step after the first frame, from the step before the last.
+        start = np.clip(frames - (frame > 0), 0, count - 2)
+        return (points(start + 1) - points(start)) / motion.time_step
+
+    here = np.array([frame])
     weight = VELOCITY_WEIGHT * motion.pendulum_time
-    difference = (points[others] - points[frame]) ** 2 + (weight * (velocity[others] - velocity[frame])) ** 2
-    distance = np.sqrt(difference.sum(axis=-1).mean(axis=-1))
+
+    def distances(some: slice) -> Array:
+        frames = others[some]
+        moved = weight * (velocity(frames) - velocity(here))
+        return np.sqrt(((points(frames) - points(here)) ** 2 + moved**2).sum(axis=-1).mean(axis=-1))
+
+    distance = in_stretches(distances, len(others))
     best = int(distance.argmin())
     return int(others[best]) if distance[best] < LIKE_POSE * motion.leg_length else None
 
@@ -103,12 +114,11 @@ def _offset(samples: Array, frame: int, other: int) -> Array:
 
 def _held(motion: CharacterMotion) -> Mask:
     """Frames that repeat the pose of the frame before, in holds too short to be rests."""
-    poses = np.concatenate(
-        [sole.transforms.reshape(len(motion.frames), -1) for sole in motion.soles] + list(motion.joints.values()),
-        axis=1,
-    )
-    held = np.zeros(len(poses), dtype=bool)
-    held[1:] = np.abs(np.diff(poses, axis=0)).max(axis=1) < SAME_POSE * motion.leg_length
+    held = np.ones(len(motion.frames), dtype=bool)
+    held[0] = False
+    for path in (*(sole.transforms for sole in motion.soles), *motion.joints.values()):
+        moved = np.abs(np.diff(path, axis=0)).reshape(len(path) - 1, -1).max(axis=1)
+        held[1:] &= moved < SAME_POSE * motion.leg_length
     for first, last in zip(*runs(held), strict=True):
         if (last - first + 1) * motion.time_step > LONGEST_HOLD or last == len(held):
             held[first:last] = False

@@ -248,6 +248,11 @@ class CharacterMotion:
         """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
         return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
 
+    @property
+    def frame_step(self) -> float:
+        """Time between the samples at scene frames [s]."""
+        return dataclasses.replace(self, frames=self.frames[self.on_frames]).time_step
+
     def at_frames(self) -> CharacterMotion:
         """The samples at scene frames alone."""
         return self.of(self.on_frames)
