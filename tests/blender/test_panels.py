@@ -238,7 +238,7 @@ def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     bpy.ops.softground.bake()
     assert buttons() == ["1 Warning"]
     told = bake_result.SOFTGROUND_OT_show_warnings.description(bpy.context, None)
-    assert "weighs 5e+03 kg" in told
+    assert "weighs 5000 kg" in told
     menu = MagicMock()
     bake_result._draw_warnings(menu, bpy.context)
     lines = [call.kwargs["text"] for call in menu.layout.column().label.mock_calls]

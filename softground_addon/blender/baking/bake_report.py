@@ -74,8 +74,8 @@ def warnings(
         likely = properties.DEFAULT_MASS * (motion.leg_length / ADULT_LEG) ** 3
         if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
             found.append(
-                f"'{motion.name}' weighs {motion.mass:.3g} kg on legs of {motion.leg_length:.2g} m: a person of that "
-                f"size weighs about {likely:.2g} kg. Set Mass in the Character panel."
+                f"'{motion.name}' weighs {motion.mass:g} kg on legs of {motion.leg_length:.2g} m: a person of that "
+                f"size weighs about {float(f'{likely:.2g}'):g} kg. Set Mass in the Character panel."
             )
     return found
 

@@ -153,7 +153,7 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
             end.prop(joint, "end", text="")
 
 
-_END_WIDTH = 2.6
+_END_WIDTH = 3.1
 """Width of a bone's end, of which a few letters are enough, in units of the interface: the bone has the rest."""
 
 
