@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,29 +44,40 @@ class GroundSample:
 
 
 @dataclass(frozen=True)
-class TouchedCells:
-    """Where a ground has changed, without how; far smaller than the ground.
+class Trail:
+    """Where a ground has changed, without how: far smaller than the ground.
 
     Attributes
     ----------
-    keys : (C,) int array
-        `cell_keys` of the cells that changed and of those around them, whose look-ups reach them, ascending.
+    touched : (T,) int array
+        `cell_keys` of the cells that changed and of those around them, whose look-ups reach them; like the following,
+        ascending.
+    moved : (M,) int array
+        Those whose displayed height changed by more than a floor.
+    printed : (P,) int array
+        Those that were compressed.
     cell_size : float
         Side of a cell [m].
     """
 
-    keys: Keys
+    touched: Keys
+    moved: Keys
+    printed: Keys
     cell_size: float
 
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
-        tiles = np.unique(keys_of(cells_of(self.keys) // TILE))  # most places of a large ground lie in none
-        covered = np.zeros(len(x), dtype=bool)
-        for first in range(0, len(x), PLACES_AT_ONCE):
-            place = np.stack([x[first : first + PLACES_AT_ONCE], y[first : first + PLACES_AT_ONCE]], axis=-1)
-            near = np.flatnonzero(among(tiles, keys_at(place, TILE * self.cell_size)))
-            covered[first + near] = among(self.keys, keys_at(place[near], self.cell_size))
-        return covered
+        return _covers(self.touched, self.cell_size, x, y)
+
+
+def _covers(touched: Keys, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
+    tiles = np.unique(keys_of(cells_of(touched) // TILE))  # most places of a large ground lie in none
+    covered = np.zeros(len(x), dtype=bool)
+    for first in range(0, len(x), PLACES_AT_ONCE):
+        place = np.stack([x[first : first + PLACES_AT_ONCE], y[first : first + PLACES_AT_ONCE]], axis=-1)
+        near = np.flatnonzero(among(tiles, keys_at(place, TILE * cell_size)))
+        covered[first + near] = among(touched, keys_at(place[near], cell_size))
+    return covered
 
 
 @dataclass(frozen=True)
@@ -100,23 +111,23 @@ class PressedGround:
         contact = last_contact(footprints, frame, cell_size)
         return cls(raw, blurred(raw, blur_sigma), contact, frame, frame_rate)
 
-    def touched(self) -> TouchedCells:
-        """Where the ground has changed."""
-        changed = [
-            keys_of(np.argwhere(mask)[:, ::-1] + np.array(tile) * TILE)
-            for tile, mask in (
-                *((tile, values.any(axis=0)) for tile, values in self.smooth.tiles.items()),
-                *((tile, np.isfinite(values[0])) for tile, values in self.contact.tiles.items()),
-            )
-        ]
-        cells = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *changed]))
-        for along in (1, ROW):  # one direction after the other keeps the intermediate sets small
-            cells = np.unique(np.concatenate([cells - along, cells, cells + along]))
-        return TouchedCells(cells, self.smooth.cell_size)
+    def trail(self, floor: float) -> Trail:
+        """Where the ground has changed, and where its displayed height did by more than a floor [m]."""
+        moved = _cells((tile, values.sum(axis=0) > floor) for tile, values in self.smooth.tiles.items())
+        printed = _cells((tile, values[0] > 0) for tile, values in self.raw.tiles.items())
+        return Trail(self._touched(), moved, printed, self.smooth.cell_size)
 
     def covers(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Which of the places (N,) lie where the ground has changed, to the reach of a look-up."""
-        return self.touched().covers(x, y)
+        return _covers(self._touched(), self.smooth.cell_size, x, y)
+
+    def _touched(self) -> Keys:
+        changed = ((tile, values.any(axis=0)) for tile, values in self.smooth.tiles.items())
+        trodden = ((tile, np.isfinite(values[0])) for tile, values in self.contact.tiles.items())
+        cells = np.union1d(_cells(changed), _cells(trodden))
+        for along in (1, ROW):  # one direction after the other keeps the intermediate sets small
+            cells = np.unique(np.concatenate([cells - along, cells, cells + along]))
+        return cells
 
     def sample(self, x: Array, y: Array) -> GroundSample:
         """Look the ground up at places (K,), bilinear between the centres of cells."""
@@ -125,3 +136,9 @@ class PressedGround:
         since = self.frame - self.contact.nearest(x, y)[0]
         age = np.where(np.isfinite(since), since / self.frame_rate, NEVER)
         return GroundSample(rim - compression, smooth_rim - smooth_compression, smooth_compression, smooth_rim, age)
+
+
+def _cells(masks: Iterable[tuple[tuple[int, int], NDArray[np.bool_]]]) -> Keys:
+    """Keys of the cells that are marked in tiles (`TILE`, `TILE`), ascending."""
+    keys = [keys_of(np.argwhere(mask)[:, ::-1] + np.array(tile) * TILE) for tile, mask in masks]
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *keys]))

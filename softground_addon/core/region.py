@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from .cell_keys import Keys, among, keys_of, parents_of
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
@@ -17,15 +16,15 @@ class Region:
 
     Parameters
     ----------
-    columns, rows : (N,) int arrays
-        The cells.
+    cells : (N,) int array
+        `cell_keys` of the cells, ascending.
     cell_size : float
         Side of a cell [m].
     """
 
-    def __init__(self, columns: Indices, rows: Indices, cell_size: float) -> None:
+    def __init__(self, cells: Keys, cell_size: float) -> None:
         self.cell_size = cell_size
-        self._levels = [np.unique(keys_of(np.stack([columns, rows], axis=-1)))]
+        self._levels = [cells]
 
     def touches(self, low: Array, high: Array) -> Mask:
         """Which of the boxes from `low` to `high`, (N, 2) [m], reach into the region, to about a cell."""

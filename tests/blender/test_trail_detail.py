@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
+from softground_addon.core.cell_keys import keys_of
 from softground_addon.core.refinement import refine
 from softground_addon.core.region import Region
 from tests.blender import fingerprints, grounds
@@ -16,7 +17,7 @@ def region(cell_size=0.02):
     i, j = np.meshgrid(np.arange(-15, 15), np.arange(-3, 3))
     columns = np.concatenate([i.ravel(), i.ravel() + 30])
     rows = np.concatenate([j.ravel(), j.ravel() + 10])
-    return Region(columns, rows, cell_size)
+    return Region(np.unique(keys_of(np.stack([columns, rows], axis=-1))), cell_size)
 
 
 def coarse_ground(scene, count=4, size=4.0):

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
+from softground_addon.core.cell_keys import keys_of
 from softground_addon.core.refinement import COARSEST_LEG, Surface, refine
 from softground_addon.core.region import Region
 
@@ -43,6 +44,10 @@ def scattered(seed, count=60, size=3.0):
     return surface_of(np.column_stack([place, rng.uniform(-0.3, 0.3, len(place))]), triangles)
 
 
+def region_of(columns, rows, cell_size):
+    return Region(np.unique(keys_of(np.stack([columns, rows], axis=-1))), cell_size)
+
+
 def trail(cell_size, steps=3, origin=(0.0, 0.0)):
     """The cells of a few prints of 30 by 12 cm."""
     columns, rows = [], []
@@ -54,7 +59,7 @@ def trail(cell_size, steps=3, origin=(0.0, 0.0)):
         )
         columns.append(np.repeat(i, len(j)))
         rows.append(np.tile(j, len(i)))
-    return Region(np.concatenate(columns), np.concatenate(rows), cell_size)
+    return region_of(np.concatenate(columns), np.concatenate(rows), cell_size)
 
 
 def all_faces(surface, refinement):
@@ -220,7 +225,7 @@ def test_the_work_does_not_grow_with_the_size_of_the_ground():
 def test_a_region_finds_every_box_that_reaches_into_it(seed, size):
     rng = np.random.default_rng(seed)
     columns, rows = rng.integers(-300, 300, (2, 40))
-    region = Region(columns, rows, 0.01)
+    region = region_of(columns, rows, 0.01)
     low = rng.uniform(-4, 4, (60, 2))
     high = low + rng.uniform(0, size, (60, 2))
     cells = np.stack([columns, rows], axis=-1) * 0.01

@@ -9,13 +9,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cell_keys import AROUND, among, cells_at, cells_of, keys_at, keys_of
+from ...core.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.deformation import GroundMaterial
 from ...core.errors import BakeError, InputError
 from ...core.footprints import QUANTUM, Footprint
-from ...core.heightfield import TILE
 from ...core.motion import CharacterMotion
-from ...core.pressed_ground import PressedGround
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -60,24 +58,14 @@ class Coverage:
         return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
 
 
-def coverage(vertices: Array, index: Indices, pressed: PressedGround) -> Coverage:
-    """How densely vertices (V, 3), of which those in `index` are moved, lie under the prints."""
-    compression = pressed.raw.sample(*vertices[index, :2].T)[0]
-    printed = [
-        np.argwhere(values[0] > 0)[:, ::-1] + np.array(tile) * TILE for tile, values in pressed.raw.tiles.items()
-    ]
-    cells = np.concatenate([np.zeros((0, 2), dtype=np.intp), *printed])
-    return _coverage(vertices, cells, int((compression > 0).sum()), pressed.raw.cell_size)
+def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: float) -> Coverage:
+    """How densely vertices (V, 3), of which those in `index` are moved, lie where the ground is, or will be, printed.
 
-
-def expected_coverage(vertices: Array, footfalls: Array, cell_size: float) -> Coverage:
-    """How densely vertices (V, 3) lie where feet come down, (N, 2) [m], as far as that is known before a bake."""
-    under = np.unique(cells_at(footfalls, cell_size))
-    inside = among(under, cells_at(vertices[:, :2], cell_size))
-    return _coverage(vertices, cells_of(under), int(inside.sum()), cell_size)
-
-
-def _coverage(vertices: Array, cells: Indices, vertices_in_cells: int, cell_size: float) -> Coverage:
+    `printed` are the `cell_keys` of those cells, ascending, `cell_size` is in [m].
+    """
+    cells = cells_of(printed)
+    first = keys_at(vertices[index, :2] - cell_size / 2, cell_size)  # of the four whose centres are around a vertex
+    vertices_in_cells = among(printed, first[:, None] + (0, 1, ROW, ROW + 1)).any(axis=1).sum()
     spacing = float(np.sqrt(len(cells) * cell_size**2 / max(1e-9, float(vertices_in_cells))))
     blocks, crowd = np.unique(keys_at(vertices[:, :2], DETAIL_FROM * cell_size), return_counts=True)
     under, share = np.unique(keys_of(cells // DETAIL_FROM), return_counts=True)

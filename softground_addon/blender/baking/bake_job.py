@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import bpy
 import numpy as np
@@ -20,9 +21,8 @@ from numpy.typing import NDArray
 from ...core import record, report
 from ...core.cell_limits import check_cell_size
 from ...core.footprints import Footprint
-from ...core.heightfield import Terrain
 from ...core.polylines import polylines_at
-from ...core.pressed_ground import PressedGround, TouchedCells
+from ...core.pressed_ground import PressedGround, Trail
 from ...core.refinement import refine
 from ...core.region import Region
 from ...core.simulation import CharacterLoads, simulate
@@ -94,33 +94,38 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     gaps = response_job.gap_table(answers)
     if gaps is None:
         gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
-    worst_gaps, gap_warnings = response_job.worst_gaps(answers), response_job.warnings(answers)
     layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
-    input_hash = report.hash_inputs(inputs, shot_hash)
-    warnings = bake_report.warnings(
-        footprints, loads, settings.cell_size_of(scene), str(inputs["ground"] or "the ground")
+    ground_name, cell_size = str(inputs["ground"] or "the ground"), settings.cell_size_of(scene)
+    warnings = [*bake_report.warnings(footprints, loads, cell_size, ground_name), *moving]
+    gap_warnings = response_job.warnings(answers)
+    build_report = partial(
+        report.build,
+        inputs=inputs,
+        input_hash=report.hash_inputs(inputs, shot_hash),
+        footprints=footprints,
+        offsets_mm=bake_report.offsets_mm(loads),
+        forces=forces,
+        gaps_mm=gaps,
+        worst_gaps=response_job.worst_gaps(answers),
+        suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
     )
-    offsets_mm = bake_report.offsets_mm(loads)
-    suggested_speed = response_job.suggested_speeds(shot.motions, footprints)
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=())
     del loads, answers
     written: _Written | None = None
     if write and not response_only and options.output != "RESPONSE":
-        written = yield from _write(scene, shot, footprints, inputs, input_hash, sole_length)
+        about = {"inputs": inputs, "input_hash": build_report.keywords["input_hash"]}
+        written = yield from _write(scene, shot, footprints, about, sole_length)
+        warnings += written.warnings
     if write and options.output != "PRINTS":
         response_job.put_layers(scene, characters, layers)
     finished = time.perf_counter()
     frames = options.frame_end - options.frame_start + 1
-    result = report.build(
-        inputs=inputs,
-        input_hash=input_hash,
-        footprints=footprints,
-        offsets_mm=offsets_mm,
+    result = build_report(
         timings={
             "sample": sampled - started,
             "simulate": simulated - sampled,
@@ -128,16 +133,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=written.error if written else None,
-        warnings=[
-            *warnings,
-            *moving,
-            *(written.warnings if written else ()),
-            *gap_warnings,
-        ],
-        forces=forces,
-        gaps_mm=gaps,
-        worst_gaps=worst_gaps,
-        suggested_speed=suggested_speed,
+        warnings=[*warnings, *gap_warnings],
     )
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
@@ -151,7 +147,6 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
 class _Written:
     """What was written to the ground."""
 
-    ground: bpy.types.Object
     carrier: bpy.types.Object
     error: float
     warnings: list[str]
@@ -161,11 +156,22 @@ def _write(
     scene: bpy.types.Scene,
     shot: Shot,
     footprints: Sequence[Footprint],
-    inputs: dict[str, object],
-    input_hash: str,
+    about: dict[str, Any],
     sole_length: float,
 ) -> Job[_Written]:
-    """Put the prints on the ground, all of them in the last step; the shortest sole is so long [m]."""
+    """Put the prints on the ground, all of them in the last step.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    shot : Shot
+        Of its ground; the motions are not needed.
+    footprints : sequence of Footprint
+    about : dict
+        What is stored with them; its inputs are told the name of a ground that is created.
+    sole_length : float
+        Of the shortest sole [m].
+    """
     options = scene.softground
     blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
     frame_rate, unit_scale = settings.frame_rate_of(scene), scene.unit_settings.scale_length
@@ -177,34 +183,18 @@ def _write(
         cell_size=cell_size,
         blur_sigma=blur_sigma,
     )
-    pressed = yield from aside("write", 0.1, at_the_end)
-    touched = yield from aside("write", 0.1, pressed.touched)
-    warnings: list[str] = []
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        # The pressed ground takes as much memory as its mesh, and is soon made again.
+        trail = yield from aside("write", 0.1, lambda: at_the_end().trail(trail_detail.FLOOR))
+        warnings: list[str] = []
         if shot.surface is None:
-            lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
-            layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, unit_scale)
-            drafts.enter_context(drafted(options.material.surface))
-            yield Progress("write", 0.3)
-            ground = drafts.enter_context(created_ground.draft(layout))
-            inputs["ground"] = ground.name
-            yield Progress("write", 0.3)
-            place = baked_ground.on_created(scene, ground, layout, touched)
+            place = yield from _created(drafts, scene, shot, trail)
+            about["inputs"]["ground"] = place.carrier.name
         else:
-            ground, vertices = options.ground, shot.surface.vertices
-            index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, touched, shot.terrain)
-            cover = yield from aside("write", 0.2, coverage, vertices, index, pressed)
-            place = baked_ground.on_itself(ground, index, vertices)
-            if wants_detail(ground, cover, options.detail, cell_size, sole_length):
-                region = trail_detail.region_of(pressed)
-                del pressed  # it takes as much memory as the mesh, and is soon made again
-                place = yield from _detail(drafts, ground, region, touched, shot.terrain, cell_size, unit_scale)
-                pressed = yield from aside("write", 0.4, at_the_end)
-            warnings += coverage_warnings(ground, cover, options.detail, cell_size)
-        stored = yield from aside("write", 0.5, record.dump, footprints, {"inputs": inputs, "input_hash": input_hash})
+            place, warnings = yield from _given(drafts, scene, shot, shot.surface, trail, sole_length)
+        stored = yield from aside("write", 0.5, record.dump, footprints, about)
         across = place.position[:, :2].T
-        sample = yield from aside("write", 0.6, pressed.sample, *across)
-        del pressed  # the cells take as much memory as what is still to come
+        sample = yield from aside("write", 0.6, lambda: at_the_end().sample(*across))
         over_time = partial(
             polylines_at,
             footprints,
@@ -228,27 +218,45 @@ def _write(
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
-    return _Written(ground, carrier, spans.error, warnings)
+    return _Written(carrier, spans.error, warnings)
 
 
-def _detail(
+def _created(drafts: ExitStack, scene: bpy.types.Scene, shot: Shot, trail: Trail) -> Job[baked_ground.Place]:
+    """A draft of a ground that fits the walk, as the place for a bake."""
+    options, cell_size = scene.softground, settings.cell_size_of(scene)
+    lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
+    layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, scene.unit_settings.scale_length)
+    drafts.enter_context(drafted(options.material.surface))
+    yield Progress("write", 0.3)
+    ground = drafts.enter_context(created_ground.draft(layout))
+    yield Progress("write", 0.3)
+    return baked_ground.on_created(scene, ground, layout, trail)
+
+
+def _given(
     drafts: ExitStack,
-    ground: bpy.types.Object,
-    region: Region,
-    touched: TouchedCells,
-    terrain: Terrain,
-    cell_size: float,
-    unit_scale: float,
-) -> Job[baked_ground.Place]:
-    """A draft of the ground refined along the trail, as the place for a bake."""
-    surface = trail_detail.surface_of(ground, unit_scale)
-    refinement = yield from aside("write", 0.3, refine, surface, region, cell_size)
-    draft = drafts.enter_context(trail_detail.draft(ground, surface, refinement))
+    scene: bpy.types.Scene,
+    shot: Shot,
+    surface: ground_mesh.GroundSurface,
+    trail: Trail,
+    sole_length: float,
+) -> Job[tuple[baked_ground.Place, list[str]]]:
+    """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; warnings."""
+    options, cell_size = scene.softground, settings.cell_size_of(scene)
+    ground, vertices = options.ground, surface.vertices
+    index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, trail, shot.terrain)
+    cover = yield from aside("write", 0.2, coverage, vertices, index, trail.printed, cell_size)
+    warnings = coverage_warnings(ground, cover, options.detail, cell_size)
+    if not wants_detail(ground, cover, options.detail, cell_size, sole_length):
+        return baked_ground.on_itself(ground, index, vertices), warnings
+    coarse = trail_detail.surface_of(ground, scene.unit_settings.scale_length)
+    refinement = yield from aside("write", 0.3, refine, coarse, Region(trail.moved, cell_size), cell_size)
+    draft = drafts.enter_context(trail_detail.draft(ground, coarse, refinement))
     yield Progress("write", 0.4)
-    vertices = refinement.at_vertices(surface, surface.vertices)
+    vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
-    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, touched, terrain)
-    return baked_ground.on_detail(ground, draft, index, vertices)
+    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, trail, shot.terrain)
+    return baked_ground.on_detail(ground, draft, index, vertices), warnings
 
 
 def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:

@@ -15,7 +15,7 @@ from ...core import record
 from ...core.errors import InputError
 from ...core.footprints import Footprint
 from ...core.polylines import Spans
-from ...core.pressed_ground import GroundSample, TouchedCells
+from ...core.pressed_ground import GroundSample, Trail
 from ..jobs import Job, Progress
 from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
 from .created_ground import Layout
@@ -78,9 +78,9 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
-def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, touched: TouchedCells) -> Place:
+def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, trail: Trail) -> Place:
     """A ground that is not in the scene yet."""
-    index = np.flatnonzero(touched.covers(*layout.vertices[:, :2].T))
+    index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     return Place(index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft), is_draft=True)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.footprints import NEVER
 from ...core.heightfield import PLACES_AT_ONCE, Terrain
-from ...core.pressed_ground import GroundSample, TouchedCells
+from ...core.pressed_ground import GroundSample, Trail
 from ...core.terrain import MeshTerrain
 from .. import mesh_arrays
 from ..compat import remove_scene
@@ -74,9 +74,9 @@ class GroundSurface:
         return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors)
 
 
-def pressed_vertices(vertices: Array, touched: TouchedCells, terrain: Terrain) -> Indices:
+def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Indices:
     """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
-    near = np.flatnonzero(touched.covers(vertices[:, 0], vertices[:, 1]))
+    near = np.flatnonzero(trail.covers(vertices[:, 0], vertices[:, 1]))
     on_top = np.zeros(len(near), dtype=bool)
     for first in range(0, len(near), PLACES_AT_ONCE):
         part = slice(first, first + PLACES_AT_ONCE)

@@ -14,8 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cell_keys import cells_at, cells_of, keys_of
-from ...core.pressed_ground import PressedGround
+from ...core.cell_keys import Keys, keys_of
 from ...core.refinement import Refinement, Surface
 from ...core.region import Region
 from . import ground_mesh, playback, refined_mesh
@@ -49,23 +48,12 @@ def hides(ground: bpy.types.Object) -> bool:
     return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
-def region_of(pressed: PressedGround) -> Region:
-    """The cells whose displayed height changes."""
-    columns, rows = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
-    for window in pressed.smooth.tile_windows():
-        row, column = np.nonzero(pressed.smooth.read(window).sum(axis=0) > FLOOR)
-        columns.append(column + window.column)
-        rows.append(row + window.row)
-    return Region(np.concatenate(columns), np.concatenate(rows), pressed.smooth.cell_size)
-
-
-def region_around(footfalls: Array, cell_size: float, reach: float) -> Region:
-    """The cells within reach of where feet come down (N, 2), before it is known what they press [m]."""
+def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
+    """The cells within reach [m] of those in which feet come down, before it is known what they press."""
     far = int(np.ceil(reach / cell_size)) + 1
     row, column = np.mgrid[-far : far + 1, -far : far + 1]
     disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
-    cells = cells_of(np.unique(cells_at(footfalls, cell_size)[:, None] + disc))
-    return Region(cells[:, 0], cells[:, 1], cell_size)
+    return Region(np.unique(footfalls[:, None] + disc), cell_size)
 
 
 def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:

@@ -15,6 +15,7 @@ from bpy.props import BoolProperty
 from numpy.typing import NDArray
 
 from ...core import record
+from ...core.cell_keys import cells_at
 from ...core.errors import InputError
 from ...core.heightfield import Window
 from ...core.playhead import Playhead
@@ -23,7 +24,7 @@ from ...core.pressed_ground import PressedGround
 from ...core.refinement import refine
 from .. import jobs, session, settings
 from ..baking import bake_report
-from ..baking.bake_checks import expected_coverage, shortest_sole, wants_detail
+from ..baking.bake_checks import coverage, shortest_sole, wants_detail
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, ground_mesh, playback, trail_detail
 from ..ground.created_ground import create_ground, reach_for
@@ -173,18 +174,15 @@ def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
     options, unit_scale = scene.softground, scene.unit_settings.scale_length
     ground, shot, cell_size = options.ground, known.shot, settings.cell_size_of(scene)
     vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
-    footfalls = shot.plan.footfalls
-    if footfalls is not None and wants_detail(
-        ground,
-        expected_coverage(vertices, footfalls, cell_size),
-        options.detail,
-        cell_size,
-        shortest_sole(shot.motions),
-    ):
-        surface = trail_detail.surface_of(ground, unit_scale)
-        refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
-        with trail_detail.draft(ground, surface, refinement) as draft:
-            ground, vertices = trail_detail.publish(ground, draft), refinement.at_vertices(surface, surface.vertices)
+    if shot.plan.footfalls is not None:
+        footfalls = cells_at(shot.plan.footfalls, cell_size)
+        cover = coverage(vertices, slice(None), footfalls, cell_size)
+        if wants_detail(ground, cover, options.detail, cell_size, shortest_sole(shot.motions)):
+            surface = trail_detail.surface_of(ground, unit_scale)
+            refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
+            with trail_detail.draft(ground, surface, refinement) as draft:
+                ground = trail_detail.publish(ground, draft)
+            vertices = refinement.at_vertices(surface, surface.vertices)
     return LiveGround(ground, vertices, shot, unit_scale)
 
 
