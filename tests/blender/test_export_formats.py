@@ -12,7 +12,7 @@ from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground, playback
-from softground_addon.blender.output import export_formats, exports
+from softground_addon.blender.output import export_formats, exports, image_exports
 from softground_addon.core import point_cache
 from tests.blender import command_line, shots
 from tests.blender.grounds import plane
@@ -253,6 +253,21 @@ def test_an_interrupted_export_leaves_the_older_file(scene, tmp_path, monkeypatc
         export_formats.export(scene, export_formats.Options("PC2", path, 30, 31))
     assert path.read_bytes() == b"older"
     assert files_in(tmp_path) == ["a.pc2"]
+
+
+def test_images_that_are_interrupted_are_whole_and_not_denied(scene, tmp_path, monkeypatch, capfd):
+    save = image_exports._save
+
+    def save_one(*arguments):
+        if files_in(tmp_path):
+            raise KeyboardInterrupt
+        save(*arguments)
+
+    monkeypatch.setattr(image_exports, "_save", save_one)
+    options = ["--format=exr", f"--output={tmp_path / 'x.exr'}", "--resolution=64"]
+    assert cli.run_in_blender(["export", *options]) == cli.EXIT_INTERRUPTED
+    assert files_in(tmp_path) == ["x_displacement_0020.exr"]
+    assert capfd.readouterr().err == "softground: interrupted; no file was left half written.\n"
 
 
 def test_a_scene_that_was_never_saved_proposes_a_name_too(scene):

@@ -65,7 +65,7 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         previous.clear()  # the process is about to end: a second signal must not spoil that
-        print("softground: interrupted; nothing was written.", file=sys.stderr)
+        print("softground: interrupted; no file was left half written.", file=sys.stderr)
         return EXIT_INTERRUPTED
     finally:
         for number, handler in previous.items():
