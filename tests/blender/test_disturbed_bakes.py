@@ -151,6 +151,49 @@ def test_what_is_left_of_a_bake_without_its_record_can_be_cleared(scene):
     assert fingerprints.of_file() == before
 
 
+def retype(attribute, kind, domain):
+    def spoil(ground):
+        mesh = ground.data
+        mesh.attributes.remove(mesh.attributes[attribute])
+        mesh.attributes.new(attribute, kind, domain)
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        retype("softground_moved", "FLOAT", "POINT"),
+        retype("softground_compression", "INT", "FACE"),
+        lambda ground: ground.data.__setitem__(ground_mesh.SUMMARY, "many steps"),
+        lambda ground: ground.data.__setitem__(ground_mesh.RECORD, {"steps": 3}),
+        lambda ground: ground.__setitem__(trail_detail.WAS_HIDDEN, "yes"),
+    ],
+    ids=["moved", "compression", "summary", "record", "was hidden"],
+)
+def test_whatever_is_made_of_the_bakes_data_clearing_gives_the_ground_back(scene, spoil):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    field = scene.softground.ground = plane(scene, vertices=150, size=5.0)
+    bpy.context.view_layer.update()
+    flat = mesh_arrays.positions(field.data)
+    bpy.ops.softground.bake()
+    assert np.ptp(mesh_arrays.positions(field.data)[:, 2]) > 0.02
+    spoil(field)
+    assert all(isinstance(value, (int, float)) for value in ground_mesh.summary_of(field).values())
+    bpy.ops.softground.clear_bake()
+    assert np.array_equal(mesh_arrays.positions(field.data), flat)
+    assert not field.hide_viewport
+
+
+def test_undisturbed_positions_that_were_converted_are_only_passed_over(scene, baked):
+    now = mesh_arrays.positions(baked.data)
+    retype(ground_mesh.REST, "FLOAT", "POINT")(baked)
+    assert np.array_equal(ground_mesh.rest_positions(baked.data), now)
+    bpy.ops.softground.bake()
+
+
 def test_a_bake_on_a_linked_ground_is_not_cleared(scene, baked, tmp_path):
     path = tmp_path / "set.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

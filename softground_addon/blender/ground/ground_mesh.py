@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import bpy
 import numpy as np
@@ -106,9 +106,9 @@ def has_remains(ground: bpy.types.Object) -> bool:
 
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
-    """What the bake that is on this ground came to, for display; empty if there is none."""
+    """What the bake that is on this ground came to, for display; empty if there is none, or something else there."""
     summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
-    return summary.to_dict() if summary else {}
+    return summary.to_dict() if hasattr(summary, "to_dict") else {}
 
 
 def note_warnings(ground: bpy.types.Object, warnings: Sequence[str]) -> None:
@@ -246,7 +246,7 @@ def write(
     _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    kept = mesh.attributes.get(REST) or _add_attribute(mesh, REST, "FLOAT_VECTOR")
+    kept = _attribute(mesh, REST, "FLOAT_VECTOR")
     kept.data.foreach_set("vector", rest.ravel())
     up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
@@ -264,7 +264,7 @@ def write(
     ):
         whole = np.full(len(mesh.vertices), default, dtype=np.float32)
         whole[index] = values
-        attribute = mesh.attributes.get(name) or _add_attribute(mesh, name, "FLOAT")
+        attribute = _attribute(mesh, name, "FLOAT")
         attribute.data.foreach_set("value", whole)
     # Numbers, not bytes: Blender's Alembic exporter ends the program on bytes that hold a zero.
     mesh.pop(RECORD, None)  # an array that is there would keep its length
@@ -281,7 +281,7 @@ def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -
         return
     whole = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     whole[index] = marks
-    attribute = mesh.attributes.get(SOLE) or _add_attribute(mesh, SOLE, "FLOAT_VECTOR")
+    attribute = _attribute(mesh, SOLE, "FLOAT_VECTOR")
     attribute.data.foreach_set("vector", whole.ravel())
 
 
@@ -337,8 +337,13 @@ def discard(ground: bpy.types.Object) -> None:
         bpy.data.meshes.remove(mesh)
 
 
-def _add_attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> bpy.types.Attribute:
-    """A new point attribute; the one that the user has active stays so."""
+def _attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> Any:
+    """A point attribute, new unless there is one of that kind; the one that the user has active stays so."""
+    there = mesh.attributes.get(name)
+    if there and (there.domain, there.data_type) == ("POINT", kind):
+        return there
+    if there:
+        mesh.attributes.remove(there)
     active = mesh.attributes.active_index
     attribute = mesh.attributes.new(name, kind, "POINT")
     mesh.attributes.active_index = active
@@ -351,7 +356,7 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
     """
     attribute = mesh.attributes.get(REST)
-    if attribute is None or len(attribute.data) != len(mesh.vertices):
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return mesh_arrays.positions(mesh)
     kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     attribute.data.foreach_get("vector", kept)

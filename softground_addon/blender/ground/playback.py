@@ -136,7 +136,7 @@ def is_playback_attribute(name: str) -> bool:
 def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
     """Whether the playback moves each vertex, (V,); None where there is none."""
     attribute: Any = mesh.attributes.get(nodes.MOVED)
-    if attribute is None or len(attribute.data) != len(mesh.vertices):
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "BOOLEAN"):
         return None
     moved = np.empty(len(attribute.data), dtype=bool)
     attribute.data.foreach_get("value", moved)

@@ -113,7 +113,8 @@ def remove(ground: bpy.types.Object) -> None:
 def _show_again(thing: bpy.types.Object) -> None:
     """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
     if hides(thing):
-        thing.hide_viewport, thing.hide_render = (bool(value) for value in thing[WAS_HIDDEN])
+        was: list[Any] = getattr(thing[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
+        thing.hide_viewport, thing.hide_render = map(bool, was) if len(was) == 2 else (False, False)
         del thing[WAS_HIDDEN]
 
 
