@@ -81,11 +81,11 @@ def test_the_record_and_the_file_grow_by_little_with_each_step():
     assert many["blend"] / many["steps"] < 150e3
 
 
-@pytest.mark.xfail(reason="0.9 MB for 920 new vertices; 0.4 MB of that stays, in the mesh and its splines")
+@pytest.mark.xfail(reason="0.7 MB for 920 new vertices, of which 0.08 MB are their 4,900 points of splines")
 def test_memory_grows_by_little_with_each_step_on_new_ground():
     assert memory_per_step(ON_NEW_GROUND) < 100e3
 
 
-@pytest.mark.xfail(reason="0.45 MB for 5,800 points of splines, of which 0.16 MB stay, and the motion of 19 frames")
+@pytest.mark.xfail(reason="0.3 MB, of which 0.07 MB stay, 4,400 points of splines; the rest is the motion of 19 frames")
 def test_memory_grows_by_little_with_each_step_on_trodden_ground():
     assert memory_per_step(IN_CIRCLES) < 100e3
