@@ -100,14 +100,14 @@ class Press:
         steps = first + np.flatnonzero(imprints.pressing[first:last])
         if not len(steps):
             return []
-        window, surface = imprints.window, None
-        if self.material.repose_angle:
+        material, window, surface = self.material, imprints.window, None
+        if material.repose_angle:
             window, surface = self._around(imprints.window)
         whole = self.state.read(window)
         before = quantised(whole)
         inside = _inside(window, imprints.window)
         state = whole[:, inside[0], inside[1]]
-        found = self._found(stance, imprints.window, state) if self.material.hardening else None
+        found = self._found(stance, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
         rim = imprints.rim[steps].reshape(len(steps), -1)
         for k, step in enumerate(steps):
@@ -118,14 +118,14 @@ class Press:
                 imprints.rate[step],
                 holds=False if imprints.holds is None else imprints.holds[step],
                 found=found,
-                hardening=self.material.hardening,
+                hardening=material.hardening,
             )
             newly = compression - state[0]
             heights[k] = newly.sum()
             if imprints.factors is None:
-                displaced[k] = displaced_volume(heights[k], self.material)
+                displaced[k] = displaced_volume(heights[k], material)
             else:
-                displaced[k] = displaced_volume(newly, self.material, imprints.factors.rim).sum()
+                displaced[k] = displaced_volume(newly, material, imprints.factors.rim).sum()
             state[0] = compression
             if surface:
                 state[1] += (displaced[k] * rim[k]).reshape(state[1].shape)

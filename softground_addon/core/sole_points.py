@@ -225,10 +225,10 @@ def centroid(points: SolePoints, transforms: Array, pressing: Array) -> Array:
     ----------
     points : SolePoints
     transforms : (N, P, 4, 4) float array
-    pressing : (N, Q) float array
+    pressing : (N, Q) or (1, Q) float array
         Area in contact of each point [m²].
     """
-    total = np.zeros((len(pressing), 4))
+    total = np.zeros((len(transforms), 4))
     first = 0
     for number, patch in enumerate(points.patches):
         share = pressing[:, first : first + len(patch.positions)]

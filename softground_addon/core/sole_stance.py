@@ -131,4 +131,4 @@ class SoleStance(Stance):
 
     def _middles(self, poses: Array) -> Array:
         area = np.concatenate([patch.area for patch in self.points.patches])
-        return centroid(self.points, poses, np.broadcast_to(area, (len(poses), len(area))))
+        return centroid(self.points, poses, area[None])
