@@ -42,6 +42,7 @@ def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
         for key, parts in arrays.items():
             entry = zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.file_size = sum(part.nbytes for part in parts)  # about: it decides how sizes are stored
             with archive.open(entry, "w") as member:
                 size = sum(len(part) for part in parts)
                 header = {"descr": parts[0].dtype.str, "fortran_order": False, "shape": (size,)}
