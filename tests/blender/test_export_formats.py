@@ -178,7 +178,8 @@ def test_a_full_disk_is_named_and_leaves_the_older_file(scene, small_disk, kind,
     old.write_bytes(b"old")
     with (small_disk / "filler").open("wb") as filler:
         filler.write(bytes(100 * 1024))
-    assert cli.run_in_blender(["export", f"--format={kind}", f"--output={old}"]) == cli.EXIT_BAD_INPUT
+    options = [f"--format={kind}", f"--output={old}", "--resolution=512"]
+    assert cli.run_in_blender(["export", *options]) == cli.EXIT_BAD_INPUT
     said = capfd.readouterr().err
     assert re.search(
         r"softground: '.*/ground\S*' (could not be written \(No space left|may take up to).* disk space", said
