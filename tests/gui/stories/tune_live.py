@@ -93,7 +93,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.key("F3")
     yield from hand.type("soft")
     yield 0.8
-    yield from hand.picture("search")
+    yield from hand.picture("search", in_docs=False)
     yield from hand.key("ESC")
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.softground")
     yield 0.3
