@@ -98,6 +98,15 @@ def test_a_mass_or_cells_that_do_not_suit_the_size_of_the_body_are_pointed_out(w
     assert "cells long: set the cell size to 1" in cells
 
 
+def test_a_character_that_leaves_no_print_is_pointed_out(walk):
+    walk.softground.characters[0].armature.rotation_euler.x = np.pi
+    walk.softground.ground = None
+    bpy.context.view_layer.update()
+    report = bake(walk).report
+    assert report["totals"]["steps"] == 0
+    assert any("leaves no print" in warning for warning in report["warnings"])
+
+
 def test_a_character_that_does_not_move_is_pointed_out(walk):
     for curve in action_curves(walk.softground.characters[0].armature.animation_data.action):
         curve.mute = True

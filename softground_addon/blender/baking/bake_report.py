@@ -41,11 +41,17 @@ def warnings(
 ) -> list[str]:
     """What the user should know of the footprints, with the remedy; the ground by its name."""
     found = []
+    printed = {footprint.character for footprint in footprints}
     for character in loads:
         if character.motion.centre is None and character.motion.stands_still:
             found.append(
                 f"'{character.motion.name}' does not move in these frames: look whether its action has keys in them, "
                 "is assigned with its slot, and is not muted."
+            )
+        elif character.motion.name not in printed:
+            found.append(
+                f"'{character.motion.name}' leaves no print in these frames: look in the Character panel whether its "
+                "soles are what touches the ground, and in the viewport whether they face down."
             )
         missed = missed_steps(character.motion, character.contacts)
         if missed:
