@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender import mesh_arrays
 from softground_addon.blender.baking import bake_report
-from softground_addon.blender.ground import ground_mesh, trail_detail
+from softground_addon.blender.ground import ground_mesh, playback, playback_nodes, trail_detail
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -39,6 +39,14 @@ def refusal(operator):
         operator()
     assert "Traceback" not in str(error.value)
     return str(error.value)
+
+
+def test_nothing_is_left_of_a_playback_whose_modifier_the_user_has_deleted(baked):
+    baked.modifiers.remove(playback.modifier_of(baked))
+    bpy.ops.softground.clear_bake()
+    assert not [group for group in bpy.data.node_groups if playback_nodes.is_playback(group)]
+    assert not bpy.data.hair_curves
+    assert not [thing for thing in bpy.data.objects if thing.name.startswith(playback.TABLE)]
 
 
 @pytest.mark.parametrize("change", ["delete", "rename"])

@@ -106,10 +106,9 @@ def remove(ground: bpy.types.Object) -> None:
     copies = [thing for thing in bpy.data.objects if thing.data == mesh] if mesh.users > 1 else []
     for shown in {ground, *copies}:
         while modifier := modifier_of(shown):
-            group = cast("Any", modifier).node_group
             shown.modifiers.remove(modifier)
-            if not group.users:
-                _remove_group(group)
+    for group in [one for one in bpy.data.node_groups if nodes.is_playback(one) and not (one.users or one.library)]:
+        _remove_group(group)  # also of a modifier that the user has deleted
     for name in [attribute.name for attribute in mesh.attributes]:
         if is_playback_attribute(name):
             mesh.attributes.remove(mesh.attributes[name])
