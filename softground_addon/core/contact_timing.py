@@ -320,7 +320,8 @@ def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) ->
         phase = (step[:, None] - strike[..., None]) / overlap
         ramp = np.cos(np.pi * np.clip(phase, 0.0, 1.0, out=phase), out=phase)
         ramp += 2 * share[:, None] - 1  # minus twice the misfit of a ramp (1 - cos)/2
-        misfit = (np.square(ramp, out=ramp) @ (telling[..., None] / 4))[..., 0]
+        # A matrix product would wake the threads of the BLAS library, which cost more than they save here.
+        misfit = np.einsum("gpw,gw->gp", np.square(ramp, out=ramp), telling / 4)
         moved = (pairs - found[:, None]) / unit
         cost = np.where(possible, misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=-1), np.inf)
         least = np.take_along_axis(pairs, cost.argmin(axis=1)[:, None, None], axis=1)[:, 0]
