@@ -59,7 +59,7 @@ def _stacked(*parts: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
     return [np.stack(part, axis=1) for part in parts]
 
 
-def counted(many: int, first: int = 0) -> Numbers:
+def _counted(many: int, first: int = 0) -> Numbers:
     return np.arange(first, first + many, dtype=np.int32)
 
 
@@ -97,9 +97,9 @@ class Bisection:
         self.points = vertices[self.vertex]
         self.corner: Numbers = local.reshape(-1, 3).astype(np.int32)
         self.ends, self.edge = _edges(self.corner, len(self.vertex))
-        self.root = counted(len(self.ends))
+        self.root = _counted(len(self.ends))
         self.half = np.full(len(self.ends), -1, dtype=np.int32)
-        self.source = counted(len(triangles))
+        self.source = _counted(len(triangles))
         self.weight = [np.tile(share, (len(triangles), 1)) for share in np.eye(3, dtype=np.float32)[:2]]
         self.roots = self.ends
         if parts > 1:
@@ -126,7 +126,7 @@ class Bisection:
 
     def run(self, region: Region, leg: float) -> None:
         """Cut until no triangle with a longer leg reaches into the region."""
-        fresh = counted(len(self.corner))
+        fresh = _counted(len(self.corner))
         while True:
             parts = [fresh[first : first + AT_ONCE] for first in range(0, len(fresh), AT_ONCE)]
             wanted = np.concatenate([fresh[:0], *(self._wanted(part, region, leg) for part in parts)])
@@ -154,13 +154,13 @@ class Bisection:
 
     def _cut_edges(self, edges: Indices) -> None:
         ends = self.ends[edges]
-        middle = counted(len(edges), len(self.points))
+        middle = _counted(len(edges), len(self.points))
         self.points = np.concatenate([self.points, (self.points[ends[:, 0]] + self.points[ends[:, 1]]) / 2])
         halves = np.stack([ends, np.stack([middle, middle], axis=-1)], axis=-1).reshape(-1, 2)
         self.half[edges] = self._add_edges(halves, np.repeat(self.root[edges], 2))[::2]
 
     def _add_edges(self, ends: Numbers, root: Numbers) -> Numbers:
-        added = counted(len(ends), len(self.ends))
+        added = _counted(len(ends), len(self.ends))
         self.ends = np.concatenate([self.ends, ends])
         self.root = np.concatenate([self.root, root])
         self.half = np.concatenate([self.half, np.full(len(ends), -1, dtype=np.int32)])
@@ -169,14 +169,14 @@ class Bisection:
     def _cut_triangles(self) -> Numbers:
         """Cut every triangle whose base is cut, and again where a part's base is; returns the parts."""
         is_part = np.zeros(len(self.corner), dtype=bool)
-        candidates = counted(len(self.corner))
+        candidates = _counted(len(self.corner))
         while True:
             cut = candidates[self.half[self.edge[candidates, 0]] >= 0]
             if not len(cut):
                 return np.flatnonzero(is_part).astype(np.int32)
             is_part[cut] = True
             is_part = np.concatenate([is_part, np.ones(len(cut), dtype=bool)])
-            candidates = np.concatenate([cut, counted(len(cut), len(self.corner))])
+            candidates = np.concatenate([cut, _counted(len(cut), len(self.corner))])
             self._halve(cut)
 
     def _halve(self, triangles: Numbers) -> None:
@@ -193,7 +193,7 @@ class Bisection:
             apex, left, right = self.corner[whole].T
             base, by_right, by_left = self.edge[whole].T  # edges opposite apex, left and right
             middle = self.ends[self.half[base], 1]
-            across = counted(len(whole), first_across + begin)
+            across = _counted(len(whole), first_across + begin)
             across_ends[begin : begin + AT_ONCE] = np.stack([apex, middle], axis=-1)
             at_left = self.half[base] + (self.ends[base, 0] != left)
             at_right = self.half[base] + (self.ends[base, 0] != right)

@@ -98,13 +98,14 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     inputs = bake_report.inputs_of(scene)
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
+    input_hash = report.hash_inputs(inputs, shot_hash)
     ground_name, cell_size = str(inputs["ground"] or "the ground"), settings.cell_size_of(scene)
     warnings = [*bake_report.warnings(footprints, loads, cell_size, ground_name), *moving]
     gap_warnings = response_job.warnings(answers)
     build_report = partial(
         report.build,
         inputs=inputs,
-        input_hash=report.hash_inputs(inputs, shot_hash),
+        input_hash=input_hash,
         footprints=footprints,
         offsets_mm=bake_report.offsets_mm(loads),
         forces=forces,
@@ -118,7 +119,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     del loads, answers
     written: _Written | None = None
     if write and not response_only and options.output != "RESPONSE":
-        about = {"inputs": inputs, "input_hash": build_report.keywords["input_hash"]}
+        about = {"inputs": inputs, "input_hash": input_hash}
         written = yield from _write(scene, shot, footprints, about, sole_length)
         warnings += written.warnings
     if write and options.output != "PRINTS":

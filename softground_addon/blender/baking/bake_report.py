@@ -20,6 +20,7 @@ from ..ground import ground_checks
 from ..jobs import STAGES
 from ..reading import staleness
 from ..response import response_job
+from .bake_checks import shortest_sole
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def warnings(
             f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground: make it larger."
         )
     for motion in (character.motion for character in loads):
-        length = min(sole.sole.length for sole in motion.soles)
+        length = shortest_sole([motion])
         if length < FEW_CELLS * cell_size:
             found.append(
                 f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long: set the cell size to "

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.footprints import NEVER
-from ...core.heightfield import PLACES_AT_ONCE, Terrain
+from ...core.heightfield import Terrain
 from ...core.pressed_ground import GroundSample, Trail
 from ...core.terrain import MeshTerrain
 from .. import mesh_arrays
@@ -77,12 +77,8 @@ class GroundSurface:
 def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Indices:
     """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
     near = np.flatnonzero(trail.covers(vertices[:, 0], vertices[:, 1]))
-    on_top = np.zeros(len(near), dtype=bool)
-    for first in range(0, len(near), PLACES_AT_ONCE):
-        part = slice(first, first + PLACES_AT_ONCE)
-        x, y, z = vertices[near[part]].T
-        on_top[part] = np.abs(z - terrain.heights(x, y)) < ON_SURFACE
-    return near[on_top]
+    x, y, z = vertices[near].T
+    return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
 
 
 def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
