@@ -73,7 +73,8 @@ class Between(np.lib.mixins.NDArrayOperatorsMixin):
         """All of the samples at some of the positions, from those around them."""
         if not len(position):
             return np.empty((0, *self._samples.shape[1:]))
-        first = max(int(position.min()) - 1, 0)
+        before = min(int(position.min()), len(self._samples) - 2)  # the last sample ends the span before it
+        first = max(before - 1, 0)
         return self._method(self._samples[first : int(position.max()) + 3], position - first)
 
 

@@ -81,3 +81,9 @@ def test_a_few_steps_of_a_long_shot_take_little_memory():
 def test_stretches_make_the_whole(count):
     numbers = np.arange(float(2 * count)).reshape(count, 2)
     np.testing.assert_array_equal(in_stretches(lambda some: numbers[some] ** 2, count), numbers**2)
+
+
+def test_the_last_step_alone_is_that_of_the_whole():
+    poses = np.random.default_rng(3).normal(size=(34, 50, 4, 4))
+    position = np.arange(33 * 7 + 1) / 7
+    np.testing.assert_array_equal(Between(poses, position, cubic)[-1:], cubic(poses, position)[-1:])
