@@ -37,6 +37,26 @@ def rotation_matrices(quaternion: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
+def euler_rotations(angles: Array, order: str) -> Array:
+    """Rotation matrices (F, 3, 3) of Euler angles (F, 3) about x, y and z [rad].
+
+    Parameters
+    ----------
+    angles : (F, 3) float array
+    order : str
+        Axes in the order in which they are applied, e.g. "XYZ".
+    """
+    result = np.tile(np.eye(3), (len(angles), 1, 1))
+    for axis in map("XYZ".index, order):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.tile(np.eye(3), (len(angles), 1, 1))
+        turn[:, u, u] = turn[:, v, v] = np.cos(angles[:, axis])
+        turn[:, v, u] = np.sin(angles[:, axis])
+        turn[:, u, v] = -turn[:, v, u]
+        result = turn @ result
+    return result
+
+
 def quaternion_product(left: Array, right: Array) -> Array:
     """Products (F, 4) of quaternions (F, 4), w first: the right one turns first."""
     w, x, y, z = left.T

@@ -32,6 +32,11 @@ def moving_human(**options):
     return armature
 
 
+def let_blender_evaluate(armature):
+    """Something that does nothing, but is more than keys."""
+    armature.constraints.new("LIMIT_LOCATION")
+
+
 @pytest.mark.parametrize("name", shots.MOTION_FILES)
 def test_joints_equal_independent_forward_kinematics_of_the_motion_file(scene, name):
     armature = shots.import_motion(name)
@@ -132,9 +137,12 @@ def test_samples_of_a_rigify_human_follow_its_ik_controls(rigify_file):
     assert_samples_equal_the_users_scene(bpy.context.scene, armature)
 
 
+@pytest.mark.parametrize("reading", ["keys", "evaluated"])
 @pytest.mark.parametrize("action", ["finish", "close", "fail"])
-def test_sampling_leaves_the_file_as_it_was(scene, action):
+def test_sampling_leaves_the_file_as_it_was(scene, action, reading):
     armature = moving_human()
+    if reading == "evaluated":
+        let_blender_evaluate(armature)
     mesh = bpy.data.meshes.new("Body")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     body = bpy.data.objects.new("Body", mesh)
@@ -187,12 +195,48 @@ def state(scene, armature):
     )
 
 
-def test_sampling_takes_one_step_per_frame(scene):
+def test_evaluating_takes_one_step_per_frame(scene):
     armature = moving_human()
+    let_blender_evaluate(armature)
     sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 10))
     steps = list(sampling)
     assert steps[:9] == list(range(1, 10))
     assert set(steps[9:]) <= {9}  # the soles are read in steps of their own
+
+
+def test_reading_keys_takes_one_step_for_each_bone(scene):
+    armature = moving_human()
+    sampling = sample_character(scene, armature, map_rig(armature), mass=70.0, frames=range(1, 101))
+    steps = list(sampling)
+    assert steps == sorted(steps)
+    assert len(set(steps)) > 10
+    assert steps[-1] == 100
+
+
+def with_nothing_more(_armature):
+    pass
+
+
+def with_object_motion(armature):
+    rigs.key(armature, "rotation_euler", {1: (0, 0, 0), 20: (0, 0, 1.5)})
+    armature.location = (5, 1, 0)
+
+
+def with_remapped_time(_armature):
+    bpy.context.scene.render.frame_map_old, bpy.context.scene.render.frame_map_new = 100, 170
+
+
+@pytest.mark.parametrize("change", [with_nothing_more, with_object_motion, with_remapped_time])
+def test_keys_read_are_poses_evaluated(scene, change):
+    armature = moving_human()
+    change(armature)
+    read = sample(scene, armature)
+    let_blender_evaluate(armature)
+    evaluated = sample(scene, armature)
+    for joint, path in evaluated.joints.items():
+        np.testing.assert_allclose(read.joints[joint], path, atol=2e-6)
+    for a, b in zip(read.soles, evaluated.soles, strict=True):
+        np.testing.assert_allclose(a.transforms, b.transforms, atol=2e-6)
 
 
 def test_lengths_are_metres_in_any_unit_and_at_any_object_scale(scene):
