@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from operator import attrgetter
 from typing import Any
 
@@ -42,28 +42,51 @@ _SERIES = {
 }
 
 
-def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, list[NDArray[Any]]]]:
+@dataclass(frozen=True)
+class Parts:
+    """An array of the record, of which only the part that is looked at takes memory.
+
+    Attributes
+    ----------
+    kind : type
+        Of its values.
+    size : int
+        How many they are.
+    parts : iterable of (N,) arrays
+        To be put together one after the other.
+    """
+
+    kind: type
+    size: int
+    parts: Iterable[NDArray[Any]]
+
+    @classmethod
+    def whole(cls, values: Sequence[object], kind: type) -> Parts:
+        """Those of values that are there already."""
+        flat: NDArray[Any] = np.array(values, kind).ravel()
+        return cls(kind, len(flat), [flat])
+
+
+def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, Parts]]:
     """The record as texts and a few flat arrays of 64-bit floats and 32-bit integers, to be stored as native data.
 
     Returns
     -------
     names : list of dict
         Character and sole of each footprint.
-    arrays : dict of str to list of (N,) arrays
-        The parts of each array, one after the other, which are the footprints' own: put together, they would be there
-        twice. `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count`
-        saying how many of its values belong to each footprint.
+    arrays : dict of str to Parts
+        `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count` saying
+        how many of its values belong to each footprint.
     """
     names = [{key: getattr(footprint, key) for key in _TEXTS} for footprint in footprints]
-    arrays: dict[str, list[NDArray[Any]]] = {
-        "numbers": [np.array([[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]).ravel()],
-    }
+    numbers = [[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]
+    arrays = {"numbers": Parts.whole(numbers, np.float64)}
     for key, (_, kind) in _VECTORS.items():
-        arrays[key] = [np.array([getattr(footprint, key) for footprint in footprints], kind).ravel()]
+        arrays[key] = Parts.whole([getattr(footprint, key) for footprint in footprints], kind)
     for key, kind in _SERIES.items():
-        parts = [attrgetter(key)(footprint) for footprint in footprints]
-        arrays[key] = [np.empty(0, kind), *(np.asarray(part, kind) for part in parts)]
-        arrays[f"{key}.count"] = [np.array([len(part) for part in parts], np.int32)]
+        counts = [len(attrgetter(key)(footprint)) for footprint in footprints]
+        arrays[key] = Parts(kind, sum(counts), map(attrgetter(key), footprints))
+        arrays[f"{key}.count"] = Parts.whole(counts, np.int32)
     return names, arrays
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .heightfield import HeightField, SparseGrid, Window
+from .packed import Packed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -47,8 +48,8 @@ class Changes:
 
     frames: Array
     first: Indices
-    cells: Indices
-    amounts: Indices
+    cells: Packed[np.int32] = Packed()
+    amounts: Packed[np.int32] = Packed()
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,9 @@ class Footprint:
     window: Window
     compression: Changes
     rim: Changes
-    contact_cells: Indices
-    contact_start: Array
-    contact_end: Array
+    contact_cells: Packed[np.int32] = Packed()
+    contact_start: Packed[np.float64] = Packed()
+    contact_end: Packed[np.float64] = Packed()
 
     def tile(self, changes: Changes, frame: float = np.inf) -> Array:
         """Sum of the compression or rim changes up to a frame, (rows, columns) of its window [m]."""
@@ -117,12 +118,13 @@ class Footprint:
         whole = int(np.searchsorted(changes.frames, frame, side="right"))
         under_way = int(np.searchsorted(changes.frames - self.frame_step, frame, side="left"))
         end = changes.first[whole]
-        total = np.bincount(changes.cells[:end], changes.amounts[:end], self.window.cells).astype(np.float64)
+        cells, amounts = changes.cells, changes.amounts
+        total = np.bincount(cells[:end], amounts[:end], self.window.cells).astype(np.float64)
         for k in range(whole, under_way):
             passed = 1.0 - (changes.frames[k] - frame) / self.frame_step
             passed = round(passed * PARTS_OF_A_FRAME) / PARTS_OF_A_FRAME
             part = slice(changes.first[k], changes.first[k + 1])
-            total += np.bincount(changes.cells[part], weights=changes.amounts[part] * passed, minlength=len(total))
+            total += np.bincount(cells[part], weights=amounts[part] * passed, minlength=len(total))
         return (total * QUANTUM).reshape(self.window.rows, self.window.columns)
 
     @property

@@ -8,6 +8,7 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -39,16 +40,16 @@ def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         text = json.dumps({"format": FORMAT, "footprints": names, "about": dict(about)}, ensure_ascii=False)
         archive.writestr(zipfile.ZipInfo(_TEXT, _FIXED_DATE), text, zipfile.ZIP_DEFLATED)
-        for key, parts in arrays.items():
+        for key, array in arrays.items():
+            kind: np.dtype[Any] = np.dtype(array.kind)
             entry = zipfile.ZipInfo(f"{key}.npy", _FIXED_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.file_size = sum(part.nbytes for part in parts)  # about: it decides how sizes are stored
+            entry.file_size = array.size * kind.itemsize  # about: it decides how sizes are stored
             with archive.open(entry, "w") as member:
-                size = sum(len(part) for part in parts)
-                header = {"descr": parts[0].dtype.str, "fortran_order": False, "shape": (size,)}
+                header = {"descr": kind.str, "fortran_order": False, "shape": (array.size,)}
                 np.lib.format.write_array_header_1_0(member, header)
-                for part in parts:
-                    member.write(part.tobytes())
+                for part in array.parts:
+                    member.write(part.astype(kind, copy=False).tobytes())
     return buffer.getvalue()
 
 

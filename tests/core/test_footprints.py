@@ -1,5 +1,6 @@
 """The record: the ground at any frame from its footprints alone."""
 
+import tracemalloc
 import zlib
 from dataclasses import fields, replace
 
@@ -136,7 +137,9 @@ def same(one, other):
 def to_arrays(footprints):
     """The record as it is stored: each array in one piece."""
     names, arrays = to_parts(footprints)
-    return names, {key: np.concatenate(parts) for key, parts in arrays.items()}
+    return names, {
+        key: np.concatenate([np.zeros(0, array.kind), *array.parts]).astype(array.kind) for key, array in arrays.items()
+    }
 
 
 def test_the_record_comes_back_from_flat_arrays_as_it_went_in(bake):
@@ -152,6 +155,18 @@ def test_the_record_takes_below_fifteen_kilobytes_a_step(bake):
         _, footprints = pressed(walk(steps=4, heading=0.6), material)
         _, arrays = to_arrays(footprints)
         assert sum(len(zlib.compress(values.tobytes())) for values in arrays.values()) < 15_000 * len(footprints)
+
+
+def test_footprints_take_less_than_half_the_memory_of_their_arrays(bake):
+    _, footprints = bake
+    tracemalloc.start()
+    try:
+        copies = [replace(footprint) for footprint in footprints]
+        taken = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    arrays = to_arrays(copies)[1].values()
+    assert taken < sum(values.nbytes for values in arrays) / 2
 
 
 @pytest.mark.parametrize("damage", ["cut", "longer", "missing", "names", "nan"])
