@@ -54,6 +54,7 @@ def of_object(thing: bpy.types.Object) -> dict[str, Any]:
     return {
         "transform": [tuple(v) for v in (*thing.matrix_basis, *thing.matrix_world, *thing.matrix_parent_inverse)],
         "visible": (thing.hide_viewport, thing.hide_render, thing.hide_get(), thing.select_get()),
+        "instancer": (thing.show_instancer_for_viewport, thing.show_instancer_for_render),
         "data": thing.data.name if thing.data else None,
         "modifiers": [_rna(m) for m in thing.modifiers],
         "constraints": [_rna(c) for c in thing.constraints],

@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender import mesh_arrays
 from softground_addon.blender.baking import bake_report
-from softground_addon.blender.ground import ground_mesh, playback, playback_nodes, trail_detail
+from softground_addon.blender.ground import ground_mesh, hidden_ground, playback, playback_nodes, trail_detail
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -175,7 +175,7 @@ def retype(attribute, kind, domain):
         retype("softground_compression", "INT", "FACE"),
         lambda ground: ground.data.__setitem__(ground_mesh.SUMMARY, "many steps"),
         lambda ground: ground.data.__setitem__(ground_mesh.RECORD, {"steps": 3}),
-        lambda ground: ground.__setitem__(trail_detail.WAS_HIDDEN, "yes"),
+        lambda ground: ground.__setitem__(hidden_ground.WAS_HIDDEN, "yes"),
     ],
     ids=["moved", "compression", "summary", "record", "was hidden"],
 )
@@ -228,7 +228,7 @@ def test_the_ground_is_shown_again_where_its_fine_copy_was_deleted(scene):
     bpy.ops.softground.bake()
     copy = trail_detail.detail_of(field)
     assert (copy.hide_viewport, copy.hide_render) == (False, True), "as the ground was before the first bake"
-    assert not trail_detail.hides(copy)
+    assert not hidden_ground.hides(copy)
     bpy.data.objects.remove(copy)
     assert (field.hide_viewport, field.hide_render) == (True, True)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}

@@ -17,7 +17,7 @@ from ...core.footprints import Footprint
 from ...core.polylines import Spans
 from ...core.pressed_ground import GroundSample, Trail
 from ..jobs import Job, Progress
-from . import created_ground, ground_checks, ground_mesh, playback, trail_detail
+from . import created_ground, ground_checks, ground_mesh, hidden_ground, playback, trail_detail
 from .created_ground import Layout
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def is_baked(ground: bpy.types.Object) -> bool:
 
 def has_remains(ground: bpy.types.Object) -> bool:
     """Whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
-    return ground_mesh.has_remains(carrier_of(ground)) or trail_detail.hides(ground)
+    return ground_mesh.has_remains(carrier_of(ground)) or hidden_ground.hides(ground)
 
 
 def clear(ground: bpy.types.Object) -> None:

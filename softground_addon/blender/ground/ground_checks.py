@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import InputError
-from . import ground_mesh
+from . import ground_mesh, trail_detail
 
 TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
 """Modifiers that change a mesh from frame to frame with nothing keyed."""
@@ -27,7 +27,8 @@ def check_writable(ground: bpy.types.Object) -> None:
 
 def check_usable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
-    check_writable(ground)
+    for thing in filter(None, (ground, trail_detail.detail_of(ground))):
+        check_writable(thing)
     name = ground.name
     mesh = ground_mesh.mesh_of(ground)
     if mesh.users - mesh.use_fake_user > 1:

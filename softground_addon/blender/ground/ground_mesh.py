@@ -164,14 +164,14 @@ def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     if ground.visible_get():
         matrix = np.array(ground.matrix_world, dtype=np.float64)
     else:  # Blender keeps no world matrix of hidden objects
-        with _stand_in(ground) as evaluated:
+        with stand_in(ground) as evaluated:
             matrix = np.array(evaluated.matrix_world, dtype=np.float64)
     matrix[:3] *= unit_scale
     return matrix
 
 
 @contextmanager
-def _stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
+def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
     """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
 
     Modifiers that change over time are evaluated at the first frame of the bake.
@@ -205,7 +205,7 @@ def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
         rest = rest_positions(mesh)
         display_key.drop_all(mesh)
         write_positions(mesh, rest)
-        with _stand_in(ground, mesh) as evaluated:
+        with stand_in(ground, mesh) as evaluated:
             yield mesh_of(evaluated)
     finally:
         bpy.data.meshes.remove(mesh)

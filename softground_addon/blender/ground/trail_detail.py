@@ -18,6 +18,7 @@ from ...core.cell_keys import Keys, keys_of
 from ...core.refinement import Refinement, Surface
 from ...core.region import Region
 from . import ground_mesh, playback, refined_mesh
+from .hidden_ground import hide, hides, show_again
 
 Array = NDArray[np.float64]
 
@@ -25,8 +26,6 @@ DETAIL_OF = "softground_detail_of"
 """Property of the copy: the ground that it stands in for."""
 NAMED = "softground_named"
 """Property of the copy: the name that it was given. Duplicates of it get another one, and carry the same properties."""
-WAS_HIDDEN = "softground_was_hidden"
-"""Property of the ground while it is hidden: whether it was in viewports and renders before."""
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
@@ -41,11 +40,6 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     ]
     # If the user has renamed it, it is the one that was there first in this session.
     return min(candidates, key=lambda thing: (thing.get(NAMED) != thing.name, thing.session_uid), default=None)
-
-
-def hides(ground: bpy.types.Object) -> bool:
-    """Whether the ground is hidden in favour of a copy."""
-    return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:
@@ -64,20 +58,22 @@ def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:
 
 @contextmanager
 def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Iterator[bpy.types.Object]:
-    """The refined ground as an object that is in no scene yet; one that is in none at the end is taken away."""
+    """The refined ground as an object that is in no scene yet; one that is not published is taken away at the end."""
     with ground_mesh.undisturbed_copy(ground) as source:
         groups = [group.name for group in ground.vertex_groups]
         mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)
     del surface, refinement  # they may be large, and the draft is there for long
     detail = ground.copy()
     detail.name = f"{ground.name} Trail"
-    detail.modifiers.clear()
+    for modifier in [one for one in detail.modifiers if one.type != "COLLISION"]:  # what others collide with stays
+        detail.modifiers.remove(modifier)
     detail.data = mesh
-    _show_again(detail)
+    show_again(detail)
+    detail.pop(DETAIL_OF, None)  # of a ground that is a duplicate of such a copy
     try:
         yield detail
     finally:
-        if not detail.users_collection:
+        if DETAIL_OF not in detail.keys():  # noqa: SIM118  (an ID is no mapping)
             ground_mesh.discard(detail)
 
 
@@ -91,31 +87,31 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
         _exchange_mesh(detail, ground_mesh.mesh_of(draft))
         return detail
     draft[DETAIL_OF], draft[NAMED] = ground, draft.name
-    if not hides(ground):
-        ground[WAS_HIDDEN] = [ground.hide_viewport, ground.hide_render]
-    for collection in ground.users_collection:
-        collection.objects.link(draft)
+    _put_beside(ground, draft)
     _choose_instead(draft, ground)
-    ground.hide_viewport = ground.hide_render = True
+    hide(ground)
     return draft
 
 
 def remove(ground: bpy.types.Object) -> None:
     """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
     detail = detail_of(ground)
-    _show_again(ground)
+    show_again(ground)
     if detail is None:
         return
     _choose_instead(ground, detail)
     ground_mesh.discard(detail)
 
 
-def _show_again(thing: bpy.types.Object) -> None:
-    """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
-    if hides(thing):
-        was: list[Any] = getattr(thing[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
-        thing.hide_viewport, thing.hide_render = map(bool, was) if len(was) == 2 else (False, False)
-        del thing[WAS_HIDDEN]
+def _put_beside(ground: bpy.types.Object, draft: bpy.types.Object) -> None:
+    """Put a draft into the collections of its ground; of two rigid bodies at one place, the ground stays the one."""
+    worlds = draft.users_collection  # of rigid bodies, into which Blender puts the copy of one
+    for collection in ground.users_collection:
+        if collection not in worlds:
+            collection.objects.link(draft)
+    for world in worlds:
+        if len(draft.users_collection) > 1:
+            world.objects.unlink(draft)
 
 
 def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:

@@ -1,0 +1,61 @@
+"""The ground while a copy of it takes the prints: hidden, but for what is scattered on it."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import bpy
+
+from . import ground_mesh
+
+WAS_HIDDEN = "softground_was_hidden"
+"""Property of the ground while it is hidden: what of `_SHOWN` was set before."""
+
+_SHOWN = ("hide_viewport", "hide_render", "show_instancer_for_viewport", "show_instancer_for_render")
+_BY_DEFAULT = (False, False, True, True)
+
+
+def hides(ground: bpy.types.Object) -> bool:
+    """Whether the ground is hidden in favour of a copy."""
+    return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def hide(ground: bpy.types.Object) -> None:
+    """Hide the ground; where particles or instances are on it, its mesh only. Nothing happens where it is hidden."""
+    if hides(ground):
+        return
+    before = [getattr(ground, name) for name in _SHOWN]
+    for kind in ("viewport", "render"):
+        if _is_scattered_on(ground, f"show_{kind}"):
+            setattr(ground, f"show_instancer_for_{kind}", False)
+        else:
+            setattr(ground, f"hide_{kind}", True)
+    ground[WAS_HIDDEN] = before
+
+
+def show_again(ground: bpy.types.Object) -> None:
+    """Show a ground that is hidden in favour of a copy, or what was copied from it meanwhile, as it was before."""
+    if not hides(ground):
+        return
+    kept: list[Any] = getattr(ground[WAS_HIDDEN], "to_list", list)()  # whatever has been made of it
+    if len(kept) not in (2, len(_SHOWN)):  # two in files of before scatter stayed
+        kept = []
+    for name, value in zip(_SHOWN, (*kept, *_BY_DEFAULT[len(kept) :]), strict=True):
+        setattr(ground, name, bool(value))
+    del ground[WAS_HIDDEN]
+
+
+def _is_scattered_on(ground: bpy.types.Object, shown: str) -> bool:
+    """Whether the ground has particles, or its modifiers that are shown (`show_viewport`, `show_render`) instances."""
+    if ground.particle_systems:
+        return True
+    if not any(modifier.type == "NODES" and getattr(modifier, shown) for modifier in ground.modifiers):
+        return False
+    with ground_mesh.stand_in(ground, ground_mesh.mesh_of(ground)) as evaluated:
+        copy = evaluated.original
+        for modifier in copy.modifiers:
+            modifier.show_viewport = getattr(modifier, shown)
+        layer = copy.users_scene[0].view_layers[0]
+        layer.update()
+        depsgraph = cast("bpy.types.Depsgraph", layer.depsgraph)
+        return any(one.parent and one.parent.original == copy for one in depsgraph.object_instances if one.is_instance)

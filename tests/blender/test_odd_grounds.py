@@ -1,0 +1,177 @@
+"""Grounds as artists have them: with physics, scatter, constraints and modifiers of all kinds."""
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from tests.blender import fingerprints, shots
+from tests.blender.grounds import plane
+
+
+@pytest.fixture
+def walk(scene):
+    """A short walk to be baked with coarse cells."""
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    return scene
+
+
+def field(scene, vertices=4, **values):
+    """A ground of a user's, coarse by default, that is the scene's."""
+    ground = scene.softground.ground = plane(scene, vertices=vertices, **values)
+    bpy.context.view_layer.objects.active = ground
+    bpy.context.view_layer.update()
+    return ground
+
+
+def refusal(operator):
+    with pytest.raises(RuntimeError) as error:
+        operator()
+    assert "Traceback" not in str(error.value)
+    return str(error.value)
+
+
+def as_rendered(ground):
+    """World positions of the ground's evaluated mesh, (V, 3), at the scene's frame."""
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.empty(len(shown.data.vertices) * 3, dtype=np.float32)
+    shown.data.vertices.foreach_get("co", points)
+    matrix = np.array(shown.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_a_ground_that_rigid_bodies_fall_on_gets_detail_and_comes_back(walk):
+    ground = field(walk)
+    bpy.ops.rigidbody.object_add(type="PASSIVE")
+    ground.rigid_body.friction = 0.75
+    before = fingerprints.of_file()
+    bodies = walk.rigidbody_world.collection
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    carrier = baked_ground.carrier_of(ground)
+    assert carrier != ground
+    assert ground_mesh.is_baked(carrier)
+    assert carrier.name in walk.objects
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert fingerprints.of_file() == before
+    assert list(bodies.objects) == [ground]
+    assert ground.rigid_body.friction == 0.75
+
+
+def test_a_bake_of_a_rigid_ground_that_is_stopped_leaves_no_draft(walk):
+    field(walk)
+    bpy.ops.rigidbody.object_add(type="PASSIVE")
+    before = fingerprints.of_file()
+    from softground_addon.blender.baking import bake_job
+
+    job = bake_job.bake(walk)
+    for progress in job:
+        if progress.stage == "write" and any("Trail" in thing.name for thing in bpy.data.objects):
+            break
+    else:
+        pytest.fail("no draft was made")
+    job.close()
+    assert fingerprints.of_file() == before
+
+
+def test_a_fine_copy_in_edit_mode_is_named_and_stays(walk):
+    ground = field(walk)
+    bpy.ops.softground.bake()
+    carrier = baked_ground.carrier_of(ground)
+    bpy.context.view_layer.objects.active = carrier
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert f"'{carrier.name}' is in Edit Mode: leave it" in refusal(bpy.ops.softground.bake)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+
+
+def node_group():
+    """An empty group of geometry nodes, with its input and output."""
+    tree = bpy.data.node_groups.new("Theirs", "GeometryNodeTree")
+    tree.is_modifier = True
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    return tree, tree.nodes.new("NodeGroupInput").outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0]
+
+
+def scatter_by_nodes(ground):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.05, location=(50.0, 0.0, 0.0))
+    tree, given, result = node_group()
+    stone = tree.nodes.new("GeometryNodeObjectInfo")
+    stone.inputs["Object"].default_value = bpy.context.object
+    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
+    points.inputs["Density"].default_value = 1.0
+    stones = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    both = tree.nodes.new("GeometryNodeJoinGeometry")
+    for one, other in (
+        (given, points.inputs["Mesh"]),
+        (points.outputs["Points"], stones.inputs["Points"]),
+        (stone.outputs["Geometry"], stones.inputs["Instance"]),
+        (given, both.inputs[0]),
+        (stones.outputs["Instances"], both.inputs[0]),
+        (both.outputs[0], result),
+    ):
+        tree.links.new(one, other)
+    ground.modifiers.new("Scatter", "NODES").node_group = tree
+
+
+def scatter_by_particles(ground):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.05, location=(50.0, 0.0, 0.0))
+    grains = ground.modifiers.new("Scatter", "PARTICLE_SYSTEM").particle_system.settings
+    grains.type, grains.count = "HAIR", 40
+    grains.render_type, grains.instance_object = "OBJECT", bpy.context.object
+
+
+def shown(thing):
+    """Whether an object's own mesh is in the viewport, and how many instances are on it."""
+    mesh, instances = False, 0
+    for one in bpy.context.evaluated_depsgraph_get().object_instances:
+        if one.is_instance:
+            instances += one.parent.original == thing
+        elif one.object.original == thing:
+            mesh = one.show_self
+    return mesh, instances
+
+
+@pytest.mark.parametrize("scatter", [scatter_by_nodes, scatter_by_particles])
+def test_what_is_scattered_on_a_ground_stays_while_a_copy_of_it_takes_the_prints(walk, scatter):
+    ground = field(walk)
+    scatter(ground)
+    bpy.context.view_layer.update()
+    mesh_is_shown, stones = shown(ground)
+    assert mesh_is_shown
+    assert stones > 20
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    carrier = baked_ground.carrier_of(ground)
+    assert shown(ground) == (False, stones)
+    assert shown(carrier) == (True, 0)
+    assert (ground.hide_render, ground.show_instancer_for_render) == (False, False)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert shown(ground) == (False, stones)
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert shown(ground) == (True, stones)
+    assert ground.show_instancer_for_render
+
+
+def test_a_scatter_that_renders_only_is_in_the_way_in_no_viewport(walk):
+    ground = field(walk)
+    scatter_by_nodes(ground)
+    ground.modifiers["Scatter"].show_viewport = False
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    assert (ground.hide_viewport, ground.hide_render) == (True, False)
+    assert (ground.show_instancer_for_viewport, ground.show_instancer_for_render) == (True, False)
+
+
+def test_what_collides_with_a_ground_collides_with_its_fine_copy(walk):
+    ground = field(walk)
+    ground.modifiers.new("Collision", "COLLISION")
+    ground.collision.damping_factor = 0.25
+    bpy.ops.softground.bake()
+    carrier = baked_ground.carrier_of(ground)
+    assert [modifier.type for modifier in carrier.modifiers] == ["NODES", "COLLISION"]
+    assert carrier.collision.damping_factor == 0.25
+    bpy.ops.softground.clear_bake()
+    assert ground.collision.damping_factor == 0.25
