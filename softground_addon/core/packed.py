@@ -14,8 +14,48 @@ LEVEL = 1
 """Of zlib: the higher ones take longer than looking at a footprint does, and gain little."""
 
 
+class PackedArray(Generic[Number]):
+    """An array that grows at its end, in compressed parts.
+
+    Parameters
+    ----------
+    first : (N, ...) array
+        Its first values, which all others are like.
+
+    Examples
+    --------
+    >>> steps = PackedArray(np.array([1, 2]))
+    >>> steps.extend(PackedArray(np.array([3])))
+    >>> steps.unpacked().tolist()
+    [1, 2, 3]
+    """
+
+    __slots__ = ("_kind", "_parts", "_row", "_size")
+
+    def __init__(self, first: NDArray[Number]) -> None:
+        self._kind, self._row, self._size = first.dtype, first.shape[1:], len(first)
+        self._parts = [zlib.compress(first.tobytes(), LEVEL)]
+
+    def __len__(self) -> int:
+        return self._size
+
+    def extend(self, more: PackedArray[Number]) -> None:
+        """Grow by another array of the same kind."""
+        self._parts += more._parts
+        self._size += len(more)
+
+    def unpacked(self) -> NDArray[Number]:
+        """The array as a new one."""
+        whole = np.empty((self._size, *self._row), self._kind)
+        content, first = whole.reshape(-1).view(np.uint8), 0
+        for part in map(zlib.decompress, self._parts):
+            content[first : first + len(part)] = np.frombuffer(part, np.uint8)
+            first += len(part)
+        return whole
+
+
 class Packed(Generic[Number]):
-    """A field of a dataclass: an array (N,) that is kept compressed, and unpacked each time that it is looked at.
+    """A field of a dataclass: an array that is packed, and unpacked each time that it is looked at.
 
     Examples
     --------
@@ -37,9 +77,7 @@ class Packed(Generic[Number]):
     def __get__(self, holder: object | None, owner: type) -> Any:
         if holder is None:
             raise AttributeError("a field without a default")  # which is what a dataclass looks for here
-        kind, packed = getattr(holder, self._name)
-        return np.frombuffer(zlib.decompress(packed), kind)
+        return getattr(holder, self._name).unpacked()
 
     def __set__(self, holder: object, values: NDArray[Number]) -> None:
-        packed = zlib.compress(values.tobytes(), LEVEL)
-        object.__setattr__(holder, self._name, (values.dtype, packed))
+        object.__setattr__(holder, self._name, PackedArray(values))

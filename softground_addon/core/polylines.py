@@ -2,14 +2,14 @@
 
 Between two points all is linear; where something jumps, two points share a frame. The pressure of a contact, which
 timelines tell by its frames and its peak, becomes points too. Some thirty places lie end to end on one: fewer polylines
-are looked up faster. They are made part by part of the ground, so that only what is kept of them takes memory
-everywhere at once.
+are looked up faster. They are made part by part of the ground and packed, so that little takes memory everywhere at
+once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .footprints import Footprint
 from .heightfield import SparseGrid
 from .histories import Histories, histories
+from .packed import PackedArray
 from .ramps import TOLERANCE
 from .timelines import NO_VISIT, Timelines, timelines
 
@@ -53,16 +54,16 @@ class Polylines:
     ----------
     size : (S,) int array
         Points of each polyline.
-    position : (R, 3) float32 array
+    position : (R, 3) packed float32 array
         Time along the polyline [frames]; change of the displayed height, and displayed compression [m], both times
         `NARROW`.
-    contact : (R,) float32 array
+    contact : (R,) packed float32 array
         While a contact lasts its pressure [Pa], after it minus the time since [s], before the first -`NO_VISIT`.
     """
 
     size: Indices
-    position: Floats
-    contact: Floats
+    position: PackedArray[np.float32]
+    contact: PackedArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -122,28 +123,29 @@ def polylines_at(
     time_stretch : float
         Frames of the polylines for each frame of the footprints.
     """
-    sizes, count, error = [np.zeros(0, dtype=np.intp)], 0, 0.0
-    whole: dict[str, tuple[type, bytearray]] = {
-        name: (kind, bytearray())
-        for kind, names in (
-            (np.intp, ("point",)),
-            (np.int32, ("polyline",)),
-            (np.float32, ("start", "end", "offset", "last_height", "last_contact", "position", "contact")),
-        )
-        for name in names
-    }  # grown in place: put together at the end, everything would be there twice
+    nowhere = np.zeros(0, dtype=np.intp)
+    nothing = np.zeros(0, dtype=np.float32)
+    sizes, count, error = [nowhere], 0, 0.0
+    whole: dict[str, PackedArray[Any]] = {
+        "point": PackedArray(nowhere),
+        "polyline": PackedArray(nowhere.astype(np.int32)),
+        **{name: PackedArray(nothing) for name in ("start", "end", "offset", "last_height", "last_contact")},
+    }
+    position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
     for places in _parts(footprints, x, y):
         over_time = histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance)
         spans, lines = polylines(over_time.stretched(time_stretch), frame_rate * time_stretch)
-        part = vars(spans) | vars(lines) | {"point": places[spans.point], "polyline": spans.polyline + count}
-        for name, (kind, grown) in whole.items():
-            grown.extend(part[name].astype(kind, copy=False).tobytes())
+        part = replace(spans, point=places[spans.point], polyline=spans.polyline + np.int32(count))
+        for name, packed in whole.items():
+            packed.extend(PackedArray(getattr(part, name)))
+        position.extend(lines.position)
+        contact.extend(lines.contact)
         sizes.append(lines.size)
         count += len(lines.size)
         error = max(error, spans.error)
-    arrays: dict[str, NDArray[Any]] = {name: np.frombuffer(grown, kind) for name, (kind, grown) in whole.items()}
-    lines = Polylines(np.concatenate(sizes), arrays.pop("position").reshape(-1, 3), arrays.pop("contact"))
-    return Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error), lines
+    arrays: dict[str, NDArray[Any]] = {name: packed.unpacked() for name, packed in whole.items()}
+    spans = Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error)
+    return spans, Polylines(np.concatenate(sizes), position, contact)
 
 
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
@@ -167,7 +169,7 @@ def polylines(over_time: Histories, frame_rate: float) -> tuple[Spans, Polylines
     >>> from softground_addon.core.ramps import Ramps
     >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
     >>> spans, lines = polylines(Histories(Ramps.joined([], 2), visits, 0.0), 24.0)
-    >>> spans.start.tolist(), lines.position[:, 0].tolist(), lines.contact.tolist()
+    >>> spans.start.tolist(), lines.position.unpacked()[:, 0].tolist(), lines.contact.unpacked().tolist()
     ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
     """
     table = timelines(over_time)
@@ -200,7 +202,8 @@ def polylines(over_time: Histories, frame_rate: float) -> tuple[Spans, Polylines
         error=over_time.error,
     )
     sizes = np.bincount(polyline, size).astype(np.intp)
-    return spans, Polylines(sizes, position, _contact(table, rows, when, frame_rate))
+    contact = _contact(table, rows, when, frame_rate)
+    return spans, Polylines(sizes, PackedArray(position), PackedArray(contact))
 
 
 def _end_to_end(length: Array) -> tuple[Indices, Array]:

@@ -174,8 +174,8 @@ def _table_object(lines: Polylines) -> bpy.types.Object:
     if len(lines.size):
         splines.add_curves(lines.size.tolist())
         position: Any = splines.attributes["position"]
-        position.data.foreach_set("vector", lines.position.ravel())
-    _store(splines, nodes.CONTACT, "FLOAT", lines.contact)
+        position.data.foreach_set("vector", lines.position.unpacked().ravel())
+    _store(splines, nodes.CONTACT, "FLOAT", lines.contact.unpacked())
     if len(lines.size):
         straighten(splines)
     return bpy.data.objects.new(TABLE, splines)
