@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Euler
 
-from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh
+from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh, still_ground
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground_plan import GroundPlan
@@ -181,7 +181,7 @@ def test_an_unusable_ground_is_named_with_the_remedy(scene, spoil, remedy):
 def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is_shown(scene):
     ground = grid(scene, spacing=0.1)
     wave = ground.modifiers.new("Swell", "WAVE")
-    assert ground_checks.changes_with_time(ground) == "Swell"
+    assert still_ground.changes_with_time(ground) == "Swell"
     scene.softground.frame_start = 40
     scene.frame_set(40)
     shown = world(ground.evaluated_get(bpy.context.evaluated_depsgraph_get()))
@@ -191,4 +191,4 @@ def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is
         np.testing.assert_allclose(taken, shown, atol=1e-6)
     assert np.ptp(shown[:, 2]) > 0.1
     wave.show_viewport = False
-    assert not ground_checks.changes_with_time(ground)
+    assert not still_ground.changes_with_time(ground)

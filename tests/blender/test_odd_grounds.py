@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -175,3 +176,107 @@ def test_what_collides_with_a_ground_collides_with_its_fine_copy(walk):
     assert carrier.collision.damping_factor == 0.25
     bpy.ops.softground.clear_bake()
     assert ground.collision.damping_factor == 0.25
+
+
+def mover(scene, name="Lift"):
+    """An empty that goes up."""
+    empty = bpy.data.objects.new(name, None)
+    scene.collection.objects.link(empty)
+    for frame, height in ((1, 0.0), (30, 1.0)):
+        empty.location.z = height
+        empty.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    return empty
+
+
+def constrain(ground, scene):
+    ground.constraints.new("COPY_LOCATION").target = mover(scene)
+
+
+def constrain_parent(ground, scene):
+    ground.parent = bpy.data.objects.new("Platform", None)
+    scene.collection.objects.link(ground.parent)
+    ground.parent.constraints.new("CHILD_OF").target = mover(scene)
+
+
+def turn_by_driver(ground, _scene):
+    ground.driver_add("rotation_euler", 2).driver.expression = "frame * 0.01"
+
+
+@pytest.mark.parametrize(
+    ("let_move", "name"), [(constrain, "Lift"), (constrain_parent, "Lift"), (turn_by_driver, "Field")]
+)
+def test_a_ground_that_something_moves_is_named_with_what_moves_it(walk, let_move, name):
+    ground = field(walk)
+    let_move(ground, walk)
+    bpy.context.view_layer.update()
+    assert f"Ground 'Field' moves: '{name}' is animated" in refusal(bpy.ops.softground.bake)
+    for constraint in (*ground.constraints, *(ground.parent.constraints if ground.parent else ())):
+        constraint.mute = True
+        assert bpy.ops.softground.bake() == {"FINISHED"}
+
+
+def test_keys_that_move_nothing_are_no_movement(walk):
+    ground = field(walk, vertices=120)
+    ground["mood"] = 1.0
+    ground.keyframe_insert('["mood"]', frame=1)
+    ground.keyframe_insert("hide_render", frame=1)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert not ground_mesh.warnings_of(ground)
+
+
+def test_a_coarse_ground_that_keys_show_and_hide_is_named_with_the_remedy(walk):
+    ground = field(walk)
+    ground.keyframe_insert("hide_render", frame=1)
+    before = fingerprints.of_file()
+    assert "Ground 'Field' is hidden and shown by keys" in refusal(bpy.ops.softground.bake)
+    assert fingerprints.of_file() == before
+
+
+def lift_by_scene_time(ground, _scene):
+    tree, given, result = node_group()
+    inner, inner_given, inner_result = node_group()
+    place, time, up = (
+        inner.nodes.new(kind)
+        for kind in ("GeometryNodeSetPosition", "GeometryNodeInputSceneTime", "ShaderNodeCombineXYZ")
+    )
+    for one, other in (
+        (inner_given, place.inputs["Geometry"]),
+        (time.outputs["Seconds"], up.inputs["Z"]),
+        (up.outputs[0], place.inputs["Offset"]),
+        (place.outputs[0], inner_result),
+    ):
+        inner.links.new(one, other)
+    nested = tree.nodes.new("GeometryNodeGroup")
+    nested.node_tree = inner
+    tree.links.new(given, nested.inputs[0])
+    tree.links.new(nested.outputs[0], result)
+    ground.modifiers.new("Theirs", "NODES").node_group = tree
+
+
+def hook(ground, scene):
+    modifier = ground.modifiers.new("Theirs", "HOOK")
+    modifier.object = mover(scene)
+    modifier.vertex_indices_set([0, 1])
+
+
+def grow_by_keys(ground, scene):
+    modifier = ground.modifiers.new("Theirs", "DISPLACE")
+    modifier.mid_level = 0.0
+    for frame, strength in ((1, 0.0), (30, 0.2)):
+        modifier.strength = strength
+        modifier.keyframe_insert("strength", frame=frame)
+    scene.frame_set(1)
+
+
+@pytest.mark.parametrize("change", [lift_by_scene_time, hook, grow_by_keys])
+def test_a_ground_that_anything_shapes_over_time_is_told_of_and_up_to_date_at_every_frame(walk, change):
+    ground = field(walk, vertices=120)
+    change(ground, walk)
+    bpy.context.view_layer.update()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    (warning,) = ground_mesh.warnings_of(baked_ground.carrier_of(ground))
+    assert "'Field' changes its shape over time by its modifier 'Theirs'" in warning
+    for frame in (1, 20):
+        walk.frame_set(frame)
+        assert bake_report.stale_reasons(walk) == ()

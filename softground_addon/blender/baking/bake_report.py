@@ -16,7 +16,7 @@ from ...core.simulation import CharacterLoads
 from ...core.sliding import treadmill_speed
 from .. import properties, settings
 from ..characters.character_setup import characters_of, mapping_of, title_of
-from ..ground import ground_checks
+from ..ground import still_ground
 from ..jobs import STAGES
 from ..reading import staleness
 from ..response import response_job
@@ -89,7 +89,7 @@ def warnings(
 
 def ground_warnings(ground: bpy.types.Object | None, frame: int) -> list[str]:
     """What the user should know of a ground that changes its shape over time, taken at a frame, with the remedy."""
-    modifier = ground_checks.changes_with_time(ground) if ground else ""
+    modifier = still_ground.changes_with_time(ground) if ground else ""
     if not (ground and modifier):
         return []
     return [

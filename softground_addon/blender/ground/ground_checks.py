@@ -1,14 +1,11 @@
-"""Whether a mesh can be the ground: what keeps it from taking a bake, and what the user should know of it."""
+"""Whether a mesh can be the ground: what keeps it from taking a bake, and what to do about that."""
 
 from __future__ import annotations
 
 import bpy
 
 from ...core.errors import InputError
-from . import ground_mesh, trail_detail
-
-TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
-"""Modifiers that change a mesh from frame to frame with nothing keyed."""
+from . import ground_mesh, still_ground, trail_detail
 
 
 def check_writable(ground: bpy.types.Object) -> None:
@@ -45,26 +42,9 @@ def check_usable(ground: bpy.types.Object) -> None:
         )
     if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
         raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")
-    moved_by = _what_moves(ground)
-    if moved_by:
+    mover = still_ground.mover_of(ground)
+    if mover:
         raise InputError(
-            f"Ground '{name}' moves: {moved_by} is animated. Only ground that stands still takes prints: take the "
+            f"Ground '{name}' moves: '{mover.name}' is animated. Only ground that stands still takes prints: take the "
             "keys and drivers off it, or choose a copy without them."
         )
-
-
-def changes_with_time(ground: bpy.types.Object) -> str:
-    """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
-    theirs = (item for item in ground.modifiers if item not in ground_mesh.own_modifiers(ground))
-    return next((item.name for item in theirs if item.show_viewport and item.type in TIME_DEPENDENT), "")
-
-
-def _what_moves(ground: bpy.types.Object) -> str:
-    """Name of the object whose animation moves the ground, or an empty text."""
-    node: bpy.types.Object | None = ground
-    while node:
-        animation = node.animation_data
-        if animation and (animation.action or animation.drivers or any(not t.mute for t in animation.nla_tracks)):
-            return f"'{node.name}'"
-        node = node.parent
-    return ""

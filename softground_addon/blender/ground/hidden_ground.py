@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import bpy
 
+from ..animation_layer.nla_layer import animated_paths
 from . import ground_mesh
 
 WAS_HIDDEN = "softground_was_hidden"
@@ -18,6 +19,11 @@ _BY_DEFAULT = (False, False, True, True)
 def hides(ground: bpy.types.Object) -> bool:
     """Whether the ground is hidden in favour of a copy."""
     return WAS_HIDDEN in ground.keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def may_hide(ground: bpy.types.Object) -> bool:
+    """Whether the ground stays hidden once it is, with nothing that shows it again at another frame."""
+    return not any(path in _SHOWN for path, _ in animated_paths(ground))
 
 
 def hide(ground: bpy.types.Object) -> None:

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.cell_keys import Keys, keys_of
+from ...core.errors import InputError
 from ...core.refinement import Refinement, Surface
 from ...core.region import Region
 from . import ground_mesh, playback, refined_mesh
-from .hidden_ground import hide, hides, show_again
+from .hidden_ground import hide, hides, may_hide, show_again
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,18 @@ def surface_of(ground: bpy.types.Object, unit_scale: float) -> Surface:
 
 @contextmanager
 def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) -> Iterator[bpy.types.Object]:
-    """The refined ground as an object that is in no scene yet; one that is not published is taken away at the end."""
+    """The refined ground as an object that is in no scene yet; one that is not published is taken away at the end.
+
+    Raises
+    ------
+    InputError
+        If the ground could not be hidden.
+    """
+    if not may_hide(ground):
+        raise InputError(
+            f"Ground '{ground.name}' is hidden and shown by keys or drivers, and would come to light beside the finer "
+            "copy that takes the prints: take them off, or Subdivide the ground so that it needs no copy."
+        )
     with ground_mesh.undisturbed_copy(ground) as source:
         groups = [group.name for group in ground.vertex_groups]
         mesh: Any = refined_mesh.build(f"{ground.name} Trail", source, surface, refinement, groups)

@@ -10,7 +10,7 @@ from ...core.cell_limits import BYTES_PER_CELL
 from ...core.motion import JOINTS
 from .. import session, settings
 from ..characters.character_setup import is_set_up, is_thing
-from ..ground import baked_ground, ground_checks, ground_mesh
+from ..ground import baked_ground, ground_mesh, still_ground
 from ..translation import iface_
 from . import bake_result, forecast
 from .character_editing import active_character, active_sole
@@ -316,7 +316,7 @@ class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
 
 def _changing_ground(layout: Any, options: Any) -> None:
     """Which frame's shape is taken of a ground that changes over time."""
-    modifier = ground_checks.changes_with_time(options.ground)
+    modifier = still_ground.changes_with_time(options.ground)
     if modifier:
         box = layout.box().column(align=True)
         box.label(text=iface_("'{modifier}' changes its shape").format(modifier=modifier), icon="INFO", translate=False)

@@ -126,7 +126,7 @@ def of_keys(thing: bpy.types.Object) -> str:
 
 def of_animation(thing: bpy.types.Object) -> str:
     """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones."""
-    animated = {path for path, _ in _animated(thing)}
+    animated = animated_paths_of(thing)
     told: list[str] = [thing.rotation_mode]
     animation = thing.animation_data
     if animation is not None:
@@ -185,6 +185,11 @@ def _plain(value: Any) -> str:
     if isinstance(value, bool):
         return str(int(value))
     return str([_plain(part) for part in value] if hasattr(value, "__len__") and not isinstance(value, str) else value)
+
+
+def animated_paths_of(thing: bpy.types.Object) -> set[str]:
+    """Data paths that something sets at each frame."""
+    return {path for path, _ in _animated(thing)}
 
 
 def _animated(thing: bpy.types.Object) -> set[tuple[str, int]]:
@@ -252,7 +257,7 @@ def _value_of(target: Any) -> str:
     path = target.data_path
     if not path.endswith('"]') or not target.id:
         return ""
-    if isinstance(target.id, bpy.types.Object) and path in {path for path, _ in _animated(target.id)}:
+    if isinstance(target.id, bpy.types.Object) and path in animated_paths_of(target.id):
         return ""
     try:
         return _plain(target.id.path_resolve(path))

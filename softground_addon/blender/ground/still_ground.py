@@ -1,0 +1,72 @@
+"""Whether a ground stands still: what moves it, and what gives it another shape from frame to frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..animation_layer.nla_layer import animated_paths
+from ..compat import node_inputs
+from . import ground_mesh
+
+TIME_DEPENDENT = ("BUILD", "CLOTH", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "SOFT_BODY", "WAVE")
+"""Modifiers that change a mesh from frame to frame with nothing keyed."""
+
+TIME_NODES = ("GeometryNodeInputSceneTime", "GeometryNodeSimulationInput")
+
+_PLACING = ("location", "rotation_", "scale", "delta_", "constraints[", "matrix_")
+"""How the paths of what places an object begin."""
+
+
+def mover_of(thing: bpy.types.Object) -> bpy.types.Object | None:
+    """The object whose animation moves an object: itself, a parent, or what it or a parent is constrained to."""
+    waiting, known = [thing], set()
+    while waiting:
+        node = waiting.pop(0)
+        if node in known:
+            continue
+        known.add(node)
+        # A parent or target may move what hangs on its bones or vertices without moving itself.
+        paths = (path for path, _ in animated_paths(node) if node.type == "ARMATURE" or path.startswith(_PLACING))
+        if any(paths):
+            return node
+        constraints: list[Any] = [one for one in node.constraints if not one.mute and one.influence]
+        followed = [getattr(one, "target", None) for one in constraints]
+        followed += [one.target for constraint in constraints for one in getattr(constraint, "targets", ())]
+        waiting += filter(None, (node.parent, *followed))
+    return None
+
+
+def changes_with_time(ground: bpy.types.Object) -> str:
+    """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
+    own = ground_mesh.own_modifiers(ground)
+    theirs = [item for item in ground.modifiers if item.show_viewport and item not in own]
+    keyed = tuple(path for path, _ in animated_paths(ground))
+    return next((item.name for item in theirs if _changes(item, ground, keyed)), "")
+
+
+def _changes(modifier: Any, ground: bpy.types.Object, keyed: tuple[str, ...]) -> bool:
+    path = modifier.path_from_id()
+    if modifier.type in TIME_DEPENDENT or any(one.startswith(path) for one in keyed):
+        return True
+    inputs = [value for _, value in node_inputs(modifier)] if modifier.type == "NODES" else []
+    tree = modifier.node_group if modifier.type == "NODES" else None
+    nodes = list(_nodes_of(tree, set())) if tree else []
+    if any(node.bl_idname in TIME_NODES for node in nodes):
+        return True
+    settings = (one.identifier for one in modifier.bl_rna.properties if one.type == "POINTER")
+    inputs += [getattr(modifier, name) for name in settings]
+    inputs += [socket.default_value for node in nodes for socket in node.inputs if socket.type == "OBJECT"]
+    followed = [one for one in inputs if isinstance(one, bpy.types.Object) and one != ground]
+    return any(mover_of(one) for one in followed)
+
+
+def _nodes_of(tree: Any, known: set[Any]) -> Any:
+    """The nodes of a group and of all groups within."""
+    known.add(tree)
+    for node in tree.nodes:
+        yield node
+        inner = getattr(node, "node_tree", None)
+        if inner is not None and inner not in known:
+            yield from _nodes_of(inner, known)
