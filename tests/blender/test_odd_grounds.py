@@ -280,3 +280,62 @@ def test_a_ground_that_anything_shapes_over_time_is_told_of_and_up_to_date_at_ev
     for frame in (1, 20):
         walk.frame_set(frame)
         assert bake_report.stale_reasons(walk) == ()
+
+
+def overhead(scene):
+    ground = field(scene)
+    ground.location.z = 5.0
+    return ground
+
+
+def room(scene):
+    """A box with its faces to the outside, as Blender adds it."""
+    bpy.ops.mesh.primitive_cube_add(size=8.0, location=(0.0, 0.0, 4.0))
+    scene.softground.ground = bpy.context.object
+    return bpy.context.object
+
+
+@pytest.mark.parametrize(("build", "depth"), [(overhead, "5"), (room, "8")])
+def test_a_ground_above_the_feet_is_named_with_the_remedy(walk, build, depth):
+    ground = build(walk)
+    bpy.context.view_layer.update()
+    said = refusal(bpy.ops.softground.bake)
+    assert f"The feet of 'Walker' are {depth} m below '{ground.name}': move the ground down" in said
+    assert "Recalculate Inside" in said
+
+
+def test_a_room_with_its_faces_inward_takes_prints_on_its_floor(walk):
+    ground = room(walk)
+    ground.data.flip_normals()
+    bpy.context.view_layer.update()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    walk.frame_set(30)
+    height = as_rendered(baked_ground.carrier_of(ground))[:, 2]
+    assert -0.1 < height.min() < -0.02
+
+
+def test_a_file_path_is_the_same_wherever_the_blend_is_saved(walk, tmp_path):
+    ground = field(walk)
+    ocean = ground.modifiers.new("Swell", "OCEAN")
+    ocean.geometry_mode, ocean.wave_scale = "GENERATE", 0.1
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "shot.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        assert bake_report.stale_reasons(bpy.context.scene) == ()
+
+
+def test_a_carrier_whose_playback_was_applied_is_no_longer_up_to_date(walk):
+    walk.softground.shape_keys = False
+    ground = field(walk)
+    bpy.ops.softground.bake()
+    assert bake_report.stale_reasons(walk) == ()
+    carrier = baked_ground.carrier_of(ground)
+    walk.frame_set(12)
+    with bpy.context.temp_override(object=carrier, active_object=carrier):
+        bpy.ops.object.modifier_apply(modifier="SoftGround Playback")
+    assert bake_report.stale_reasons(walk) == ("'Field Trail' has lost its playback, and shows one moment only",)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert bake_report.stale_reasons(walk) == ()

@@ -163,6 +163,8 @@ def of_settings(owner: Any, animated: Collection[str] = ()) -> Iterator[str]:
                 yield from of_settings(target, animated)
         elif setting.type != "COLLECTION" and not setting.is_readonly and f"{path}.{name}" not in animated:
             value = getattr(owner, name)
+            if setting.subtype in ("FILE_PATH", "DIR_PATH"):
+                value = bpy.path.basename(value)  # where it is changes with the place of the .blend
             if isinstance(value, bpy.types.Texture):
                 yield from of_settings(value)
             elif setting.type != "POINTER" or isinstance(value, bpy.types.ID):

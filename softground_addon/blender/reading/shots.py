@@ -106,7 +106,7 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
 
 
 def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
-    """Raise InputError if nothing touches the ground of that name, or where it has two layers under a foot."""
+    """Raise InputError if nothing touches the ground of that name, or it lies overhead or in layers under a foot."""
     place = np.concatenate(
         [
             sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
@@ -121,6 +121,14 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
             f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
             "feet in the Character panel."
         )
+    for character in loads:
+        contacts, leg = character.contacts, character.motion.leg_length
+        below = -(contacts.clearance + contacts.offset)[contacts.touching]
+        if len(below) and (depth := float(np.median(below))) > leg:
+            raise InputError(
+                f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
+                "Where it is a room, let its faces look inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
+            )
     if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
         raise InputError(
             f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "

@@ -63,6 +63,8 @@ def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, 
         return ()
     if edited := next((thing for thing in (ground, carrier, *_bodies_of(scene)) if thing.mode == "EDIT"), None):
         return (f"'{edited.name}' is in Edit Mode",)
+    if playback.modifier_of(carrier) is None:
+        return (f"'{carrier.name}' has lost its playback, and shows one moment only",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
         now = _fingerprints(inputs, scene, of_movers(scene))
