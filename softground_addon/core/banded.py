@@ -60,24 +60,15 @@ def _reduce(diagonal: Array, coupling: Array, right: Array) -> Array:
     if blocks == 1:
         return _eliminate(diagonal, right)
     odd, last = blocks // 2, (blocks - 1) // 2  # odd blocks; those of them that have a block after them
-    before, after = coupling[..., ::2], coupling[..., 1::2]
     # Each odd block as a function of its even neighbours: x = constant - from_before·x[i-1] - from_after·x[i+1].
     sides = np.zeros((size, 2 * size + columns, odd))
-    sides[:, :size] = before.swapaxes(0, 1)
-    sides[:, size : 2 * size, :last] = after
+    sides[:, :size] = coupling[..., ::2].swapaxes(0, 1)
+    sides[:, size : 2 * size, :last] = coupling[..., 1::2]
     sides[:, 2 * size :] = right[..., 1::2]
     eliminated = _eliminate(diagonal[..., 1::2], sides)
+    even = _reduce(*_without_odd(diagonal, coupling, right, eliminated))
+
     from_before, from_after, constant = np.split(eliminated, (size, 2 * size), axis=1)
-
-    even_diagonal, even_right = diagonal[..., ::2].copy(), right[..., ::2].copy()
-    forward = _product(before, eliminated)
-    even_diagonal[..., :odd] -= forward[:, :size]
-    even_right[..., :odd] -= forward[:, 2 * size :]
-    backward = _product(after.swapaxes(0, 1), eliminated[:, size:, :last])
-    even_diagonal[..., 1:] -= backward[:, :size]
-    even_right[..., 1:] -= backward[:, size:]
-    even = _reduce(even_diagonal, -forward[:, size : 2 * size, :last], even_right)
-
     solution = np.empty_like(right)
     solution[..., ::2] = even
     solution[..., 1::2] = constant - _product(from_before, even[..., :odd])
@@ -85,9 +76,22 @@ def _reduce(diagonal: Array, coupling: Array, right: Array) -> Array:
     return solution
 
 
+def _without_odd(diagonal: Array, coupling: Array, right: Array, eliminated: Array) -> tuple[Array, Array, Array]:
+    """The system of the even blocks alone: its diagonal, coupling and right side."""
+    size, odd, last = len(diagonal), eliminated.shape[-1], coupling[..., 1::2].shape[-1]
+    diagonal, right = diagonal[..., ::2].copy(), right[..., ::2].copy()
+    forward = _product(coupling[..., ::2], eliminated)
+    diagonal[..., :odd] -= forward[:, :size]
+    right[..., :odd] -= forward[:, 2 * size :]
+    backward = _product(coupling[..., 1::2].swapaxes(0, 1), eliminated[:, size:, :last])
+    diagonal[..., 1:] -= backward[:, :size]
+    right[..., 1:] -= backward[:, size:]
+    return diagonal, -forward[:, size : 2 * size, :last], right
+
+
 def _eliminate(matrix: Array, right: Array) -> Array:
-    """Solve (K, K, M) matrices for (K, C, M) right sides by Gaussian elimination; definite ones need no pivots."""
-    matrix, solution = matrix.copy(), right.copy()
+    """Solve (K, K, M) matrices for (K, C, M) right sides, in place of these; definite ones need no pivots."""
+    matrix, solution = matrix.copy(), right
     size = len(matrix)
     for i in range(size):
         factor = matrix[i + 1 :, i] / matrix[i, i]

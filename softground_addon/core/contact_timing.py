@@ -54,6 +54,8 @@ COARSE_STRIDE = 3
 """Steps between the times that are tried first."""
 WINDOW_UNIT = 8
 """Steps to a whole number of which a transition's window is extended, so that many are fitted at once."""
+AT_ONCE = 32
+"""Transitions that are fitted at once: a thousand ramps are tried on each."""
 
 
 @dataclass(frozen=True)
@@ -262,10 +264,10 @@ def _fit_overlaps(
     fitted = found.copy()
     # Those whose windows are about as long are fitted together.
     width = -(-(end - begin) // WINDOW_UNIT) * WINDOW_UNIT
-    for steps in np.unique(width):
-        some = np.flatnonzero(width == steps)
+    alike = [np.flatnonzero(width == steps) for steps in np.unique(width)]
+    for some in (part for group in alike for part in np.split(group, range(AT_ONCE, len(group), AT_ONCE))):
         feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
-        windows = _Windows(found[some], feet, begin[some, None] + np.arange(steps), end[some])
+        windows = _Windows(found[some], feet, begin[some, None] + np.arange(width[some[0]]), end[some])
         share, telling = _shares_told(windows, lowest, extent, body, unit)
         fitted[some] = _best_ramps(windows, share, telling, unit)
     return fitted

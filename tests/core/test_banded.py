@@ -1,5 +1,7 @@
 """Banded systems against scipy's dense solver and a closed form."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -50,3 +52,16 @@ def test_the_inputs_are_left_as_they_were():
     solve_banded(band, right)
     assert np.array_equal(band, before[0])
     assert np.array_equal(right, before[1])
+
+
+def test_solving_takes_a_few_times_the_memory_of_the_system():
+    count, reach = 30_000, 3
+    band, right = np.zeros((reach + 1, count)), np.ones((count, 3))
+    band[0], band[1] = 2.0, -1.0
+    tracemalloc.start()
+    try:
+        solve_banded(band, right)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 6 * (band.nbytes + right.nbytes)
