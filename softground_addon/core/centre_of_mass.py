@@ -185,15 +185,19 @@ def fitted_to_free_fall(
     deviation = _FRACTION_DEVIATION * prior
     excess = accelerations / gravity + (0.0, 0.0, 1.0)
     rows = np.moveaxis(excess, 1, -1).reshape(-1, len(prior))
-    # Least squares for the changes in deviations, under the condition that they sum to 0 (its own last equation).
-    system = np.zeros((len(prior) + 1, len(prior) + 1))
     row_deviation = _FALL_DEVIATION / np.sqrt(independent)
     scaled = rows * deviation / row_deviation
-    system[:-1, :-1] = scaled.T @ scaled + np.eye(len(prior))
-    system[:-1, -1] = system[-1, :-1] = deviation
-    right = np.append(-scaled.T @ (rows @ prior) / row_deviation, 0.0)
-    change = np.linalg.solve(system, right)[:-1]
-    misfit = (((rows @ prior) / row_deviation + scaled @ change) ** 2).sum() + (change**2).sum()
+    # `solve`, and `@` with a vector, would wake the threads of the BLAS library, which cost more than they save here.
+    missed = np.einsum("rp,p->r", rows, prior) / row_deviation
+    pull = -np.einsum("rp,r->p", scaled, missed)
+    # Least squares for the changes in deviations, the table being one more row for each of them.
+    stiffness, modes = np.linalg.eigh(scaled.T @ scaled + np.eye(len(prior)))
+    flexibility = (modes / stiffness) @ modes.T
+    # The force of a constraint keeps the sum of the fractions.
+    along = flexibility @ deviation
+    change = flexibility @ pull
+    change -= along * (deviation @ change) / (deviation @ along)
+    misfit = ((missed + np.einsum("rp,p->r", scaled, change)) ** 2).sum() + (change**2).sum()
     fractions = points.fractions * (np.maximum(prior + deviation * change, 0.0) / prior)[points.parts]
     return MassPoints(points.positions, fractions / fractions.sum(), points.parts), float(misfit)
 
