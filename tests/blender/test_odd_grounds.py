@@ -339,3 +339,56 @@ def test_a_carrier_whose_playback_was_applied_is_no_longer_up_to_date(walk):
     assert bake_report.stale_reasons(walk) == ("'Field Trail' has lost its playback, and shows one moment only",)
     assert bpy.ops.softground.bake() == {"FINISHED"}
     assert bake_report.stale_reasons(walk) == ()
+
+
+@pytest.fixture
+def shrinkwrapped(walk):
+    """A fine grid that a Shrinkwrap lays onto a coarse hill, wherever its vertices are."""
+    hill = plane(walk, vertices=40, height=lambda x, y: 0.05 * np.sin(2 * x))
+    hill.name, hill.hide_render = "Hill", True
+    ground = field(walk, vertices=200, size=6.0)
+    wrap = ground.modifiers.new("Wrap", "SHRINKWRAP")
+    wrap.target, wrap.wrap_method, wrap.use_project_z, wrap.use_negative_direction = hill, "PROJECT", True, True
+    ground.location.z = 0.5
+    bpy.context.view_layer.update()
+    return ground
+
+
+def test_prints_that_modifiers_would_undo_are_taken_by_a_copy_without_them(walk, shrinkwrapped):
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    carrier = baked_ground.carrier_of(shrinkwrapped)
+    assert carrier != shrinkwrapped
+    walk.frame_set(1)
+    before = as_rendered(carrier)[:, 2]
+    walk.frame_set(30)
+    assert -0.1 < (as_rendered(carrier)[:, 2] - before).min() < -0.02
+    (warning,) = ground_mesh.warnings_of(carrier)
+    assert "The modifiers of ground 'Field' undo prints on it" in warning
+
+
+def test_prints_that_modifiers_would_undo_are_refused_where_there_may_be_no_copy(walk, shrinkwrapped):
+    walk.softground.detail = "NEVER"
+    assert "ground 'Field' would not show, as its modifiers undo them" in refusal(bpy.ops.softground.bake)
+
+
+def test_live_prints_show_where_modifiers_would_undo_them(walk, shrinkwrapped):
+    bpy.ops.softground.live()
+    try:
+        carrier = baked_ground.carrier_of(shrinkwrapped)
+        before = as_rendered(carrier)[:, 2]
+        walk.frame_set(15)
+        assert -0.1 < (as_rendered(carrier)[:, 2] - before).min() < -0.02
+    finally:
+        bpy.ops.softground.live()
+
+
+@pytest.mark.parametrize("kind", ["SUBSURF", "DISPLACE", "SOLIDIFY", "SMOOTH", "WAVE"])
+def test_modifiers_that_let_prints_through_stay_on_the_ground(walk, kind):
+    ground = field(walk, vertices=200, size=6.0)
+    ground.scale = (1.0, -1.0, 1.0)
+    modifier = ground.modifiers.new("Theirs", kind)
+    if kind == "DISPLACE":
+        modifier.strength, modifier.mid_level = 0.05, 0.0
+    bpy.context.view_layer.update()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert baked_ground.carrier_of(ground) == ground

@@ -31,6 +31,7 @@ from .. import settings
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
 from ..ground.materials import drafted
+from ..ground.modified_prints import are_undone, undone_warning
 from ..jobs import Job, Progress, aside
 from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
@@ -249,7 +250,10 @@ def _given(
     cover = yield from aside("write", 0.2, coverage, vertices, index, trail.printed, cell_size)
     warnings = coverage_warnings(ground, cover, options.detail, cell_size)
     if not wants_detail(ground, cover, options.detail, cell_size, sole_length):
-        return baked_ground.on_itself(ground, index, vertices), warnings
+        unit_scale = scene.unit_settings.scale_length
+        if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=options.detail):
+            return baked_ground.on_itself(ground, index, vertices), warnings
+        warnings = [*warnings, undone_warning(ground)]
     coarse = trail_detail.surface_of(ground, scene.unit_settings.scale_length)
     refinement = yield from aside("write", 0.3, refine, coarse, Region(trail.moved, cell_size), cell_size)
     draft = drafts.enter_context(trail_detail.draft(ground, coarse, refinement))

@@ -198,11 +198,18 @@ def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> It
 
 
 @contextmanager
-def undisturbed_copy(ground: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake."""
+def undisturbed_copy(
+    ground: bpy.types.Object, moved: Indices | None = None, by: Array | None = None
+) -> Iterator[bpy.types.Mesh]:
+    """The evaluated mesh of the ground, hidden or not, with its modifiers but without its bake.
+
+    Vertices of its mesh (K,) may be moved, by as much (3,) in its own space and units.
+    """
     mesh = mesh_of(ground).copy()
     try:
         rest = rest_positions(mesh)
+        if moved is not None:
+            rest[moved] += np.asarray(by, dtype=np.float32)
         display_key.drop_all(mesh)
         write_positions(mesh, rest)
         with stand_in(ground, mesh) as evaluated:

@@ -15,7 +15,7 @@ from bpy.props import BoolProperty
 from numpy.typing import NDArray
 
 from ...core import record
-from ...core.cell_keys import cells_at
+from ...core.cell_keys import cells_at, keys_at
 from ...core.errors import InputError
 from ...core.heightfield import Window
 from ...core.playhead import Playhead
@@ -28,6 +28,7 @@ from ..baking.bake_checks import coverage, shortest_sole, wants_detail
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, ground_mesh, playback, trail_detail
 from ..ground.created_ground import create_ground, reach_for
+from ..ground.modified_prints import are_undone
 from ..operator_base import reports_errors
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of
@@ -177,7 +178,10 @@ def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
     if shot.plan.footfalls is not None:
         footfalls = cells_at(shot.plan.footfalls, cell_size)
         cover = coverage(vertices, slice(None), footfalls, cell_size)
-        if wants_detail(ground, cover, options.detail, cell_size, shortest_sole(shot.motions)):
+        under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
+        if wants_detail(ground, cover, options.detail, cell_size, shortest_sole(shot.motions)) or are_undone(
+            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=options.detail
+        ):
             surface = trail_detail.surface_of(ground, unit_scale)
             refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
             with trail_detail.draft(ground, surface, refinement) as draft:

@@ -1,0 +1,79 @@
+"""Whether prints on a ground would show: its modifiers work on the ground as the playback has left it."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.heightfield import Terrain
+from ...core.terrain import MeshTerrain
+from .. import mesh_arrays
+from . import ground_mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+LIFT = 0.01
+"""How far vertices are raised to see what modifiers make of it [m]."""
+
+PROBES = 1000
+"""Vertices that are looked at, spread over those that a bake moves, about."""
+
+MARGIN = 0.1
+"""How far around them the surface is looked at [m]."""
+
+
+def are_undone(
+    ground: bpy.types.Object, vertices: Array, moved: Indices, terrain: Terrain, *, unit_scale: float, detail: str
+) -> bool:
+    """Whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    vertices : (V, 3) float array
+        Undisturbed world positions of the vertices of its mesh [m].
+    moved : (K,) int array
+        Those that the bake moves.
+    terrain : Terrain
+        The undisturbed surface.
+    unit_scale : float
+        Metres per Blender unit.
+    detail : str
+        Whether there may be a copy without modifiers, in the words of the settings.
+
+    Raises
+    ------
+    InputError
+        If they do, and there may be no copy.
+    """
+    own = ground_mesh.own_modifiers(ground)
+    if not len(moved) or not any(item.show_viewport and item not in own for item in ground.modifiers):
+        return False
+    to_world = ground_mesh.to_world_of(ground, unit_scale)
+    with ground_mesh.undisturbed_copy(ground, moved, LIFT * ground_mesh.up_of(ground, unit_scale)) as raised:
+        surface = mesh_arrays.positions(raised) @ to_world[:3, :3].T + to_world[:3, 3]
+        triangles = mesh_arrays.triangles(raised)
+    if np.linalg.det(to_world[:3, :3]) < 0:
+        triangles = triangles[:, ::-1]
+    place = vertices[moved[:: len(moved) // PROBES + 1], :2]
+    bounds = np.stack([place.min(axis=0) - MARGIN, place.max(axis=0) + MARGIN])
+    raised_by = MeshTerrain.from_mesh(surface, triangles, bounds).heights(*place.T) - terrain.heights(*place.T)
+    if (raised_by > LIFT / 2).mean() > 1 / 2:
+        return False
+    if detail == "NEVER":
+        raise InputError(
+            f"Prints on ground '{ground.name}' would not show, as its modifiers undo them: set Detail to Automatic in "
+            "the Ground panel, or apply the modifiers."
+        )
+    return True
+
+
+def undone_warning(ground: bpy.types.Object) -> str:
+    """What to tell the user of such a ground."""
+    return (
+        f"The modifiers of ground '{ground.name}' undo prints on it: a copy without them, '{ground.name} Trail', takes "
+        f"the prints. To have them on '{ground.name}' itself, clear the bake and apply the modifiers."
+    )
