@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .interpolation import in_stretches
 from .motion import CharacterMotion, SoleMotion
 from .smoothing_spline import smooth_path
 
@@ -125,12 +126,13 @@ def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Arra
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
-def clearances(sole: SoleMotion, terrain: Terrain, *, reach: float) -> tuple[Array, Array]:
+def clearances(points: Array, terrain: Terrain, *, reach: float) -> tuple[Array, Array]:
     """Distances of a sole's landmarks from the ground, measured along its normal.
 
     Parameters
     ----------
-    sole : SoleMotion
+    points : (N, L, 3) float array
+        World positions of the landmarks [m].
     terrain : Terrain
     reach : float
         Half the distance over which the ground's slope is read [m].
@@ -142,7 +144,6 @@ def clearances(sole: SoleMotion, terrain: Terrain, *, reach: float) -> tuple[Arr
     normal : (N, L, 3) float array
         The ground's unit normal, vertical where there is none.
     """
-    points = sole.landmark_positions()
     x, y, z = np.moveaxis(points, -1, 0)
     normal = ground_normal(terrain, x, y, reach=reach)
     clearance = (z - terrain.heights(x, y)) * normal[..., 2]
@@ -189,11 +190,17 @@ class _Track:
 
 
 def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Track:
-    clearance, normals = clearances(sole, terrain, reach=SLOPE_PROBE * motion.leg_length)
-    now = np.arange(len(clearance))
-    lowest = clearance.argmin(axis=1)
-    velocity = _velocities(sole.landmark_positions(), lowest, motion.time_step)
-    return _Track(clearance[now, lowest], velocity, clearance, normals[now, lowest])
+    points = sole.landmark_positions()
+
+    def during(steps: slice) -> Array:
+        clearance, normals = clearances(points[steps], terrain, reach=SLOPE_PROBE * motion.leg_length)
+        lowest = clearance.argmin(axis=1)[:, None]
+        return np.concatenate([clearance, np.take_along_axis(normals, lowest[..., None], axis=1)[:, 0]], axis=1)
+
+    rise, normal = np.split(in_stretches(during, len(points)), [points.shape[1]], axis=1)
+    lowest = rise.argmin(axis=1)
+    velocity = _velocities(points, lowest, motion.time_step)
+    return _Track(rise.min(axis=1), velocity, rise, normal)
 
 
 def _velocities(points: Array, chosen: NDArray[np.intp], step: float) -> Array:
