@@ -392,3 +392,62 @@ def test_modifiers_that_let_prints_through_stay_on_the_ground(walk, kind):
     bpy.context.view_layer.update()
     assert bpy.ops.softground.bake() == {"FINISHED"}
     assert baked_ground.carrier_of(ground) == ground
+
+
+@pytest.mark.parametrize(("kind", "shape_keys"), [("DISPLACE", True), ("DISPLACE", False), ("SOLIDIFY", True)])
+def test_the_final_mesh_holds_what_modifiers_make_of_the_ground(walk, kind, shape_keys):
+    walk.softground.shape_keys = shape_keys
+    ground = field(walk, vertices=150, size=5.0)
+    ground.data.materials.append(bpy.data.materials.new("Snow"))
+    ground.data.uv_layers.new(name="Theirs")
+    modifier = ground.modifiers.new("Theirs", kind)
+    if kind == "DISPLACE":
+        modifier.strength, modifier.mid_level, modifier.direction = 0.2, 0.0, "Z"
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    walk.frame_set(100)
+    seen = as_rendered(ground)
+    meshes = len(bpy.data.meshes)
+    bpy.ops.softground.final_mesh()
+    still = next(thing for thing in walk.objects if thing.name.endswith("Final"))
+    assert not still.modifiers
+    assert still.data.shape_keys is None
+    np.testing.assert_allclose(as_rendered(still), seen, atol=1e-6)
+    assert [material.name for material in still.data.materials] == ["Snow"]
+    assert still.data.materials[0] == bpy.data.materials["Snow"]
+    assert [layer.name for layer in still.data.uv_layers] == ["Theirs"]
+    assert not [key for key in still.data.keys() if key.startswith("softground")]  # noqa: SIM118  (an ID is no mapping)
+    assert {name for name in still.data.attributes.keys() if name.startswith("softground")} == {  # noqa: SIM118
+        "softground_compression",
+        "softground_rim",
+        "softground_age",
+    }
+    assert len(bpy.data.meshes) == meshes + 1
+
+
+def test_a_ground_that_nodes_make_of_nothing_gets_a_copy_and_comes_back(walk):
+    ground = bpy.data.objects.new("Made", bpy.data.meshes.new("Made"))
+    walk.collection.objects.link(ground)
+    tree, _, result = node_group()
+    grid = tree.nodes.new("GeometryNodeMeshGrid")
+    for name, value in (("Size X", 7.0), ("Size Y", 7.0), ("Vertices X", 30), ("Vertices Y", 30)):
+        grid.inputs[name].default_value = value
+    tree.links.new(grid.outputs["Mesh"], result)
+    modifier = ground.modifiers.new("Theirs", "NODES")
+    modifier.node_group = tree
+    walk.softground.ground = ground
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    walk.frame_set(30)
+    assert -0.1 < as_rendered(baked_ground.carrier_of(ground))[:, 2].min() < -0.02
+    assert bake_report.stale_reasons(walk) == ()
+    walk.frame_set(1)
+    assert bpy.ops.softground.clear_bake() == {"FINISHED"}
+    assert fingerprints.of_file() == before
+    modifier.show_viewport = False
+    bpy.context.view_layer.update()
+    assert "Ground 'Made' has no faces" in refusal(bpy.ops.softground.bake)
+    modifier.show_viewport = True
+    walk.softground.detail = "NEVER"
+    assert "Ground 'Made' is too coarse" in refusal(bpy.ops.softground.bake)

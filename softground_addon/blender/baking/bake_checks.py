@@ -63,6 +63,8 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
 
     `printed` are the `cell_keys` of those cells, ascending, `cell_size` is in [m].
     """
+    if not len(vertices):  # of a ground that is made by modifiers alone
+        return Coverage(np.inf, 1.0, is_fine_somewhere=False)
     cells = cells_of(printed)
     first = keys_at(vertices[index, :2] - cell_size / 2, cell_size)  # of the four whose centres are around a vertex
     vertices_in_cells = among(printed, first[:, None] + (0, 1, ROW, ROW + 1)).any(axis=1).sum()

@@ -33,7 +33,7 @@ def check_usable(ground: bpy.types.Object) -> None:
             f"Ground '{name}' shares its mesh with other objects: make it single-user first "
             "(Object > Relations > Make Single User > Object & Data)."
         )
-    if not len(mesh.polygons):
+    if not len(mesh.polygons) and not any(modifier.show_viewport for modifier in ground.modifiers):
         raise InputError(f"Ground '{name}' has no faces: choose a surface, or press Create Ground.")
     if mesh.shape_keys and not ground_mesh.has_remains(ground):
         raise InputError(

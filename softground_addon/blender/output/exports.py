@@ -137,6 +137,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
 def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Object:
     """A new object with the ground as it stands at the end of the bake: a plain mesh, no modifiers or shape keys.
 
+    What the user's modifiers make of the ground is in the mesh.
+
     Raises
     ------
     InputError
@@ -146,6 +148,11 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     mesh = ground_mesh.mesh_of(carrier).copy()
     display_key.drop_all(mesh)
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
+    if any(one.show_viewport and one not in ground_mesh.own_modifiers(carrier) for one in carrier.modifiers):
+        with ground_mesh.stand_in(carrier, mesh) as evaluated:
+            plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
+        mesh.name = plain.name
+        bpy.data.meshes.remove(plain)
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
     for name in [attribute.name for attribute in mesh.attributes]:
         if name == ground_mesh.REST or playback.is_playback_attribute(name):
