@@ -15,6 +15,7 @@ from .heightfield import Surface, Window
 from .interpolation import in_stretches
 from .motion import Sole, SolePatch
 from .patch_maps import Nodes, covered_fraction
+from .rigid import inverse
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -115,7 +116,7 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
         points = _patch_points(patch)
         free = points.area
         for earlier, frame in zip(sole.patches[:number], flat[:number], strict=True):
-            to_earlier = np.linalg.inv(frame) @ flat[number]
+            to_earlier = inverse(frame) @ flat[number]
             places = points.positions @ to_earlier[:3, :3].T + to_earlier[:3, 3]
             distance = Nodes.under(earlier, *places[:, :2].T.astype(np.float32)).interpolate(earlier.signed_distance)
             free = free * (1.0 - covered_fraction(distance, earlier.spacing))
