@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
 from .footprints import NEVER, Footprint, last_contact, recompose
-from .heightfield import PLACES_AT_ONCE, TILE, HeightField, SparseGrid
-from .smoothing import blurred
+from .heightfield import PLACES_AT_ONCE, TILE, HeightField, SparseGrid, Window
+from .smoothing import blurred, gaussian_kernel
 
 Array = NDArray[np.float64]
+
+PART = 1 << 15
+"""Places for which the ground is made together."""
+SQUARE = 1.0
+"""Side of the squares by which these are put together [m]: as large as a few footprints."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +141,30 @@ class PressedGround:
         since = self.frame - self.contact.nearest(x, y)[0]
         age = np.where(np.isfinite(since), since / self.frame_rate, NEVER)
         return GroundSample(rim - compression, smooth_rim - smooth_compression, smooth_compression, smooth_rim, age)
+
+
+def sample_at(
+    footprints: Sequence[Footprint],
+    x: Array,
+    y: Array,
+    *,
+    frame: float,
+    frame_rate: float,
+    cell_size: float,
+    blur_sigma: float,
+) -> GroundSample:
+    """The ground at a frame, looked up at places (K,): made part by part, as all of it takes more than its mesh."""
+    values = np.empty((5, len(x)))
+    order = np.lexsort((np.floor(x / SQUARE), np.floor(y / SQUARE)))
+    margin = len(gaussian_kernel(blur_sigma / cell_size)) // 2 + 1  # a look-up reaches a cell further than the blur
+    for first in range(0, len(order), PART):
+        part = order[first : first + PART]
+        place = np.stack([x[part], y[part]])
+        window = Window.around(place.min(axis=1), place.max(axis=1), cell_size).expanded(margin)
+        near = [footprint for footprint in footprints if footprint.window.intersects(window)]
+        ground = PressedGround.at(near, frame=frame, frame_rate=frame_rate, cell_size=cell_size, blur_sigma=blur_sigma)
+        values[:, part] = astuple(ground.sample(*place))
+    return GroundSample(*values)
 
 
 def _cells(masks: Iterable[tuple[tuple[int, int], NDArray[np.bool_]]]) -> Keys:

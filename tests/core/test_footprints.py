@@ -19,6 +19,7 @@ from softground_addon.core.footprints import (
     recompose,
 )
 from softground_addon.core.heightfield import FlatTerrain, Window
+from softground_addon.core.pressed_ground import PressedGround, sample_at
 from softground_addon.core.simulation import simulate
 from softground_addon.core.soft_ground import SoftGround
 from tests.core.walkers import box_sole, loads_of, pose, pressed, walk
@@ -155,6 +156,20 @@ def test_the_record_takes_below_fifteen_kilobytes_a_step(bake):
         _, footprints = pressed(walk(steps=4, heading=0.6), material)
         _, arrays = to_arrays(footprints)
         assert sum(len(zlib.compress(values.tobytes())) for values in arrays.values()) < 15_000 * len(footprints)
+
+
+def test_looked_up_part_by_part_the_ground_is_the_same(bake, monkeypatch):
+    _, footprints = bake
+    x, y = np.random.default_rng(8).uniform((-0.5, -0.7), (3.8, 1.7), (5000, 2)).T
+    when = {"frame": 60.5, "frame_rate": 30.0, "cell_size": 0.01, "blur_sigma": 0.006}
+    whole = PressedGround.at(footprints, **when).sample(x, y)
+    assert (whole.raw != 0).sum() > 200
+    monkeypatch.setattr("softground_addon.core.pressed_ground.PART", 300)
+    parts = sample_at(footprints, x, y, **when)
+    for field in fields(whole):
+        np.testing.assert_array_equal(getattr(parts, field.name), getattr(whole, field.name))
+    nowhere = sample_at(footprints, x[:0], y[:0], **when)
+    assert len(nowhere.raw) == len(nowhere.age) == 0
 
 
 def test_footprints_take_less_than_half_the_memory_of_their_arrays(bake):

@@ -22,7 +22,7 @@ from ...core import record, report
 from ...core.cell_limits import check_cell_size
 from ...core.footprints import Footprint
 from ...core.polylines import polylines_at
-from ...core.pressed_ground import PressedGround, Trail
+from ...core.pressed_ground import PressedGround, Trail, sample_at
 from ...core.refinement import refine
 from ...core.region import Region
 from ...core.simulation import CharacterLoads, simulate
@@ -177,30 +177,32 @@ def _write(
     options = scene.softground
     blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
     frame_rate, unit_scale = settings.frame_rate_of(scene), scene.unit_settings.scale_length
-    at_the_end = partial(
-        PressedGround.at,
-        footprints,
-        frame=float(options.frame_end),
-        frame_rate=frame_rate,
-        cell_size=cell_size,
-        blur_sigma=blur_sigma,
-    )
+    at_the_end = {
+        "frame": float(options.frame_end),
+        "frame_rate": frame_rate,
+        "cell_size": cell_size,
+        "blur_sigma": blur_sigma,
+    }
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        trail = yield from aside("write", 0.1, lambda: at_the_end().trail(trail_detail.FLOOR))
+        trail = yield from aside(
+            "write", 0.1, lambda: PressedGround.at(footprints, **at_the_end).trail(trail_detail.FLOOR)
+        )
         warnings: list[str] = []
         if shot.surface is None:
             place = yield from _created(drafts, scene, shot, trail)
             about["inputs"]["ground"] = place.carrier.name
         else:
             place, warnings = yield from _given(drafts, scene, shot, shot.surface, trail, sole_length)
+        del trail
         stored = yield from aside("write", 0.5, record.dump, footprints, about)
-        across = place.position[:, :2].T
-        sample = yield from aside("write", 0.6, lambda: at_the_end().sample(*across))
+        x, y = place.position[:, 0], place.position[:, 1]
+        sample = yield from aside("write", 0.6, partial(sample_at, footprints, x, y, **at_the_end))
         over_time = partial(
             polylines_at,
             footprints,
-            *across,
+            x,
+            y,
             blur_sigma=blur_sigma,
             frame_rate=frame_rate,
             time_stretch=settings.time_stretch_of(scene),  # nodes count the animation's frames
@@ -220,7 +222,12 @@ def _write(
             shape_keys=options.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
-    return _Written(carrier, spans.error, warnings)
+        error, publish = spans.error, place.publish if place.is_draft else None
+        del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
+        if publish:
+            yield Progress("write", 0.9)
+            publish()
+    return _Written(carrier, error, warnings)
 
 
 def _created(drafts: ExitStack, scene: bpy.types.Scene, shot: Shot, trail: Trail) -> Job[baked_ground.Place]:

@@ -112,7 +112,8 @@ def write(
 ) -> Job[bpy.types.Object]:
     """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
 
-    What is there already is written in the last step, a new object in steps before it gets into the scene.
+    What is there already is written in one step. A draft, which takes several, still has to be published: that takes
+    memory of its own, which what is given here may have left by then.
 
     Parameters
     ----------
@@ -138,9 +139,6 @@ def write(
     if place.is_draft:
         yield Progress("write", 0.9)
     playback.attach(place.carrier, place.index[spans.point], spans, table, up=up)
-    if place.is_draft:
-        yield Progress("write", 0.9)
-        place.publish()
     return place.carrier
 
 
