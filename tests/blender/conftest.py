@@ -23,6 +23,15 @@ def walk(scene):
     return scene
 
 
+@pytest.fixture
+def short_walk(scene):
+    """A short walk to be baked with coarse cells."""
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    return scene
+
+
 @pytest.fixture(scope="session")
 def saved_walker(addon, tmp_path_factory):
     bpy.ops.wm.read_factory_settings(use_empty=True)

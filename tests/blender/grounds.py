@@ -41,3 +41,50 @@ def plane(scene, size=7.0, vertices=240, height=lambda x, y: 0.0 * x):
     ground = bpy.data.objects.new("Field", mesh)
     scene.collection.objects.link(ground)
     return ground
+
+
+def field(scene, vertices=4, **values):
+    """A ground of a user's, coarse by default, that is the scene's."""
+    ground = scene.softground.ground = plane(scene, vertices=vertices, **values)
+    bpy.context.view_layer.objects.active = ground
+    bpy.context.view_layer.update()
+    return ground
+
+
+def as_rendered(ground):
+    """World positions of the ground's evaluated mesh, (V, 3), at the scene's frame."""
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.empty(len(shown.data.vertices) * 3, dtype=np.float32)
+    shown.data.vertices.foreach_get("co", points)
+    matrix = np.array(shown.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def node_group():
+    """An empty group of geometry nodes, with its input and output."""
+    tree = bpy.data.node_groups.new("Theirs", "GeometryNodeTree")
+    tree.is_modifier = True
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    return tree, tree.nodes.new("NodeGroupInput").outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0]
+
+
+def mover(scene, name="Lift"):
+    """An empty that goes up."""
+    empty = bpy.data.objects.new(name, None)
+    scene.collection.objects.link(empty)
+    for frame, height in ((1, 0.0), (30, 1.0)):
+        empty.location.z = height
+        empty.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    return empty
+
+
+def refusal(operator):
+    """What an operator that refuses says."""
+    try:
+        operator()
+    except RuntimeError as error:
+        assert "Traceback" not in str(error)
+        return str(error)
+    raise AssertionError("nothing was refused")

@@ -9,7 +9,7 @@ from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import ground_mesh, hidden_ground, playback, playback_nodes, trail_detail
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
-from tests.blender.grounds import plane
+from tests.blender.grounds import plane, refusal
 
 
 @pytest.fixture
@@ -32,13 +32,6 @@ def key_positions(key):
     values = np.empty(len(key.points) * 3, dtype=np.float32)
     key.points.foreach_get("co", values)
     return values.reshape(-1, 3)
-
-
-def refusal(operator):
-    with pytest.raises(RuntimeError) as error:
-        operator()
-    assert "Traceback" not in str(error.value)
-    return str(error.value)
 
 
 def test_nothing_is_left_of_a_playback_whose_modifier_the_user_has_deleted(baked):

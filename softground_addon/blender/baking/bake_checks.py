@@ -114,6 +114,19 @@ def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
     ]
 
 
+def copy_warnings(ground: bpy.types.Object) -> list[str]:
+    """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
+    # Nodes may scatter things for renders only, and those stay.
+    hidden = (one for one in ground.modifiers if one.show_render and not one.show_viewport)
+    names = [f"'{one.name}'" for one in hidden if one.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")]
+    if not names:
+        return []
+    return [
+        f"The finer copy of ground '{ground.name}' lacks what only renders show of {' and '.join(names)}: show it in "
+        "the viewport too (the modifier's screen icon), and bake again."
+    ]
+
+
 def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
     """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4.
 

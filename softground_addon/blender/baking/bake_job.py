@@ -37,7 +37,7 @@ from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
 from ..response import response_job
 from . import bake_report
-from .bake_checks import check_volumes, coverage, coverage_warnings, shortest_sole, wants_detail
+from .bake_checks import check_volumes, copy_warnings, coverage, coverage_warnings, shortest_sole, wants_detail
 
 Array = NDArray[np.float64]
 
@@ -268,7 +268,7 @@ def _given(
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, trail, shot.terrain)
-    return baked_ground.on_detail(ground, draft, index, vertices), warnings
+    return baked_ground.on_detail(ground, draft, index, vertices), [*warnings, *copy_warnings(ground)]
 
 
 def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, cast
 
 import bpy
@@ -31,8 +32,12 @@ def hide(ground: bpy.types.Object) -> None:
     if hides(ground):
         return
     before = [getattr(ground, name) for name in _SHOWN]
+    scattered: dict[frozenset[str], bool] = {}  # by the modifiers that are shown, which mostly are the same in both
     for kind in ("viewport", "render"):
-        if _is_scattered_on(ground, f"show_{kind}"):
+        shown = frozenset(one.name for one in ground.modifiers if getattr(one, f"show_{kind}"))
+        if shown not in scattered:
+            scattered[shown] = _is_scattered_on(ground, shown)
+        if scattered[shown]:
             setattr(ground, f"show_instancer_for_{kind}", False)
         else:
             setattr(ground, f"hide_{kind}", True)
@@ -51,16 +56,16 @@ def show_again(ground: bpy.types.Object) -> None:
     del ground[WAS_HIDDEN]
 
 
-def _is_scattered_on(ground: bpy.types.Object, shown: str) -> bool:
-    """Whether the ground has particles, or its modifiers that are shown (`show_viewport`, `show_render`) instances."""
+def _is_scattered_on(ground: bpy.types.Object, shown: Collection[str]) -> bool:
+    """Whether the ground has particles, or instances while some of its modifiers are shown, by their names."""
     if ground.particle_systems:
         return True
-    if not any(modifier.type == "NODES" and getattr(modifier, shown) for modifier in ground.modifiers):
+    if not any(modifier.type == "NODES" and modifier.name in shown for modifier in ground.modifiers):
         return False
     with ground_mesh.stand_in(ground, ground_mesh.mesh_of(ground)) as evaluated:
         copy = evaluated.original
         for modifier in copy.modifiers:
-            modifier.show_viewport = getattr(modifier, shown)
+            modifier.show_viewport = modifier.name in shown
         layer = copy.users_scene[0].view_layers[0]
         layer.update()
         depsgraph = cast("bpy.types.Depsgraph", layer.depsgraph)
