@@ -102,11 +102,12 @@ class Bisection:
         self.source = _counted(len(triangles))
         self.weight = [np.tile(share, (len(triangles), 1)) for share in np.eye(3, dtype=np.float32)[:2]]
         self.roots = self.ends
-        if parts > 1:
-            self._cut_evenly(parts, grain)
         side = self.points[np.roll(self.corner, -1, axis=1)] - self.points[np.roll(self.corner, 1, axis=1)]
         base = np.argmax(np.einsum("tki,tki->tk", side, side), axis=1)
-        turn = (base[:, None] + np.arange(3)) % 3
+        if parts > 1:
+            self._cut_evenly(parts, grain)
+        # The parts of a triangle are alike, and have their bases side by side.
+        turn = (base[self.source, None] + np.arange(3)) % 3
         self.corner, self.edge, *self.weight = (
             np.take_along_axis(of, turn, axis=1) for of in (self.corner, self.edge, *self.weight)
         )
@@ -205,6 +206,15 @@ class Bisection:
                 weight[whole], weight[part] = _stacked((between, apex, left), (between, right, apex))
             self.source[part] = self.source[whole]
         self._add_edges(across_ends, np.full(more, -1, dtype=np.int32))
+
+    def pairs(self) -> Numbers:
+        """Triangles at either side of one base, both in the same given triangle, (Q, 2): parallelograms, to a grain."""
+        base, number = self.edge[:, 0], _counted(len(self.edge))
+        first, last = np.zeros((2, base.max(initial=-1) + 1), dtype=np.int32)
+        first[base[::-1]], last[base] = number[::-1], number
+        shared = np.flatnonzero(first != last)
+        pairs = np.stack([first[shared], last[shared]], axis=-1)
+        return pairs[self.source[pairs[:, 0]] == self.source[pairs[:, 1]]]
 
     def cut_edges(self) -> Indices:
         """The given edges that were cut, as ascending pairs of vertices, (E, 2)."""

@@ -1,6 +1,7 @@
 """Detail where it is wanted: the faces of a coarse surface, bisected along the trail down to the size of the cells.
 
-Only the faces near the trail are looked at; the work does not depend on how large the ground is.
+Two parts at one base are a parallelogram, and become a quad; the others stay triangles. Only the faces near the trail
+are looked at; the work does not depend on how large the ground is.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ WEIGHT_BITS = 24
 LEAST_PART = 8.0
 """Smallest leg of an equal part, in cells: beside the trail, sizes still have some halvings to fall off in."""
 
-AT_ONCE = 1 << 15
-"""Triangles whose values are worked out together, in double precision: there may be millions."""
+AT_ONCE = 1 << 17
+"""Corners whose values are worked out together, in double precision: there may be millions."""
 
 
 @dataclass(frozen=True)
@@ -73,21 +74,24 @@ class Surface:
 
 @dataclass(frozen=True)
 class Refinement:
-    """What becomes of a surface: some of its faces are kept, the others become triangles.
+    """What becomes of a surface: some of its faces are kept, the others become quads and triangles.
 
     Attributes
     ----------
     kept_faces : (K,) int array
         Faces that stay as they are, ascending.
-    triangles : (N, 3) int array
-        Vertices of the new triangles; those from V on are new.
+    corner_vertex : (L,) int array
+        Vertices of the new faces' corners, face by face; those from V on are new.
+    face_start : (N + 1,) int array
+        First corner of each new face, and the number of corners; quads come before triangles. The triangle of a quad's
+        first three corners and that of the others are as they were cut.
     source : (N,) int array
-        Triangle of the surface that each lies in.
-    weights : (N, 3, 2) float32 array
+        Triangle of the surface that each new face lies in.
+    weights : (L, 2) float32 array
         Barycentric coordinates of each corner in that triangle, of its first two corners; the third's are what is left
         of 1.
     new_vertex : (M,) int array
-        Where each new vertex occurs first among the triangles' corners, 3·triangle + corner.
+        The corner at which each new vertex occurs first.
     edges : (E, 2) int array
         New edges that are parts of the surface's edges.
     edge_of : (E, 2) int array
@@ -95,7 +99,8 @@ class Refinement:
     """
 
     kept_faces: Indices
-    triangles: Numbers
+    corner_vertex: Numbers
+    face_start: Numbers
     source: Numbers
     weights: NDArray[np.float32]
     new_vertex: Numbers
@@ -107,35 +112,38 @@ class Refinement:
 
         Real numbers are interpolated; of others, that of the nearest corner is taken.
         """
-        triangle, corner = np.divmod(self.new_vertex, 3)
-        source, weights = self.source[triangle], self.weights[triangle, corner]
-        return _continued(values, values, surface.triangle_vertices, source, weights[:, None])
+        source, weights = self._corner_source()[self.new_vertex], self.weights[self.new_vertex]
+        return _continued(values, values, surface.triangle_vertices, source, weights)
 
     def at_corners(self, surface: Surface, values: NDArray[Any], kept: Indices) -> NDArray[Any]:
-        """Values at kept corners of the surface, and behind them at the corners of the triangles, (C + 3N, ...)."""
-        return _continued(values[kept], values, surface.triangle_corners, self.source, self.weights)
+        """Values at kept corners of the surface, and behind them at those of the new faces, (C + L, ...)."""
+        return _continued(values[kept], values, surface.triangle_corners, self._corner_source(), self.weights)
+
+    def _corner_source(self) -> Numbers:
+        """Triangle of the surface that each corner's face lies in, (L,)."""
+        return np.repeat(self.source, np.diff(self.face_start))
 
 
 def _continued(
     first: NDArray[Any], values: NDArray[Any], sources: Indices, number: Numbers, weights: NDArray[np.float32]
 ) -> NDArray[Any]:
-    """Some values, and behind them those at C places each within N triangles, one after the other.
+    """Some values, and behind them those at N places within triangles.
 
-    Where the values of triangles are is in `sources` (T, 3), which triangle it is in `number` (N,), and where the
-    places are in `weights` (N, C, 2).
+    Where the values of triangles are is in `sources` (T, 3), which triangle each place is in is in `number` (N,), and
+    where it is there in `weights` (N, 2).
     """
-    whole = np.empty((len(first) + len(number) * weights.shape[1], *values.shape[1:]), dtype=values.dtype)
+    whole = np.empty((len(first) + len(number), *values.shape[1:]), dtype=values.dtype)
     whole[: len(first)] = first
-    behind = whole[len(first) :].reshape(*weights.shape[:2], *values.shape[1:])
+    behind = whole[len(first) :]
     for begin in range(0, len(number), AT_ONCE):
         part = slice(begin, begin + AT_ONCE)
-        source, weight = sources[number[part]], np.empty((*weights[part].shape[:2], 3))
-        weight[..., :2] = weights[part]
-        weight[..., 2] = 1.0 - weight[..., :2].sum(axis=-1)
+        source, weight = sources[number[part]], np.empty((len(number[part]), 3))
+        weight[:, :2] = weights[part]
+        weight[:, 2] = 1.0 - weight[:, :2].sum(axis=1)
         if np.issubdtype(values.dtype, np.floating):
-            behind[part] = np.einsum("nck,nk...->nc...", weight, values[source].astype(np.float64, copy=False))
+            behind[part] = np.einsum("nk,nk...->n...", weight, values[source].astype(np.float64, copy=False))
         else:
-            behind[part] = values[np.take_along_axis(source, weight.argmax(axis=-1), axis=1)]
+            behind[part] = values[source[np.arange(len(source)), weight.argmax(axis=1)]]
     return whole
 
 
@@ -217,33 +225,55 @@ def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
     """The refinement by a mesh that was made from the chosen triangles of a surface; it is of no use afterwards."""
     leaves = mesh.leaves_of_roots()
     leaf_ends, leaf_roots = mesh.ends[leaves], mesh.roots[mesh.root[leaves]]
-    del mesh.edge, mesh.ends, mesh.root, mesh.half
+    del mesh.ends, mesh.root, mesh.half
+    pairs = mesh.pairs()
+    del mesh.edge
     given = len(mesh.vertex)
     face = surface.triangle_face[chosen]
     parts = np.bincount(mesh.source, minlength=len(chosen))
     changed = np.zeros(len(surface.face_start) - 1, dtype=bool)
     changed[face[parts > 1]] = True
-    ours = np.flatnonzero(changed[face[mesh.source]]).astype(np.int32)
+    single = changed[face[mesh.source]]
+    single[pairs] = False
     place = along_curve(mesh.points[:, :2])
-    begin = reduce(np.minimum, (place[mesh.corner[ours, number]] for number in range(3)))
-    ours = ours[np.argsort(begin, kind="stable")]
-    corner = mesh.corner[ours]
+    corner = mesh.corner.ravel()
+    of_mesh, face_start = _faces(pairs, np.flatnonzero(single).astype(np.int32), place, corner)
+    del pairs, single
     by_place = given + np.argsort(place[given:], kind="stable")
-    del begin, place, mesh.corner
+    point = corner[of_mesh]
+    del place, corner, mesh.corner
     vertex = np.empty(len(mesh.points), dtype=np.int32)
     vertex[:given] = mesh.vertex
     vertex[by_place] = np.arange(len(surface.vertices), len(surface.vertices) + len(by_place))
     first = np.zeros(len(mesh.points), dtype=np.int32)
-    first[corner.ravel()[::-1]] = np.arange(corner.size)[::-1]
-    weights = np.empty((len(ours), 3, 2), dtype=np.float32)
+    first[point[::-1]] = np.arange(len(point))[::-1]
+    weights = np.empty((len(of_mesh), 2), dtype=np.float32)
     for number in (1, 0):
-        weights[:, :, number] = mesh.weight.pop()[ours]
+        weights[:, number] = mesh.weight.pop().ravel()[of_mesh]
     return Refinement(
         kept_faces=np.flatnonzero(~changed),
-        triangles=vertex[corner],
-        source=chosen[mesh.source[ours]].astype(np.int32),
+        corner_vertex=vertex[point],
+        face_start=face_start,
+        source=chosen[mesh.source[of_mesh[face_start[:-1]] // 3]].astype(np.int32),
         weights=weights,
         new_vertex=first[by_place],
         edges=vertex[leaf_ends].astype(np.intp),
         edge_of=mesh.vertex[leaf_roots],
     )
+
+
+def _faces(pairs: Numbers, single: Numbers, place: NDArray[np.int64], corner: Numbers) -> tuple[Numbers, Numbers]:
+    """Corners of a bisection's triangles (`3·triangle + corner`) that make up quads and triangles, and their starts.
+
+    Both are in order of the first of their places, which are given for the points that those corners are at.
+    """
+    kinds = []
+    for faces in (
+        3 * pairs[:, [0, 1, 0, 0]] + np.array([1, 0, 2, 0], dtype=np.int32),  # cut in two from their first corner
+        3 * single[:, None] + np.arange(3, dtype=np.int32),
+    ):
+        begin = reduce(np.minimum, (place[corner[column]] for column in faces.T))
+        kinds.append(faces[np.argsort(begin, kind="stable")])
+    size = np.repeat(np.array([4, 3], dtype=np.int32), [len(faces) for faces in kinds])
+    start = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
+    return np.concatenate([faces.ravel() for faces in kinds]), start

@@ -1,6 +1,7 @@
 """Cutting coarse faces along a trail."""
 
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -67,7 +68,26 @@ def all_faces(surface, refinement):
         surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]].tolist()
         for face in refinement.kept_faces
     ]
-    return kept + refinement.triangles.tolist()
+    return kept + new_faces(refinement)
+
+
+def new_faces(refinement):
+    return [face.tolist() for face in np.split(refinement.corner_vertex, refinement.face_start[1:-1])]
+
+
+def quads_and_triangles(refinement, of_corners):
+    """Values at the corners of the quads, (Q, 4, ...), and of the triangles, (T, 3, ...)."""
+    quads = np.count_nonzero(np.diff(refinement.face_start) == 4)
+    return (
+        of_corners[: 4 * quads].reshape(quads, 4, *of_corners.shape[1:]),
+        of_corners[4 * quads :].reshape(-1, 3, *of_corners.shape[1:]),
+    )
+
+
+def halves(refinement):
+    """Vertices of the triangles that the new faces are made of, (T, 3)."""
+    quads, triangles = quads_and_triangles(refinement, refinement.corner_vertex)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], triangles])
 
 
 def faces_at_edges(faces):
@@ -125,11 +145,56 @@ def test_any_terrain_stays_watertight_and_keeps_its_area(seed, x, y):
     assert max(count.values()) <= 2
     assert boundary_length(faces, points) == pytest.approx(boundary_length(original_faces(surface), points), rel=1e-9)
 
-    def area(triangles):
-        corner = points[np.array(triangles)]
+    def area(faces):
+        corner = points[[(face[0], *side) for face in faces for side in pairwise(face[1:])]]
         return np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
 
     assert area(faces) == pytest.approx(area(original_faces(surface)), rel=1e-9)
+
+
+def regular(size=6.0):
+    """Two triangles of equal sides, of which any could be the base."""
+    return surface_of(
+        size * np.array([[0, 0, 0], [1, 0, 0.3], [0.5, 0.75**0.5, 0], [1.5, 0.75**0.5, 1]]) - 1, [[0, 1, 2], [1, 3, 2]]
+    )
+
+
+def doubled(size=5.0):
+    """One triangle, once from each of its sides."""
+    return surface_of(size * np.array([[-1, -1, 0], [1, -0.8, 0.1], [0.2, 1, 0.3]]), [[0, 1, 2], [0, 2, 1]])
+
+
+@settings(max_examples=30)
+@given(
+    st.one_of(
+        st.integers(0, 2**16).map(scattered),
+        st.builds(scattered, st.integers(0, 2**16), st.sampled_from([0, 3, 10]), st.floats(2, 500)),
+        st.floats(3, 50).map(regular),
+        st.floats(3, 50).map(doubled),
+        st.floats(3, 2000).map(lambda size: grid(1, size)),
+    )
+)
+def test_quads_are_parallelograms_in_one_triangle_and_turned_like_it(surface):
+    refinement = refine(surface, trail(0.03, 2), 0.03)
+    place, _ = quads_and_triangles(refinement, positions(surface, refinement)[refinement.corner_vertex])
+    one, other = place[:, 2] - place[:, 0], place[:, 3] - place[:, 1]
+    apart = np.linalg.norm(place[:, [0, 2]].sum(axis=1) - place[:, [1, 3]].sum(axis=1), axis=-1) / 2
+    assert (apart < 0.03 * np.linalg.norm(one, axis=-1)).all(), "the diagonals do not halve each other"
+    first, second, third = np.moveaxis(
+        surface.vertices[surface.triangle_vertices[refinement.source[: len(place)]]], 1, 0
+    )
+    normal = np.cross(second - first, third - first)
+    across = np.cross(one, other)
+    np.testing.assert_allclose(
+        np.einsum("ni,ni->n", across, normal),
+        np.linalg.norm(across, axis=-1) * np.linalg.norm(normal, axis=-1),
+        rtol=1e-6,
+    )
+
+
+def test_no_two_triangles_that_could_be_a_quad_are_left_in_a_region():
+    refinement = refine(grid(1, 8.0), region_of(*np.mgrid[-100:100, -100:100].reshape(2, -1), 0.02), 0.02)
+    assert np.mean(np.diff(refinement.face_start) == 4) > 0.9
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -139,9 +204,10 @@ def test_corners_lie_in_their_triangle_of_the_surface_at_their_weights(name):
     points = positions(surface, refinement)
     weights = np.concatenate([refinement.weights, 1 - refinement.weights.sum(axis=-1, keepdims=True)], axis=-1)
     assert (weights >= 0).all()
-    source = surface.vertices[surface.triangle_vertices[refinement.source]]
-    placed = np.einsum("nck,nki->nci", weights.astype(float), source)
-    np.testing.assert_allclose(placed, points[refinement.triangles], atol=1e-9 * np.abs(points).max())
+    of_corner = np.repeat(refinement.source, np.diff(refinement.face_start))
+    source = surface.vertices[surface.triangle_vertices[of_corner]]
+    placed = np.einsum("nk,nki->ni", weights.astype(float), source)
+    np.testing.assert_allclose(placed, points[refinement.corner_vertex], atol=1e-9 * np.abs(points).max())
 
 
 def test_what_corners_carry_goes_along_with_the_places_of_their_vertices():
@@ -149,7 +215,7 @@ def test_what_corners_carry_goes_along_with_the_places_of_their_vertices():
     refinement = refine(surface, trail(0.02), 0.02)
     kept = np.flatnonzero(np.isin(np.repeat(np.arange(len(surface.face_start) - 1), 3), refinement.kept_faces))
     carried = refinement.at_corners(surface, surface.vertices[surface.corner_vertex], kept)
-    vertex = np.concatenate([surface.corner_vertex[kept], refinement.triangles.ravel()])
+    vertex = np.concatenate([surface.corner_vertex[kept], refinement.corner_vertex])
     np.testing.assert_allclose(carried, positions(surface, refinement)[vertex], atol=1e-9)
     names = refinement.at_corners(surface, surface.corner_vertex, kept)
     assert set(names[len(kept) :].tolist()) <= set(surface.corner_vertex.tolist()), "whole numbers are not mixed"
@@ -160,7 +226,7 @@ def test_vertices_are_about_a_cell_apart_in_the_region_and_few_elsewhere():
     for size in (7.0, 8.0, 9.0, 10.0, 11.0):
         surface, region = grid(1, size), trail(cell, 3)
         refinement = refine(surface, region, cell)
-        corner = positions(surface, refinement)[refinement.triangles]
+        corner = positions(surface, refinement)[halves(refinement)]
         side = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=-1)
         inside = region.touches(corner[..., :2].min(axis=1), corner[..., :2].max(axis=1))
         assert side[inside].max() <= COARSEST_LEG * np.sqrt(2) * cell * 1.0001
@@ -172,10 +238,10 @@ def test_vertices_are_about_a_cell_apart_in_the_region_and_few_elsewhere():
 def test_sizes_fall_off_gradually():
     refinement = refine(grid(1, 64.0), trail(0.01), 0.01)
     surface = grid(1, 64.0)
-    corner = positions(surface, refinement)[refinement.triangles]
+    corner = positions(surface, refinement)[halves(refinement)]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=-1).max(axis=1)
     owner = {}
-    for number, face in enumerate(refinement.triangles.tolist()):
+    for number, face in enumerate(halves(refinement).tolist()):
         for a, b in zip(face, [*face[1:], face[0]], strict=True):
             owner.setdefault((min(a, b), max(a, b)), []).append(number)
     ratios = [longest[pair[0]] / longest[pair[1]] for pair in owner.values() if len(pair) == 2]
@@ -203,7 +269,8 @@ def test_new_edges_know_the_edges_they_are_parts_of():
 def test_a_surface_that_is_fine_enough_or_far_away_stays_as_it_is():
     for surface, region in ((grid(200, 2.0), trail(0.02)), (grid(3, 3.0), trail(0.01, 2, (50.0, 0.0)))):
         refinement = refine(surface, region, 0.02)
-        assert not len(refinement.triangles)
+        assert not len(refinement.corner_vertex)
+        assert refinement.face_start.tolist() == [0]
         assert len(refinement.kept_faces) == len(surface.face_start) - 1
 
 

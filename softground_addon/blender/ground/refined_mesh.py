@@ -53,7 +53,7 @@ def surface_of(mesh: bpy.types.Mesh, to_world: Array) -> Surface:
 def build(
     name: str, source: bpy.types.Mesh, surface: Surface, refinement: Refinement, groups: Sequence[str] = ()
 ) -> bpy.types.Mesh:
-    """A new mesh: the kept faces of the source and the new triangles, with all that the source carries.
+    """A new mesh: the kept faces of the source and the new ones, with all that the source carries.
 
     Vertices of the source keep their numbers and their positions, bit for bit.
 
@@ -72,13 +72,13 @@ def build(
     kept = refinement.kept_faces
     size = np.diff(surface.face_start)
     kept_corners = _runs(surface.face_start[kept], size[kept])
-    corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.triangles.ravel()])
-    corner_count, kept_size = len(corner_vertex), size[kept]
-    face_start = np.concatenate([np.cumsum(kept_size) - kept_size, np.arange(len(kept_corners), corner_count, 3)])
+    corner_vertex = np.concatenate([surface.corner_vertex[kept_corners].astype(np.int32), refinement.corner_vertex])
+    kept_start = np.cumsum(size[kept]) - size[kept]
+    face_start = np.concatenate([kept_start, len(kept_corners) + refinement.face_start[:-1]])
 
     mesh.vertices.add(len(surface.vertices) + len(refinement.new_vertex))
     _add_loose_edges(mesh, source)
-    mesh.loops.add(corner_count)
+    mesh.loops.add(len(corner_vertex))
     mesh.loops.foreach_set("vertex_index", corner_vertex)
     mesh.polygons.add(len(face_start))
     mesh.polygons.foreach_set("loop_start", face_start.astype(np.int32))
