@@ -199,6 +199,15 @@ def test_a_ground_above_the_feet_is_named_with_the_remedy(short_walk, build, dep
     assert "Recalculate Inside" in said
 
 
+def test_an_upper_storey_is_named_as_one_of_several_layers(short_walk):
+    ground = field(short_walk)
+    upper = ground.modifiers.new("Upper", "ARRAY")
+    upper.use_relative_offset, upper.use_constant_offset = False, True
+    upper.constant_offset_displace = (0.0, 0.0, 3.0)
+    bpy.context.view_layer.update()
+    assert "Ground 'Field' has several layers" in refusal(bpy.ops.softground.bake)
+
+
 def test_a_room_with_its_faces_inward_takes_prints_on_its_floor(short_walk):
     ground = room(short_walk)
     ground.data.flip_normals()

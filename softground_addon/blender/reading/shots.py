@@ -121,6 +121,11 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
             f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
             "feet in the Character panel."
         )
+    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
+        raise InputError(
+            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
+            "separate the layer that is walked on into an object of its own."
+        )
     for character in loads:
         contacts, leg = character.contacts, character.motion.leg_length
         below = -(contacts.clearance + contacts.offset)[contacts.touching]
@@ -129,11 +134,6 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
                 f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
                 "Where it is a room, let its faces look inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
             )
-    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
-        raise InputError(
-            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own."
-        )
 
 
 def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
