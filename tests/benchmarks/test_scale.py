@@ -81,7 +81,7 @@ def test_the_record_and_the_file_grow_by_little_with_each_step():
     assert many["blend"] / many["steps"] < 150e3
 
 
-@pytest.mark.xfail(reason="0.67 MB for 920 new vertices: 0.13 of them their mesh, 0.08 their 4,900 points of splines")
+@pytest.mark.xfail(reason="0.58 MB for 920 new vertices: 0.10 of them their mesh, 0.08 their 4,900 points of splines")
 def test_memory_grows_by_little_with_each_step_on_new_ground():
     assert memory_per_step(ON_NEW_GROUND) < 100e3
 
