@@ -81,12 +81,13 @@ def _rests(sole: SoleMotion, motion: CharacterMotion) -> Mask:
 
 def advice(name: str, missed: Sequence[MissedStep], ground: str) -> str:
     """What to tell the user of a character's missed steps: how many, from when on, and what to do."""
-    count = f"{len(missed)} steps" if len(missed) > 1 else "1 step"
+    many = len(missed) > 1
+    count, meet, leave = (f"{len(missed)} steps", "meet", "leave") if many else ("1 step", "meets", "leaves")
     beyond = sum(np.isinf(step.clearance) for step in missed)
     heights = [step.clearance for step in missed if np.isfinite(step.clearance)]
     where = [f"{beyond} beyond its edge or on its walls"] if beyond else []
     where += [f"{len(heights)} up to {max(heights) * 100:.0f} cm above it"] if heights else []
     return (
-        f"{count} of '{name}' meet no ground on {ground} and leave no print, from frame {missed[0].frame:.0f} on "
+        f"{count} of '{name}' {meet} no ground on {ground} and {leave} no print, from frame {missed[0].frame:.0f} on "
         f"({', '.join(where)}): extend or move the ground, or choose a mesh of the stairs or hill under the feet."
     )

@@ -63,7 +63,13 @@ class MeshTerrain:
 
     @classmethod
     def from_mesh(
-        cls, vertices: Array, triangles: Indices, bounds: Array | None = None, values: Array | None = None
+        cls,
+        vertices: Array,
+        triangles: Indices,
+        bounds: Array | None = None,
+        values: Array | None = None,
+        *,
+        name: str = "The ground",
     ) -> MeshTerrain:
         """Bin the triangles of a mesh.
 
@@ -78,6 +84,8 @@ class MeshTerrain:
             Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
         values : (V, C) float array, optional
             What is said of the vertices, to be interpolated between them.
+        name : str
+            For messages.
 
         Raises
         ------
@@ -99,7 +107,7 @@ class MeshTerrain:
         corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(
-                "The ground has no face under the character's path that could be stood on: move it under the feet."
+                f"{name} has no face under the character's path that could be stood on: move it under the feet."
             )
         bins = _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]

@@ -53,6 +53,11 @@ def far_below(scene):
     ground.location.z = -5.0
 
 
+def far_away(scene):
+    ground = scene.softground.ground = plane(scene)
+    ground.location.x = 500.0
+
+
 def bridge(scene):
     ground = scene.softground.ground = plane(scene, vertices=200)
     ground.modifiers.new("twice", "ARRAY").relative_offset_displace = (0, 0, 0)
@@ -84,6 +89,7 @@ def edited_body(scene):
         (empty_range, "10-5 is empty"),
         (too_coarse, "'Field' is too coarse.*Subdivide"),
         (far_below, "'Walker'.*touches 'Field'.*move"),
+        (far_away, "'Field' has no face under.*move it under the feet"),
         (bridge, "'Field' has several layers.*separate"),
         (moving_ground, "'Field' moves"),
         (edited_body, "'Walker Figure'.*Edit Mode: leave it"),

@@ -71,3 +71,5 @@ def test_the_advice_names_how_many_since_when_and_what_to_do():
     assert "'Field'" in text
     assert f"from frame {missed[0].frame:.0f}" in text
     assert "extend or move the ground" in text
+    once = "1 step of 'Walker' meets no ground on 'Field' and leaves no print"
+    assert advice("Walker", missed[:1], "'Field'").startswith(once)

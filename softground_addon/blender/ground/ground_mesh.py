@@ -54,6 +54,8 @@ class GroundSurface:
 
     Attributes
     ----------
+    name : str
+        Of the object.
     vertices : (V, 3) float array
         World positions of the vertices that the bake moves [m].
     surface_vertices : (W, 3) float array
@@ -64,6 +66,7 @@ class GroundSurface:
         What is painted on the evaluated surface; see `painted_ground`.
     """
 
+    name: str
     vertices: Array
     surface_vertices: Array
     triangles: Indices
@@ -71,7 +74,8 @@ class GroundSurface:
 
     def terrain(self, bounds: Array | None = None) -> MeshTerrain:
         """The surface as a function of place, within bounds in the plane [m]."""
-        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors)
+        name = f"Ground '{self.name}'"
+        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors, name=name)
 
 
 def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Indices:
@@ -156,7 +160,7 @@ def undisturbed_surface(
             vertices = surface
     if np.linalg.det(to_world[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
-    return GroundSurface(vertices, surface, triangles, factors)
+    return GroundSurface(ground.name, vertices, surface, triangles, factors)
 
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
