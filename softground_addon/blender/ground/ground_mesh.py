@@ -95,6 +95,12 @@ def own_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [item for item in (playback.modifier_of(ground), ground.modifiers.get(CACHE)) if item]
 
 
+def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """All other modifiers of the ground."""
+    own = own_modifiers(ground)
+    return [item for item in ground.modifiers if item not in own]
+
+
 def is_baked(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground."""
     return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)

@@ -49,8 +49,7 @@ def are_undone(
     InputError
         If they do, and there may be no copy.
     """
-    own = ground_mesh.own_modifiers(ground)
-    if not len(moved) or not any(item.show_viewport and item not in own for item in ground.modifiers):
+    if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
         return False
     to_world = ground_mesh.to_world_of(ground, unit_scale)
     with ground_mesh.undisturbed_copy(ground, moved, LIFT * ground_mesh.up_of(ground, unit_scale)) as raised:

@@ -40,8 +40,7 @@ def mover_of(thing: bpy.types.Object) -> bpy.types.Object | None:
 
 def changes_with_time(ground: bpy.types.Object) -> str:
     """Name of the first modifier that gives the ground another shape at each frame, or an empty text."""
-    own = ground_mesh.own_modifiers(ground)
-    theirs = [item for item in ground.modifiers if item.show_viewport and item not in own]
+    theirs = [item for item in ground_mesh.users_modifiers(ground) if item.show_viewport]
     keyed = tuple(path for path, _ in animated_paths(ground))
     return next((item.name for item in theirs if _changes(item, ground, keyed)), "")
 

@@ -148,7 +148,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     mesh = ground_mesh.mesh_of(carrier).copy()
     display_key.drop_all(mesh)
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
-    if any(one.show_viewport and one not in ground_mesh.own_modifiers(carrier) for one in carrier.modifiers):
+    if any(item.show_viewport for item in ground_mesh.users_modifiers(carrier)):
         with ground_mesh.stand_in(carrier, mesh) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
         mesh.name = plain.name

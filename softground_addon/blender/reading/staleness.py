@@ -137,10 +137,8 @@ def _modifiers_of(ground: bpy.types.Object) -> list[str]:
 def _of_surface(scene: bpy.types.Scene) -> str:
     """What the ground's modifiers do, and how its material varies."""
     ground = scene.softground.ground
-    own = ground_mesh.own_modifiers(ground)
     keyed = digests.animated_paths_of(ground)
-    theirs = (modifier for modifier in ground.modifiers if modifier not in own)
-    told = [text for modifier in theirs for text in digests.of_settings(modifier, keyed)]
+    told = [text for modifier in ground_mesh.users_modifiers(ground) for text in digests.of_settings(modifier, keyed)]
     told += filter(None, [digests.of_keys(ground)])
     try:
         painted = [name for name in painted_ground.names_of(scene) if name]
