@@ -13,7 +13,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-from softground_addon.core import files
+from softground_addon.core.files import files
 
 REPOSITORY = Path(__file__).parents[1]
 

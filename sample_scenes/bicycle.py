@@ -12,7 +12,7 @@ import numpy as np
 from sample_scenes import production, stage
 from sample_scenes.course import Course
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.core.footprints import recompose
+from softground_addon.core.record.footprints import recompose
 
 CELL_SIZE = 0.006  # m
 FRAMES = 60  # 2.5 s

@@ -14,7 +14,7 @@ import numpy as np
 
 from sample_scenes import production, stage, terrain
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.core.footprints import Footprint
+from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.01  # m
 RATE = 48  # Hz

@@ -16,8 +16,8 @@ from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.core.footprints import Footprint, recompose
-from softground_addon.core.heightfield import HeightField
+from softground_addon.core.ground.heightfield import HeightField
+from softground_addon.core.record.footprints import Footprint, recompose
 
 CELL_SIZE = 0.012  # m
 FRAMES = 84  # 3.5 s

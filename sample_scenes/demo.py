@@ -26,8 +26,8 @@ from sample_scenes.keys import write_action
 from sample_scenes.production import addon
 from sample_scenes.stick_figure import add_stick_figure
 from softground_addon.blender.ground import ground_mesh
-from softground_addon.core import record
-from softground_addon.core.footprints import Footprint
+from softground_addon.core.record import record
+from softground_addon.core.record.footprints import Footprint
 
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 

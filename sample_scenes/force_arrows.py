@@ -20,7 +20,7 @@ from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.blender.interface import overlay_shapes
 from softground_addon.blender.reading import analysis
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.loads.estimate import CharacterLoads
 
 CELL_SIZE = 0.0075  # m
 FRAMES = 72  # 3 s

@@ -18,7 +18,7 @@ from sample_scenes.character import copy_character, create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.core.footprints import Footprint
+from softground_addon.core.record.footprints import Footprint
 
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 

@@ -17,8 +17,8 @@ from sample_scenes.four_legged import TROT, WALK, go_on_four_legs
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.blender.reading import analysis
-from softground_addon.core.footprints import Footprint
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.loads.estimate import CharacterLoads
+from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.005  # m
 FRAMES = 60  # 2.5 s

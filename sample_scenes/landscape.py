@@ -24,7 +24,7 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.run import Run, run
 from sample_scenes.snowshoe import ON_SNOWSHOES, put_on_snowshoes
 from softground_addon.blender.ground.materials import BLEND, ensure_blend
-from softground_addon.core.footprints import Footprint
+from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.01  # m
 FRAMES = 116

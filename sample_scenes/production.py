@@ -30,7 +30,7 @@ from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import character_setup
 from softground_addon.blender.ground import baked_ground
-from softground_addon.core.footprints import Footprint, recompose
+from softground_addon.core.record.footprints import Footprint, recompose
 
 OUTPUT = Path("build/scenes")
 
@@ -105,7 +105,7 @@ class Bake:
     footprints : tuple of Footprint
         In the order of their first contact.
     report : dict
-        See `core.report`.
+        See `core.files.report`.
     rim_share : (float, float)
         Least and largest part of the compressed volume that rises as a rim: 2·nu, times what is painted.
     layer_depth : float

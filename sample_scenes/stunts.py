@@ -17,8 +17,8 @@ from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.showpieces import dance, kick
 from softground_addon.blender.reading import analysis
-from softground_addon.core.footprints import Footprint
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.loads.estimate import CharacterLoads
+from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE = 0.0075  # m
 FRAMES = 100

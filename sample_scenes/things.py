@@ -21,8 +21,8 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.rolling_things import create_ball, drop, write_poses
 from sample_scenes.snowshoe import snowshoe_mesh
 from softground_addon.blender.reading import analysis
-from softground_addon.core.footprints import Footprint, recompose
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.loads.estimate import CharacterLoads
+from softground_addon.core.record.footprints import Footprint, recompose
 
 CELL_SIZE = 0.015  # m
 FRAMES = 56  # 2.3 s

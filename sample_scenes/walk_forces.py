@@ -17,7 +17,7 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.production import Bake, Claim, Options, Walker
 from softground_addon.blender.reading import analysis
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.loads.estimate import CharacterLoads
 
 mpl.use("Agg")
 from matplotlib import pyplot

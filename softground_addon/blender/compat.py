@@ -82,7 +82,7 @@ def remove_scene(scene: bpy.types.Scene) -> None:
 
 
 def straighten(curves: Any) -> None:
-    """Make polylines of all splines of curves; early Blenders take one of a single point more, in nobody's way."""
+    """Make curves of all splines of curves; early Blenders take one of a single point more, in nobody's way."""
     if hasattr(curves, "set_types"):
         curves.set_types(type="POLY")
     else:

@@ -46,7 +46,7 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     elif bpy.app.background:  # where a timer that waits would keep the bpy module from ending
         return
     elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
-        _later(compare_forecast)
+        _later(compare_prediction)
 
 
 def compare_bake() -> float | None:
@@ -60,7 +60,7 @@ def compare_bake() -> float | None:
     return None
 
 
-def compare_forecast() -> float | None:
+def compare_prediction() -> float | None:
     """Foretell nothing more of what has changed; for a timer, as it may take a while."""
     if session.current().is_baking:
         return SETTLED
@@ -152,6 +152,6 @@ def unregister() -> None:
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:
             handlers.remove(handler)
-    for job in (live.after_edit, compare_bake, compare_forecast):
+    for job in (live.after_edit, compare_bake, compare_prediction):
         if bpy.app.timers.is_registered(job):
             bpy.app.timers.unregister(job)

@@ -12,13 +12,13 @@ from .command_line import cli
 from .interface import (
     bake_result,
     character_editing,
-    forecast,
     ground_options_panel,
     menus,
     modal_bake,
     operators,
     overlay,
     panels,
+    prediction,
     preset_menu,
     response_panel,
 )
@@ -65,7 +65,7 @@ def register() -> None:
         for part in (handlers, overlay, menus):
             part.register()
             undo.callback(part.unregister)
-        undo.callback(forecast.unregister)
+        undo.callback(prediction.unregister)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import bpy
 
-from ..core.deformation import GroundMaterial
 from ..core.errors import InputError
-from ..core.presets import MATERIAL_RANGES, Preset
+from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
+from ..core.ground.presets import Preset
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 

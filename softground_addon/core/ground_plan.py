@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cell_keys import Keys, cells_at, cells_of, keys_of
-from .contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
-from .heightfield import FlatTerrain, SlopingTerrain, Terrain
-from .missed_steps import advice, missed_steps
-from .motion import CharacterMotion, SoleMotion
-from .solids import posed
+from .ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
+from .loads.contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
+from .loads.missed_steps import advice, missed_steps
+from .motion.motion import CharacterMotion, SoleMotion
+from .motion.props import posed
+from .numerics.cell_keys import Keys, cells_at, cells_of, keys_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -124,8 +124,8 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
     height = low + (float(np.median(floats)) if floats else 0.0)
     raster = min(lengths) / POINTS_ALONG_SOLE
     footfalls = [
-        _places_under_solid(sole, _terrain(height, slope), raster)
-        if sole.sole.solid
+        _places_under_prop(sole, _terrain(height, slope), raster)
+        if sole.sole.prop
         else _places_under(sole, touching, _terrain(low + offset, slope), raster)
         for motion, found in zip(motions, contacts, strict=True)
         for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True)
@@ -148,7 +148,7 @@ def _terrain(height: float, slope: Array) -> FlatTerrain | SlopingTerrain:
 
 def _feet(motion: CharacterMotion) -> list[SoleMotion]:
     """The soles that tell where the ground is: hands and canes need not ever touch it."""
-    return [sole for sole in motion.soles if sole.sole.solid is None] or list(motion.soles)
+    return [sole for sole in motion.soles if sole.sole.prop is None] or list(motion.soles)
 
 
 def _standing_height(motion: CharacterMotion, sole: SoleMotion, slope: Array) -> float:
@@ -156,7 +156,7 @@ def _standing_height(motion: CharacterMotion, sole: SoleMotion, slope: Array) ->
 
     A thing may fly for most of a shot, and its mesh touches exactly.
     """
-    if sole.sole.solid:
+    if sole.sole.prop:
         lifts = sole.lowest() - sole.transforms[:, 0, :2, 3] @ slope
     else:
         points = sole.landmark_positions()
@@ -190,7 +190,7 @@ def _footholds(motion: CharacterMotion) -> Array:
     """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which may rest on nothing."""
     limit = REST_SPEED * motion.froude_speed
     found = [np.zeros((0, 3))]
-    for sole in (sole for sole in motion.soles if sole.sole.solid is None):
+    for sole in (sole for sole in motion.soles if sole.sole.prop is None):
         points = sole.landmark_positions()
         lowest = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
         speed = np.linalg.norm(np.gradient(lowest, motion.time_step, axis=0), axis=-1) if len(lowest) > 1 else 0.0
@@ -220,15 +220,15 @@ def _places_under(sole: SoleMotion, touching: NDArray[np.bool_], terrain: Terrai
     return (cells_of(found) + 0.5) * raster
 
 
-def _places_under_solid(sole: SoleMotion, terrain: Terrain, raster: float) -> Array:
+def _places_under_prop(sole: SoleMotion, terrain: Terrain, raster: float) -> Array:
     """Places under the lower part of a body whenever it is near the ground, (N, 2) [m]: it may roll and sink in."""
-    solid = sole.sole.solid
-    assert solid is not None, sole.sole.name
-    near = SOLID_REACH * solid.size
+    prop = sole.sole.prop
+    assert prop is not None, sole.sole.name
+    near = SOLID_REACH * prop.size
     count = (len(sole.transforms) - 1) * PARTS_OF_A_FRAME + 1
     found: Keys = np.zeros(0, dtype=np.int64)
     for pose in sole.at(np.arange(count) / PARTS_OF_A_FRAME).transforms[:, 0]:
-        place = posed(solid.vertices, pose)
+        place = posed(prop.vertices, pose)
         place = place[place[:, 2] < terrain.heights(*place[:, :2].T) + near, :2]
         if len(place):
             low, high = np.floor(place.min(axis=0) / raster), np.floor(place.max(axis=0) / raster) + 1

@@ -9,11 +9,12 @@ from itertools import count as numbers
 import numpy as np
 from numpy.typing import NDArray
 
-from .deformation import GroundMaterial
-from .footprints import Footprint
-from .heightfield import HeightField, SparseGrid, Window
-from .simulation import CharacterLoads, FrameResult, Simulation
-from .soft_ground import SoftGround
+from .ground.heightfield import HeightField, SparseGrid, Window
+from .ground.material import GroundMaterial
+from .ground.soft_ground import SoftGround
+from .loads.estimate import CharacterLoads
+from .record.footprints import Footprint
+from .simulation import FrameResult, Simulation
 
 Array = NDArray[np.float64]
 

@@ -13,19 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .bed import UndisturbedCells
-from .contacts import runs
-from .deformation import GroundMaterial, compress, compression_rate, sink, target_compression, touching_fraction
 from .errors import InputError
-from .heightfield import Terrain, Window
-from .indentation import Springs, stress
-from .pressure import Pressure, pressure_field
-from .simulation import CharacterLoads
-from .sole_points import contact_window, places, point_contact, sole_points
-from .solid_imprint import ground_under
-from .solids import posed
-from .stance import descent
-from .variation import Factors, Variation, layer_factors
+from .ground.heightfield import Terrain, Window
+from .ground.material import GroundMaterial, Pressure
+from .ground.variation import Factors, Variation, layer_factors
+from .loads.estimate import CharacterLoads
+from .motion.props import posed
+from .numerics.intervals import runs
+from .pressing.contact_layout import descent
+from .pressing.deformation import compress, compression_rate, sink, target_compression, touching_fraction
+from .pressing.ground_cells import UndisturbedCells
+from .pressing.indentation import Springs, stress
+from .pressing.pressure import pressure_field
+from .pressing.prop_imprint import ground_under
+from .pressing.sole_points import contact_window, places, point_contact, sole_points
 
 Array = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ class StanceLoad:
 
 
 @dataclass(frozen=True)
-class SolidLoad:
+class PropLoad:
     """One body from touching down to leaving, as the ground feels it at some of its steps.
 
     Attributes
@@ -154,7 +155,7 @@ def _depth_under(springs: Springs, force: float, material: GroundMaterial) -> fl
 
 def stance_loads(
     loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float, variation: Variation | None = None
-) -> list[StanceLoad | SolidLoad]:
+) -> list[StanceLoad | PropLoad]:
     """Every stance of the characters, in the order of their first contact.
 
     Parameters
@@ -168,10 +169,10 @@ def stance_loads(
         How the ground varies from place to place.
     """
     cells = UndisturbedCells(terrain, variation, cell_size)
-    stances: list[StanceLoad | SolidLoad] = []
+    stances: list[StanceLoad | PropLoad] = []
     for character in loads:
         for index, sole in enumerate(character.motion.soles):
-            load = _solid_loads if sole.sole.solid else _sole_loads
+            load = _prop_loads if sole.sole.prop else _sole_loads
             stances += load(character, index, cells)
     return sorted(stances, key=lambda stance: float(stance.frames[0]))
 
@@ -217,12 +218,12 @@ def _sole_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) 
         )
 
 
-def _solid_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[SolidLoad]:
+def _prop_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[PropLoad]:
     """Every contact of a body."""
     motion = character.motion
     sole, force = motion.soles[index], character.forces.forces[:, index]
-    solid = sole.sole.solid
-    assert solid is not None, sole.sole.name
+    prop = sole.sole.prop
+    assert prop is not None, sole.sole.name
     normal_force = np.maximum(np.einsum("ni,ni->n", force, character.contacts.normal[:, index]), 0.0)
     for contact in _contacts_of(character, index):
         steps = np.arange(contact.start, contact.stop)
@@ -230,30 +231,30 @@ def _solid_loads(character: CharacterLoads, index: int, cells: UndisturbedCells)
         springs, pressing = [], []
         for step in chosen:
             pose = sole.transforms[step, 0]
-            place = posed(solid.vertices, pose)[:, :2]
+            place = posed(prop.vertices, pose)[:, :2]
             window = Window.around(place.min(axis=0), place.max(axis=0), cells.cell_size)
-            under = ground_under(solid, pose, cells.surface(window), np.inf, cells.factors(window))
+            under = ground_under(prop, pose, cells.surface(window), np.inf, cells.factors(window))
             if under is not None:
                 springs.append(under.springs)
                 pressing.append(normal_force[step])
-        yield SolidLoad(motion.name, sole.sole.name, motion.frames[steps], tuple(springs), np.array(pressing))
+        yield PropLoad(motion.name, sole.sole.name, motion.frames[steps], tuple(springs), np.array(pressing))
 
 
 def deepest(
-    stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, pressure: Pressure = "UNIFORM"
+    stances: Sequence[StanceLoad | PropLoad], material: GroundMaterial, pressure: Pressure = "UNIFORM"
 ) -> float:
     """Depth of the deepest print [m], 0 if there is none."""
     return max((stance.depth(material, pressure) for stance in stances), default=0.0)
 
 
 def matching_modulus(
-    stances: Sequence[StanceLoad | SolidLoad], material: GroundMaterial, depth: float, pressure: Pressure = "UNIFORM"
+    stances: Sequence[StanceLoad | PropLoad], material: GroundMaterial, depth: float, pressure: Pressure = "UNIFORM"
 ) -> float:
     """The modulus [Pa] at which the deepest print gets a depth, everything else being equal.
 
     Parameters
     ----------
-    stances : sequence of StanceLoad or SolidLoad
+    stances : sequence of StanceLoad or PropLoad
     material : GroundMaterial
     depth : float
         Wanted depth of the deepest print [m].

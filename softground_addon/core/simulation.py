@@ -5,87 +5,29 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bed import Timing
-from .body_dynamics import body_dynamics
-from .contact_timing import refine_contacts
-from .contacts import Contacts, detect_contacts, runs
-from .continuation import continued, without_holds
-from .deformation import GroundMaterial
 from .errors import InputError
-from .footprints import Footprint
-from .forces import ContactForces, impulse_forces, whole_body_forces
-from .free_bodies import free_loads
-from .heightfield import HeightField, Terrain, Window
-from .motion import CharacterMotion, SoleMotion, steps_per_frame
-from .pressing import Press
-from .soft_ground import SoftGround
-from .sole_points import SolePoints, sole_points
-from .sole_stance import SoleStance
-from .solid_stance import SolidStance
-from .stance import Stance, Steps
+from .ground.heightfield import HeightField, Window
+from .ground.material import GroundMaterial
+from .ground.soft_ground import SoftGround
+from .loads.estimate import CharacterLoads
+from .motion.motion import SoleMotion
+from .numerics.intervals import runs
+from .pressing.contact_layout import Stance, Steps
+from .pressing.ground_cells import Timing
+from .pressing.prop_layout import PropLayout
+from .pressing.sole_layout import SoleLayout
+from .pressing.sole_points import SolePoints, sole_points
+from .pressing.solver import Press
+from .record.footprints import Footprint
 
 Array = NDArray[np.float64]
 
 LONGEST_TRACK = 8.0
 """Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
-
-ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
-
-
-@dataclass(frozen=True)
-class CharacterLoads:
-    """What one character does to the ground, on the simulation's time grid."""
-
-    motion: CharacterMotion
-    contacts: Contacts
-    forces: ContactForces
-
-
-def estimate_loads(
-    motion: CharacterMotion,
-    terrain: Terrain,
-    *,
-    force_model: ForceModel,
-    material: GroundMaterial,
-    crisp_landings: bool = False,
-) -> CharacterLoads:
-    """Resample the motion to the simulation's time grid, find its contacts and estimate its forces.
-
-    Parameters
-    ----------
-    motion : CharacterMotion
-        At scene frames.
-    terrain : Terrain
-        The undisturbed ground.
-    force_model : 'WHOLE_BODY' or 'IMPULSE'
-    material : GroundMaterial
-        Its characteristic time shapes the impulse model and the landings of things without a skeleton; the
-        whole-body model of a character does not depend on it.
-    crisp_landings : bool
-        See `whole_body_forces`.
-    """
-    steps = steps_per_frame(motion.frame_rate)
-    if motion.centre is not None:
-        tau = material.characteristic_time
-        return CharacterLoads(
-            *free_loads(motion, terrain, steps=steps, characteristic_time=tau, force_model=force_model)
-        )
-    source, given = continued(without_holds(motion))
-    source = source.resampled(steps)
-    contacts = detect_contacts(source, terrain)
-    if force_model == "IMPULSE":
-        forces = impulse_forces(source, contacts, material.characteristic_time)
-    else:
-        body = body_dynamics(source, ~contacts.touching.any(axis=1))
-        contacts = refine_contacts(source, contacts, body)
-        forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
-    shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
-    return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))
 
 
 @dataclass(frozen=True)
@@ -222,7 +164,7 @@ class _Waiting:
             contact = self._contacts.popleft()
             stance = contact.stance(self._frames)
             earlier = self._latest.get(contact.of)
-            if isinstance(stance, SolidStance) and earlier and earlier.end == contact.since:
+            if isinstance(stance, PropLayout) and earlier and earlier.end == contact.since:
                 stance.earlier = earlier
             self._latest[contact.of] = stance
             yield stance
@@ -242,7 +184,7 @@ class _Contact:
     since, first : int
         Steps of the time grid from which it touches, and presses.
     points : SolePoints or None
-        Of the sole, None of a solid.
+        Of the sole, None of a prop.
     """
 
     character: CharacterLoads
@@ -267,15 +209,15 @@ class _Contact:
             forces.centre_of_pressure[during, index],
         )
         if self.points is None:
-            return SolidStance(motion.name, sole, steps)
-        return SoleStance(motion.name, sole, steps, self.points)
+            return PropLayout(motion.name, sole, steps)
+        return SoleLayout(motion.name, sole, steps, self.points)
 
 
 def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
     """The contacts of a sole of a character, which appears at a step of the time grid."""
     motion = character.motion.soles[index]
     tracks = list(_tracks(motion, character.contacts.touching[:, index]))
-    points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.solid else None
+    points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.prop else None
     for since, end in tracks:
         begin = max(since, 1 - offset)  # the first step of the grid is a state, it presses nothing
         if begin < end:
@@ -284,13 +226,13 @@ def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -
 
 def _tracks(motion: SoleMotion, touching: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """First steps of the contacts, and the steps after their last; those of a body that travels far are cut."""
-    solid = motion.sole.solid
+    prop = motion.sole.prop
     for first, end in zip(*runs(touching), strict=True):
         begin = int(first)
-        if solid is not None:
+        if prop is not None:
             place = motion.transforms[:, 0, :2, 3]
             for step in range(begin + 1, int(end)):
-                if np.abs(place[step] - place[begin]).max() > LONGEST_TRACK * solid.extent.max():
+                if np.abs(place[step] - place[begin]).max() > LONGEST_TRACK * prop.extent.max():
                     yield begin, step
                     begin = step
         yield begin, int(end)

@@ -6,12 +6,12 @@ import time
 import numpy as np
 import pytest
 
-from softground_addon.core.body_dynamics import body_dynamics
-from softground_addon.core.contact_timing import refine_contacts
-from softground_addon.core.contacts import detect_contacts
-from softground_addon.core.forces import whole_body_forces
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.motion import steps_per_frame
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.loads.body_dynamics import body_dynamics
+from softground_addon.core.loads.contact_timing import refine_contacts
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.forces import whole_body_forces
+from softground_addon.core.motion.motion import steps_per_frame
 from tests.core import spring_mass
 from tests.core.character import character, flat_sole
 from tests.core.spring_mass import LEG, motion_and_forces

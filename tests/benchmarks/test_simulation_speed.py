@@ -4,9 +4,9 @@ from time import thread_time
 
 import pytest
 
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.footprints import recompose
-from softground_addon.core.smoothing import blurred
+from softground_addon.core.ground.display_blur import blurred
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.record.footprints import recompose
 from tests.core.walkers import pressed, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)

@@ -12,11 +12,11 @@ from softground_addon.blender.characters.character_setup import mapping_of
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
-from softground_addon.core.foot_placement import lowest_clearance, posed_points
-from softground_addon.core.ground_history import GroundHistory
-from softground_addon.core.grounding import leg_soles
-from softground_addon.core.legs import Leg
-from softground_addon.core.motion import SoleMotion
+from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.record.ground_history import GroundHistory
+from softground_addon.core.response.foot_placement import lowest_clearance, posed_points
+from softground_addon.core.response.grounding import leg_soles
+from softground_addon.core.response.legs import Leg
 from tests.blender import rigs
 
 _MIXAMO = {

@@ -12,10 +12,10 @@ from softground_addon.blender.characters.character_setup import set_up_automatic
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
-from softground_addon.core import record
 from softground_addon.core.errors import InputError
-from softground_addon.core.presets import FOLDER
-from softground_addon.core.simulation import CharacterLoads
+from softground_addon.core.ground.presets import FOLDER
+from softground_addon.core.loads.estimate import CharacterLoads
+from softground_addon.core.record import record
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights, plane, rest
 

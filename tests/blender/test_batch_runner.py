@@ -14,7 +14,7 @@ import pytest
 
 from softground_addon.blender.command_line.batch_runner import Outcome, Step, Workplace, run
 from softground_addon.core.errors import InputError
-from softground_addon.core.manifest import BatchShot
+from softground_addon.core.files.manifest import BatchShot
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,7 +23,7 @@ WORKER = """
     import json, os, signal, sys, time
     from pathlib import Path
     sys.path.insert(0, ROOT)
-    from softground_addon.core import files, receipts
+    from softground_addon.core.files import files, receipts
     shot, options = Path(sys.argv[1]), dict(option[2:].partition("=")[::2] for option in sys.argv[2:])
     with open(f"{shot}.runs", "a") as runs:
         runs.write(f"{os.getpid()}\\n")
@@ -274,7 +274,7 @@ def test_no_shot_is_baked_twice_however_often_the_batch_is_killed(batch):
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from pathlib import Path\n"
         "from softground_addon.blender.command_line.batch_runner import Workplace, run\n"
-        "from softground_addon.core.manifest import BatchShot\n"
+        "from softground_addon.core.files.manifest import BatchShot\n"
         f"folder = Path({str(batch.folder)!r})\n"
         "shots = [BatchShot(name=name, file=folder / f'{name}.blend', save=folder / 'baked' / f'{name}.blend')\n"
         "         for name in 'abcdefgh']\n"

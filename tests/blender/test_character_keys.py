@@ -11,7 +11,7 @@ from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.response import response_job
 from softground_addon.blender.response.character_keys import controls_of
 from softground_addon.core.errors import InputError
-from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.ground.heightfield import FlatTerrain
 from tests.blender import auto_rig_pro, fingerprints, responders, rigs, shots
 
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.animation_layer import nla_layer
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.orientation import quaternion_power, quaternion_product, rotation_matrices
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.numerics.orientation import quaternion_power, quaternion_product, rotation_matrices
 from tests.blender import fingerprints, responders, shots
 
 BONES = ["hips", "thigh.L", "shin.L", "foot.L", "thigh.R", "hand.L"]

@@ -13,7 +13,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground, playback
 from softground_addon.blender.output import export_formats, exports, image_exports
-from softground_addon.core import point_cache
+from softground_addon.core.files import point_cache
 from tests.blender import command_line, shots
 from tests.blender.grounds import plane
 from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image

@@ -9,10 +9,10 @@ from softground_addon.blender.baking import bake_job, bake_report
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground, ground_mesh, playback
 from softground_addon.blender.output import exports, image_exports
-from softground_addon.core import point_cache
 from softground_addon.core.errors import InputError
-from softground_addon.core.pressed_ground import PressedGround
-from softground_addon.core.ramps import TOLERANCE
+from softground_addon.core.files import point_cache
+from softground_addon.core.playback.ramps import TOLERANCE
+from softground_addon.core.record.pressed_ground import PressedGround
 from tests.blender import shots
 from tests.blender.grounds import plane
 

@@ -9,9 +9,9 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import painted_ground
 from softground_addon.blender.properties import material
 from softground_addon.blender.reading import analysis
-from softground_addon.core.deformation import GroundMaterial
 from softground_addon.core.errors import InputError
-from softground_addon.core.presets import MATERIAL_RANGES, find
+from softground_addon.core.ground.material import MATERIAL_RANGES, GroundMaterial
+from softground_addon.core.ground.presets import find
 from tests.blender import shots
 from tests.blender.grounds import bake, heights, plane, rest
 

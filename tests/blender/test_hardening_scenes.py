@@ -191,7 +191,7 @@ def test_a_linked_ground_is_refused_with_what_to_do(walker, tmp_path, capfd):
 
 def test_an_absurd_cell_size_is_refused_with_the_estimate(scene, capfd, monkeypatch):
     shots.walker(scene, frames=72)
-    monkeypatch.setattr("softground_addon.core.cell_limits.machine_memory", lambda: 2e9)
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 2e9)
     said = refused(capfd, "--cell-size", "0.0001")
     assert "GB of memory" in said
     size = float(said.partition("at least ")[2].partition(" mm")[0]) / 1e3
@@ -266,7 +266,7 @@ def fifty(first, *marks):
     ids=lambda numbers: f"{numbers.start}-{numbers.stop}",
 )
 def test_a_random_scene_is_baked_or_refused_and_the_ground_is_finite(addon, capfd, monkeypatch, numbers):
-    monkeypatch.setattr("softground_addon.core.cell_limits.machine_memory", lambda: 1e9)  # giants are refused
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 1e9)  # giants are refused
     codes = {0: 0, 2: 0}
     for number in numbers:
         chance = random.Random(1000 + number)

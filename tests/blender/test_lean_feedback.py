@@ -13,18 +13,18 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
     scene.softground.tilt.strength = 1.0
     scene.softground.material.youngs_modulus = 6e4
     leans, answers = [], []
-    leaning, answers_of = response_job.leaning, response_job.answers_of
+    leaning, responses_of = response_job.leaning, response_job.responses_of
 
     def watched(*arguments):
         leans.append(leaning(*arguments))
         return leans[-1]
 
     def kept(*arguments):
-        answers.extend(answers_of(*arguments))
+        answers.extend(responses_of(*arguments))
         return answers
 
     monkeypatch.setattr(response_job, "leaning", watched)
-    monkeypatch.setattr(response_job, "answers_of", kept)
+    monkeypatch.setattr(response_job, "responses_of", kept)
     responders.bake(scene)
     first, last = leans[0].leans[0], answers[0].response.lean
     assert np.abs(first).max() > response_job.NOTICEABLE_LEAN, "the body sways over its own prints"

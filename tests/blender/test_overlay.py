@@ -9,7 +9,7 @@ from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.interface import overlay, overlay_shapes
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
-from softground_addon.core import record
+from softground_addon.core.record import record
 from tests.blender.shots import walker
 
 

@@ -10,7 +10,7 @@ from softground_addon.blender import jobs, registration
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.interface import bake_result, panels, preset_menu
 from softground_addon.blender.reading import analysis
-from softground_addon.core import presets
+from softground_addon.core.ground import presets
 from tests.blender.shots import import_motion, walker
 
 

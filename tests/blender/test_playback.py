@@ -10,10 +10,10 @@ import pytest
 
 from softground_addon.blender.ground import ground_mesh, playback
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.polylines import polylines_at
-from softground_addon.core.pressed_ground import PressedGround
-from softground_addon.core.ramps import TOLERANCE
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.playback.playback_curves import playback_curves_at
+from softground_addon.core.playback.ramps import TOLERANCE
+from softground_addon.core.record.pressed_ground import PressedGround
 from tests.core.walkers import pressed, walk
 
 SAND = GroundMaterial(330e3, 0.45, 0.1, blur_sigma=0.01)
@@ -50,8 +50,8 @@ def bake_onto(ground, footprints, material=SAND, unit_scale=1.0, shape_keys=True
     place = surface.vertices[index, :2].T
     ground_mesh.write(ground, index, pressed_ground.sample(*place), b"record", unit_scale, shape_keys=shape_keys)
     up = ground_mesh.up_of(ground, unit_scale)
-    spans, lines = polylines_at(footprints, *place, blur_sigma=material.blur_sigma, frame_rate=30.0)
-    with playback.timelines(lines) as table:
+    spans, lines = playback_curves_at(footprints, *place, blur_sigma=material.blur_sigma, frame_rate=30.0)
+    with playback.keyframe_tables(lines) as table:
         playback.attach(ground, index[spans.point], spans, table, up=up)
     return surface
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground.ground_mesh import undisturbed_surface
-from softground_addon.core.contacts import detect_contacts
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.loads.contacts import detect_contacts
 from tests.blender import responders, shots
 
 KNEE_PER_FRAME = 15.0

@@ -8,7 +8,7 @@ import pytest
 
 from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.core.errors import InputError
-from softground_addon.core.motion import JOINTS
+from softground_addon.core.motion.motion import JOINTS
 
 from . import rigs, shots
 

@@ -9,8 +9,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from softground_addon.blender.ground import baked_ground, ground_mesh, playback
 from softground_addon.blender.live import live
-from softground_addon.core.pressed_ground import PressedGround
-from softground_addon.core.ramps import TOLERANCE
+from softground_addon.core.playback.ramps import TOLERANCE
+from softground_addon.core.record.pressed_ground import PressedGround
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 from tests.blender.test_playback import world_positions

@@ -409,7 +409,7 @@ def test_contacts_are_added_from_what_is_selected(scene):
     limbs = [sole for sole in scene.softground.characters[0].soles if sole.kind == "LIMB"]
     assert {sole.side for sole in limbs} == {"LEFT", "RIGHT"}
     (motion,) = jobs.run(read_shot(scene)).motions
-    assert [sole.sole.solid is not None for sole in motion.soles] == [False, False, True, True]
+    assert [sole.sole.prop is not None for sole in motion.soles] == [False, False, True, True]
     # Hands that only swing by change nothing.
     report = bake(scene, frame_end=20).report
     assert {step["contact"] for step in report["steps"]} <= {"foot.L", "foot.R"}

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.ground import ground_mesh, refined_mesh, trail_detail
-from softground_addon.core.cell_keys import keys_of
-from softground_addon.core.refinement import refine
-from softground_addon.core.region import Region
+from softground_addon.core.meshing.refinement import refine
+from softground_addon.core.meshing.region import Region
+from softground_addon.core.numerics.cell_keys import keys_of
 from tests.blender import fingerprints, grounds
 from tests.blender.shots import walker
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softground_addon.core.ramps import TOLERANCE
+from softground_addon.core.playback.ramps import TOLERANCE
 from tests.blender.version_worker import BETWEEN, FRAMES
 
 pytestmark = pytest.mark.versions

@@ -18,7 +18,7 @@ def make(blend: str, heights: str) -> None:
     from softground_addon.blender import jobs
     from softground_addon.blender.baking import bake_job
     from softground_addon.blender.ground import baked_ground, ground_mesh
-    from softground_addon.core.pressed_ground import PressedGround
+    from softground_addon.core.record.pressed_ground import PressedGround
     from tests.blender import shots
     from tests.blender.grounds import plane
     from tests.blender.test_playback_render import set_up_render

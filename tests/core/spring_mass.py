@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from softground_addon.core.motion import CharacterMotion
+from softground_addon.core.motion.motion import CharacterMotion
 from tests.core.character import character, flat_sole
 
 MASS, LEG, GRAVITY = 80.0, 1.0, 9.81

@@ -8,7 +8,12 @@ import pytest
 
 from softground_addon import core
 
-SHOWN = sorted(path.stem for path in Path(core.__file__).parent.glob("*.py") if ">>> " in path.read_text("utf-8"))
+CORE = Path(core.__file__).parent
+SHOWN = sorted(
+    ".".join(path.relative_to(CORE).with_suffix("").parts)
+    for path in CORE.rglob("*.py")
+    if ">>> " in path.read_text("utf-8")
+)
 
 
 @pytest.mark.parametrize("name", SHOWN)

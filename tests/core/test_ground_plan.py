@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.contacts import detect_contacts
-from softground_addon.core.deformation import GroundMaterial
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground_plan import plan_ground
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.simulation import estimate_loads
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.estimate import estimate_loads
 from tests.core.walkers import pressed, through_scene_frames, walk
 
 

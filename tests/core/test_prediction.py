@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.prediction import deepest, stance_loads
 from softground_addon.core.simulation import simulate
-from softground_addon.core.soft_ground import SoftGround
-from tests.core.solid_bodies import solid_sole, sphere
-from tests.core.test_solid_prints import resting
+from tests.core.pressing.test_prop_prints import resting
+from tests.core.prop_bodies import prop_sole, sphere
 from tests.core.walkers import walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
@@ -55,7 +55,7 @@ def test_the_foretold_depth_is_the_pressed_one(options, painted, pressure):
 @pytest.mark.parametrize("painted", [False, True], ids=["even", "painted"])
 @pytest.mark.parametrize("crust", [0.0, 2e3, 1e6])
 def test_the_foretold_depth_of_a_ball_that_rests_is_the_pressed_one(crust, painted):
-    loads = resting(solid_sole(*sphere(0.15, rings=32)), (0.3, 0.0, 0.15), 300.0, seconds=3.0)
+    loads = resting(prop_sole(*sphere(0.15, rings=32)), (0.3, 0.0, 0.15), 300.0, seconds=3.0)
     material, variation = replace(SNOW, crust_stress=crust), Stripes() if painted else None
     stances = stance_loads([loads], FlatTerrain(), CELL, variation)
     expected = pressed(loads, material, "UNIFORM", variation)

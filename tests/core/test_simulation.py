@@ -6,13 +6,14 @@ from math import inf
 import numpy as np
 import pytest
 
-from softground_addon.core.deformation import GroundMaterial, equilibrium_depth
 from softground_addon.core.errors import InputError
-from softground_addon.core.footprints import recompose
-from softground_addon.core.heightfield import FlatTerrain, Window
+from softground_addon.core.ground.heightfield import FlatTerrain, Window
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.pressing.deformation import equilibrium_depth
+from softground_addon.core.pressing.sole_points import TOLERANCE
+from softground_addon.core.record.footprints import recompose
 from softground_addon.core.simulation import Simulation, simulate
-from softground_addon.core.soft_ground import SoftGround
-from softground_addon.core.sole_points import TOLERANCE
 from tests.core.walkers import (
     GRAVITY,
     MASS,

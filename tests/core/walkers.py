@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from softground_addon.core.contacts import Contacts
-from softground_addon.core.forces import ContactForces
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
-from softground_addon.core.simulation import CharacterLoads, simulate
-from softground_addon.core.soft_ground import SoftGround
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.loads.contacts import Contacts
+from softground_addon.core.loads.estimate import CharacterLoads
+from softground_addon.core.loads.forces import ContactForces
+from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
+from softground_addon.core.simulation import simulate
 
 MASS = 77.5
 GRAVITY = 9.81

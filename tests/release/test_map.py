@@ -6,8 +6,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BLENDER = ROOT / "softground_addon/blender"
-FOLDERS = sorted(path.parent.name for path in BLENDER.glob("*/__init__.py") if path.parent.name != "properties")
+HALVES = {half: ROOT / "softground_addon" / half for half in ("core", "blender")}
+FOLDERS = [
+    (half, path.parent.name)
+    for half, root in HALVES.items()
+    for path in sorted(root.glob("*/__init__.py"))
+    if path.parent.name != "properties"
+]
 
 
 def modules(folder):
@@ -24,25 +29,24 @@ def shown(text):
     return sorted(re.findall(r"`(\w+)`", text))
 
 
-def test_every_module_of_the_core_is_on_the_map_once():
-    assert shown(section("core")) == sorted(modules(ROOT / "softground_addon/core"))
+@pytest.mark.parametrize("half", HALVES)
+def test_the_map_has_a_row_for_each_folder(half):
+    rows = re.findall(r"^\| `(\w+)/`", section(half), re.MULTILINE)
+    assert sorted(rows) == [folder for of, folder in FOLDERS if of == half]
 
 
-def test_the_map_has_a_row_for_each_folder():
-    assert sorted(re.findall(r"^\| `(\w+)/`", section("blender"), re.MULTILINE)) == FOLDERS
+@pytest.mark.parametrize(("half", "folder"), FOLDERS)
+def test_the_row_of_a_folder_shows_its_modules(half, folder):
+    (row,) = re.findall(rf"^\| `{folder}/`.*", section(half), re.MULTILINE)
+    assert shown(row) == sorted(modules(HALVES[half] / folder))
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_the_row_of_a_folder_shows_its_modules(folder):
-    (row,) = re.findall(rf"^\| `{folder}/`.*", section("blender"), re.MULTILINE)
-    assert shown(row) == sorted(modules(BLENDER / folder))
+@pytest.mark.parametrize(("half", "folders"), [("core", set()), ("blender", {"properties"})])
+def test_the_first_row_shows_what_is_in_no_folder(half, folders):
+    (row,) = re.findall(rf"^\| `softground_addon/{half}` itself.*", section(half), re.MULTILINE)
+    assert shown(row) == sorted(modules(HALVES[half]) | folders)
 
 
-def test_the_first_row_shows_what_is_in_no_folder():
-    (row,) = re.findall(r"^\| `softground_addon/blender` itself.*", section("blender"), re.MULTILINE)
-    assert shown(row) == sorted({*modules(BLENDER), "properties"})
-
-
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_a_folder_says_what_it_is_for(folder):
-    assert (BLENDER / folder / "__init__.py").read_text(encoding="utf-8").startswith('"""')
+@pytest.mark.parametrize(("half", "folder"), FOLDERS)
+def test_a_folder_says_what_it_is_for(half, folder):
+    assert (HALVES[half] / folder / "__init__.py").read_text(encoding="utf-8").startswith('"""')

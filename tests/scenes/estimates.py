@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
 
 SNOW = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
 
@@ -17,7 +17,7 @@ def loads_in_blender(scene, body, motion, terrain=None):
     from softground_addon.blender.characters.rig_mapping import map_rig
     from softground_addon.blender.characters.rig_sampling import sample_character
     from softground_addon.blender.jobs import run
-    from softground_addon.core.simulation import estimate_loads
+    from softground_addon.core.loads.estimate import estimate_loads
 
     armature = create_character("Body", body, scene.collection)
     write_action(armature, motion, "Motion", first_frame=0)

@@ -37,7 +37,7 @@ def lanes(demo, scene):
     """Footprints of each ground of the saved shot, and where its walker stands."""
     import bpy
 
-    from softground_addon.core import record
+    from softground_addon.core.record import record
 
     bpy.ops.wm.open_mainfile(filepath=str(demo[0] / "demo.blend"))
     found = {}

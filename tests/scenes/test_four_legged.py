@@ -147,8 +147,8 @@ class TestInBlender:
         from softground_addon.blender.characters.rig_mapping import RigMapping, SoleSource, map_rig
         from softground_addon.blender.characters.rig_sampling import sample_character
         from softground_addon.blender.jobs import run
-        from softground_addon.core.heightfield import FlatTerrain
-        from softground_addon.core.simulation import estimate_loads
+        from softground_addon.core.ground.heightfield import FlatTerrain
+        from softground_addon.core.loads.estimate import estimate_loads
         from tests.scenes.estimates import SNOW
 
         dog = Dog()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.presets import SURFACES
+from softground_addon.core.ground.presets import SURFACES
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from matplotlib import pyplot as plt
 
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.simulation import CharacterLoads, estimate_loads
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
 from tests.validation.through_blender import motion_of_bvh
 from tests.validation.trials import read_trial
 from tests.validation.validate import validate

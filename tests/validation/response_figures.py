@@ -13,7 +13,7 @@ import numpy as np
 
 import softground_addon
 from sample_scenes.stick_figure import add_stick_figure
-from softground_addon.core.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains, lean
+from softground_addon.core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains, lean
 from tests.blender import responders, rigs, shots
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"

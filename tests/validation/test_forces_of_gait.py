@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softground_addon.core.contacts import detect_contacts
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.motion import CharacterMotion
-from softground_addon.core.simulation import CharacterLoads, estimate_loads
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
+from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.scoring import Score, plates_saw_everything, score
 from tests.validation.trials import Trial, motion_of_trial, read_trial
 

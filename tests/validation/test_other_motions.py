@@ -16,10 +16,10 @@ import pytest
 
 pytest.importorskip("bpy")
 
-from softground_addon.core.contacts import runs
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.simulation import CharacterLoads, estimate_loads
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
+from softground_addon.core.numerics.intervals import runs
 from tests.validation.through_blender import motion_of_bvh
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

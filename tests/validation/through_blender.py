@@ -8,7 +8,7 @@ import bpy
 
 from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
-from softground_addon.core.motion import CharacterMotion
+from softground_addon.core.motion.motion import CharacterMotion
 
 
 def motion_of_bvh(

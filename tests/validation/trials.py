@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.motion import JOINTS, CharacterMotion, Sole, SoleMotion
+from softground_addon.core.motion.motion import JOINTS, CharacterMotion, Sole, SoleMotion
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.contacts import detect_contacts
-from softground_addon.core.deformation import GroundMaterial
-from softground_addon.core.heightfield import FlatTerrain
-from softground_addon.core.motion import CharacterMotion
-from softground_addon.core.simulation import ForceModel, estimate_loads
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.estimate import ForceModel, estimate_loads
+from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.plots import plot_trial
 from tests.validation.scoring import plates_saw_everything, score
 from tests.validation.through_blender import motion_of_bvh

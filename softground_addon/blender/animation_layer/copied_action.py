@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.orientation import quaternion_power, quaternion_product
+from ...core.numerics.orientation import quaternion_power, quaternion_product
 from ..compat import action_curves, channels_of, new_channels, set_slot, slot_of
 from .layer_curves import LayerCurve, add_curve, new_action, set_value, value_of
 

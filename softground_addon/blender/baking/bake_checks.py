@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
-from ...core.deformation import GroundMaterial
 from ...core.errors import BakeError, InputError
-from ...core.footprints import QUANTUM, Footprint
-from ...core.motion import CharacterMotion
+from ...core.ground.material import GroundMaterial
+from ...core.motion.motion import CharacterMotion
+from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
+from ...core.record.footprints import QUANTUM, Footprint
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

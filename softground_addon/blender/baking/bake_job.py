@@ -18,15 +18,17 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import record, report
-from ...core.cell_limits import check_cell_size
-from ...core.footprints import Footprint
-from ...core.polylines import polylines_at
-from ...core.pressed_ground import PressedGround, Trail, sample_at
-from ...core.refinement import refine
-from ...core.region import Region
-from ...core.simulation import CharacterLoads, simulate
-from ...core.sole_marks import sole_marks
+from ...core.files import report
+from ...core.loads.cell_limits import check_cell_size
+from ...core.loads.estimate import CharacterLoads
+from ...core.meshing.refinement import refine
+from ...core.meshing.region import Region
+from ...core.playback.playback_curves import playback_curves_at
+from ...core.record import record
+from ...core.record.footprints import Footprint
+from ...core.record.pressed_ground import PressedGround, Trail, sample_at
+from ...core.record.sole_marks import sole_marks
+from ...core.simulation import simulate
 from .. import settings
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
@@ -49,7 +51,7 @@ class BakeResult:
     Attributes
     ----------
     report : dict
-        For JSON (see `core.report`).
+        For JSON (see `core.files.report`).
     footprints : tuple of Footprint
     """
 
@@ -199,7 +201,7 @@ def _write(
         x, y = place.position[:, 0], place.position[:, 1]
         sample = yield from aside("write", 0.6, partial(sample_at, footprints, x, y, **at_the_end))
         over_time = partial(
-            polylines_at,
+            playback_curves_at,
             footprints,
             x,
             y,
@@ -208,7 +210,7 @@ def _write(
             time_stretch=settings.time_stretch_of(scene),  # nodes count the animation's frames
         )
         spans, lines = yield from aside("write", 0.7, over_time)
-        table = drafts.enter_context(playback.timelines(lines))
+        table = drafts.enter_context(playback.keyframe_tables(lines))
         del lines  # they are large, and all is in the table
         marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
         yield Progress("write", 0.9)
@@ -281,7 +283,7 @@ def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Ar
 
 def _press(
     scene: bpy.types.Scene, shot: Shot
-) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object] | None, list[response_job.Answer]]]:
+) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object] | None, list[response_job.CharacterResponse]]]:
     """Loads, footprints and, on request, forces of a shot, and how its characters answer.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
@@ -303,7 +305,7 @@ def _press(
         loads = yield from estimate_shot(scene, replace(shot, motions=leaning.motions))
         footprints, forces = yield from _simulate(scene, shot, loads)
     check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
-    return loads, footprints, forces, response_job.answers_of(loads, shot.motions, shot.terrain, footprints, asked)
+    return loads, footprints, forces, response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
 
 
 def _simulate(

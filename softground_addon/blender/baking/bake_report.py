@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.footprints import Footprint
-from ...core.missed_steps import advice, missed_steps
-from ...core.simulation import CharacterLoads
-from ...core.sliding import treadmill_speed
+from ...core.loads.estimate import CharacterLoads
+from ...core.loads.missed_steps import advice, missed_steps
+from ...core.loads.sliding import treadmill_speed
+from ...core.record.footprints import Footprint
 from .. import properties, settings
 from ..characters.character_setup import characters_of, mapping_of, title_of
 from ..ground import still_ground

@@ -10,12 +10,12 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.solids import mass_properties
+from ...core.motion.props import mass_properties
 from ..properties import SoftGroundCharacter
 from ..settings import exists, time_stretch_of
+from .prop_extraction import surface_of
 from .rig_mapping import RigMapping, SoleSource, instances_armature, map_rig, require_armature
 from .rig_sampling import is_animated, is_simulated
-from .solid_extraction import surface_of
 
 _SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
 _SIDE_TO_ENUM = {code: side for side, code in _SIDE_TO_CODE.items()}

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.orientation import euler_rotations, rotation_matrices
-from ...core.rigid import rotation, unit
+from ...core.numerics.orientation import euler_rotations, rotation_matrices
+from ...core.numerics.rigid import rotation, unit
 from ..compat import HAS_SLOTS, action_curves, slot_of
 
 Array = NDArray[np.float64]

@@ -10,7 +10,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.foot_attitude import (
+from ...core.motion.motion import Array, CharacterMotion, SoleMotion
+from ...core.motion.props import capsule
+from ...core.numerics.interpolation import in_stretches
+from ...core.numerics.rigid import displacement, nearest_rotation, unit
+from ...core.soles.foot_attitude import (
     UP,
     FlatFoot,
     FootSize,
@@ -20,11 +24,7 @@ from ...core.foot_attitude import (
     reflection,
     standing_up,
 )
-from ...core.interpolation import in_stretches
-from ...core.motion import Array, CharacterMotion, SoleMotion
-from ...core.rigid import displacement, nearest_rotation, unit
-from ...core.soles import PlacedSole, solid_sole
-from ...core.solids import capsule
+from ...core.soles.soles import PlacedSole, prop_sole
 from ..jobs import meanwhile
 from ..settings import frame_rate_of, gravity_of
 from .rig_at_rest import RestPose
@@ -179,7 +179,7 @@ def _limb_motions(
             length = float(np.linalg.norm(tail - head))
             vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
         middle = vertices.mean(axis=0)
-        sole = solid_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
+        sole = prop_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
         transforms = _rigid_motion(recording.bone(source.bone), rest.matrix(source.bone))
         transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
         motions[source.name] = SoleMotion(sole, transforms[:, None])

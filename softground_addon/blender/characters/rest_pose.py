@@ -12,7 +12,7 @@ from itertools import combinations
 import bpy
 import numpy as np
 
-from ...core.motion import Array
+from ...core.motion.motion import Array
 
 Joints = dict[str, tuple[str, str]]
 Feet = list[tuple[str, str, str, str]]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.foot_attitude import UP
-from ...core.motion import Array
-from ...core.rigid import rotation, turn_between, unit
+from ...core.motion.motion import Array
+from ...core.numerics.rigid import rotation, turn_between, unit
+from ...core.soles.foot_attitude import UP
 from .rig_mapping import RigMapping
 
 _ACROSS, _ALONG = 0.6, 0.7

@@ -55,7 +55,7 @@ class RigMapping:
     Attributes
     ----------
     joints : mapping of str to BoneEnd
-        Canonical joint (`core.motion.JOINTS`) to the end of a bone.
+        Canonical joint (`core.motion.motion.JOINTS`) to the end of a bone.
     soles : tuple of SoleSource
         What prints, feet first.
     method : str

@@ -15,14 +15,14 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion import CharacterMotion
+from ...core.motion.motion import CharacterMotion
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
 from ..settings import frame_rate_of, gravity_of, time_stretch_of
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .motion_assembly import Recording, assemble_motion
+from .prop_extraction import check_things, prop_motion
 from .rig_mapping import RigMapping, SoleSource, require_armature
-from .solid_extraction import check_things, solid_motion
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -92,7 +92,7 @@ def sample_character(
         recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
     _check_recording(armature.name, recording)
     carried = {
-        source.name: solid_motion(scene, source, recording.things[source.object])[0]
+        source.name: prop_motion(scene, source, recording.things[source.object])[0]
         for source in mapping.soles
         if source.object
     }
@@ -125,14 +125,14 @@ def sample_thing(
     things = list(dict.fromkeys(source.object for source in sources))
     recording = yield from _evaluate(scene, "", frames, [], things)
     _check_finite(name, recording)
-    parts = [solid_motion(scene, source, recording.things[source.object]) for source in sources]
+    parts = [prop_motion(scene, source, recording.things[source.object]) for source in sources]
     volumes = np.array([volume for _, volume in parts])
     shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
     motions = tuple(motion for motion, _ in parts)
     return CharacterMotion(
         name=name,
         mass=mass,
-        leg_length=max(motion.sole.solid.size for motion in motions if motion.sole.solid),
+        leg_length=max(motion.sole.prop.size for motion in motions if motion.sole.prop),
         frames=recording.frames,
         frame_rate=frame_rate_of(scene),
         soles=motions,

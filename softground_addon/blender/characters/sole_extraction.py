@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.foot_attitude import FlatFoot, FootSize
-from ...core.motion import Array
-from ...core.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
+from ...core.motion.motion import Array
+from ...core.soles.foot_attitude import FlatFoot, FootSize
+from ...core.soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
 from .. import mesh_arrays
 from .rig_mapping import RigMapping, SoleSource
 

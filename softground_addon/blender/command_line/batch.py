@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from ...core import files, manifest
+from ...core.files import files, manifest
 from .batch_runner import Outcome, Step, Workplace, run
 
 SCHEMA_VERSION = 1

@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from ...core import files, receipts
 from ...core.errors import InputError
-from ...core.manifest import BatchShot
+from ...core.files import files, receipts
+from ...core.files.manifest import BatchShot
 
 try:
     import fcntl
@@ -65,7 +65,7 @@ class Workplace:
     command: Callable[[Path, list[str]], list[str]]
 
     def receipt(self, shot: BatchShot) -> Path:
-        """The shot's receipt (see `core.receipts`)."""
+        """The shot's receipt (see `core.files.files.receipts`)."""
         return self.state / f"{shot.name}.json"
 
     def log(self, shot: BatchShot) -> Path:

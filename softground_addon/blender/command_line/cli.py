@@ -16,9 +16,10 @@ from typing import Any
 
 import bpy
 
-from ...core import files, presets, receipts, report
 from ...core.errors import BakeError, InputError, SoftGroundError
-from ...core.manifest import BatchShot
+from ...core.files import files, receipts, report
+from ...core.files.manifest import BatchShot
+from ...core.ground import presets
 from .. import jobs, settings
 from ..baking import bake_job
 from ..characters.character_setup import set_up_automatically

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...core.manifest import frame_range
+from ...core.files.manifest import frame_range
 from ..output import export_formats
 from . import batch
 

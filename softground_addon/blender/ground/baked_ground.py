@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import record
 from ...core.errors import InputError
-from ...core.footprints import Footprint
-from ...core.polylines import Spans
-from ...core.pressed_ground import GroundSample, Trail
+from ...core.playback.playback_curves import Spans
+from ...core.record import record
+from ...core.record.footprints import Footprint
+from ...core.record.pressed_ground import GroundSample, Trail
 from ..jobs import Job, Progress
 from . import created_ground, ground_checks, ground_mesh, hidden_ground, playback, trail_detail
 from .created_ground import Layout
@@ -123,9 +123,9 @@ def write(
     spans : Spans
         Of the place's positions.
     table : bpy.types.Object
-        The polylines that these lie on, from `playback.timelines`.
+        The curves that these lie on, from `playback.keyframe_tables`.
     stored : bytes
-        The footprints, from `core.record`.
+        The footprints, from `core.record.record`.
     unit_scale : float
         Metres per Blender unit.
     shape_keys : bool

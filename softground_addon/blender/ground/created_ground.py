@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.graded_grid import GradedGrid, graded_grid
 from ...core.ground_plan import GroundPlan
+from ...core.meshing.graded_grid import GradedGrid, graded_grid
 from .. import settings
 from .ground_mesh import discard, mesh_of, write_positions
 from .materials import ensure_material

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.footprints import NEVER
-from ...core.heightfield import Terrain
-from ...core.pressed_ground import GroundSample, Trail
-from ...core.terrain import MeshTerrain
+from ...core.ground.heightfield import Terrain
+from ...core.ground.terrain import MeshTerrain
+from ...core.record.footprints import NEVER
+from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
 from . import display_key, painted_ground, playback
@@ -250,7 +250,7 @@ def write(
     pressed : GroundSample
         What it does to each of them.
     record : bytes
-        The footprints, from `core.record`.
+        The footprints, from `core.record.record`.
     unit_scale : float
         Metres per Blender unit.
     shape_keys : bool

@@ -155,7 +155,7 @@ def ensure_material(surface: str) -> bpy.types.Material:
     Parameters
     ----------
     surface : str
-        One of `core.presets.SURFACES`.
+        One of `core.ground.presets.SURFACES`.
 
     Raises
     ------
@@ -379,4 +379,4 @@ _SURFACES: dict[str, tuple[Callable[[Graph, Ground], Look], Colour]] = {
     "mud": (_mud, (0.07, 0.04, 0.02)),
     "soil": (_soil, (0.12, 0.07, 0.04)),
 }
-"""What builds each surface, and its colour in Solid shading."""
+"""What builds each surface, and its colour in Prop shading."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.heightfield import Terrain
-from ...core.terrain import MeshTerrain
+from ...core.ground.heightfield import Terrain
+from ...core.ground.terrain import MeshTerrain
 from .. import mesh_arrays
 from . import ground_mesh
 

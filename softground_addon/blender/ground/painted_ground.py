@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.variation import CHANNELS
+from ...core.ground.variation import CHANNELS
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.polylines import Polylines, Spans
-from ...core.timelines import NO_VISIT
+from ...core.playback.keyframe_tables import NO_VISIT
+from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
 from . import playback_nodes as nodes
 
@@ -20,7 +20,7 @@ Indices = NDArray[np.intp]
 
 MODIFIER = "SoftGround Playback"
 
-TABLE = "SoftGround Timelines"
+TABLE = "SoftGround KeyframeTables"
 
 _ATTRIBUTES = (
     nodes.MOVED,
@@ -39,8 +39,8 @@ FEW = 1 / 64
 
 
 @contextmanager
-def timelines(lines: Polylines) -> Iterator[bpy.types.Object]:
-    """An object that holds timelines as splines and is in no scene; it is taken away if nothing has come to use it."""
+def keyframe_tables(lines: PlaybackCurves) -> Iterator[bpy.types.Object]:
+    """An object that holds keyframe tables as splines in no scene; taken away if nothing comes to use it."""
     table = _table_object(lines)
     del lines  # they are large, and all is in the table
     try:
@@ -58,7 +58,7 @@ def attach(
     *,
     up: Array,
 ) -> bpy.types.Modifier:
-    """Let timelines play a ground, in place of those that may play it.
+    """Let keyframe_tables play a ground, in place of those that may play it.
 
     The ground must carry its undisturbed positions and stand finished (`ground_mesh.write`). The modifier comes first,
     so that the user's own modifiers work on the ground as it is at the time.
@@ -70,7 +70,7 @@ def attach(
         Vertex of its mesh that each of the spans is of.
     spans : Spans
     table : bpy.types.Object
-        The polylines that these lie on, from `timelines`.
+        The curves that these lie on, from `keyframe_tables`.
     up : (3,) float array
         World up in the ground's own space and units, of the length of one metre.
     """
@@ -155,7 +155,7 @@ def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> No
         (nodes.MOVED, "BOOLEAN", True, False),
         (nodes.START, "FLOAT", spans.start, -NO_VISIT),
         (nodes.END, "FLOAT", spans.end, -NO_VISIT),
-        (nodes.SPLINE, "INT", spans.polyline, 0),
+        (nodes.SPLINE, "INT", spans.curve, 0),
         (nodes.OFFSET, "FLOAT", spans.offset, 0.0),
         (nodes.LAST_CONTACT, "FLOAT", spans.last_contact, NO_VISIT),
         # What is there is overwritten faster than made.
@@ -168,8 +168,8 @@ def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> No
     mesh.attributes.active_index = active  # the one that the user has active stays so
 
 
-def _table_object(lines: Polylines) -> bpy.types.Object:
-    """The polylines as splines."""
+def _table_object(lines: PlaybackCurves) -> bpy.types.Object:
+    """The curves as splines."""
     splines = bpy.data.hair_curves.new(TABLE)
     if len(lines.size):
         splines.add_curves(lines.size.tolist())

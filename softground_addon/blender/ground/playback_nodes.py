@@ -2,8 +2,8 @@
 
 It is native Blender data and needs nothing of this add-on. A vertex stands still most of the time: before its first
 movement where it was, after its last where that left it, which is where the mesh has it. So only those that wait for
-theirs are put back, and only those under way are looked up, in timelines (see `core.polylines`): the splines of an
-object of its own, on each of which those of some vertices lie end to end.
+theirs are put back, and only those under way are looked up, in keyframe tables (see `core.playback.playback_curves`):
+the splines of an object of its own, on each of which those of some vertices lie end to end.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any
 
 import bpy
 
-from ...core.footprints import NEVER
-from ...core.polylines import NARROW
-from ...core.timelines import NO_VISIT
+from ...core.playback.keyframe_tables import NO_VISIT
+from ...core.playback.playback_curves import NARROW
+from ...core.record.footprints import NEVER
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"
@@ -33,7 +33,7 @@ LAST_HEIGHT, LAST_CONTACT = "softground_last_height", "softground_last_contact"
 COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "softground_age", "softground_pressure"
 
 CONTACT = "softground_contact"
-"""Of a spline's points; see `core.polylines.Polylines`, also for the height and compression in their positions."""
+"""Of a spline's points; see `core.playback.playback_curves.PlaybackCurves`, which says what their positions hold."""
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
@@ -52,7 +52,7 @@ def build(
     Parameters
     ----------
     table : bpy.types.Object
-        Its splines are the timelines.
+        Its splines are the keyframe_tables.
     up : (3,) floats
         World up in the ground's own space and units, of the length of one metre.
     frame_rate : float
@@ -74,11 +74,11 @@ def build(
         waiting = graph.both(moved, waiting)
         looked_up = graph.both(graph.compare("LESS_EQUAL", start, frame), looked_up)
     since = graph.math("MAXIMUM", graph.math("SUBTRACT", frame, start), 0.0)
-    timelines = _Timelines(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
+    keyframe_tables = _KeyframeTables(graph, table, graph.math("ADD", graph.attribute(OFFSET), since))
 
     graph.next_row()
     rest = graph.attribute(REST, "FLOAT_VECTOR")
-    height, compression = timelines.movement()
+    height, compression = keyframe_tables.movement()
     if not settled:
         at_rest = graph.both(moved, graph.compare("LESS_EQUAL", end, frame))
         geometry = graph.put(geometry, at_rest, rest, graph.scaled(graph.up, graph.attribute(LAST_HEIGHT)))
@@ -91,7 +91,7 @@ def build(
     aged = graph.math("DIVIDE", graph.math("SUBTRACT", frame, last), frame_rate)
     shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
     rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
-    contact = timelines.contact()
+    contact = keyframe_tables.contact()
     untouched = graph.compare("LESS_THAN", contact, -NO_VISIT / 2)
     if few:
         untouched = graph.either(waiting, untouched)
@@ -121,8 +121,8 @@ def table_of(tree: bpy.types.NodeTree) -> bpy.types.Object | None:
     return None
 
 
-class _Timelines:
-    """What the timelines of vertices say at a place along their splines."""
+class _KeyframeTables:
+    """What the keyframe_tables of vertices say at a place along their splines."""
 
     def __init__(self, graph: _Graph, table: bpy.types.Object, length: Any) -> None:
         info = graph.node("GeometryNodeObjectInfo")
@@ -138,7 +138,7 @@ class _Timelines:
         return graph.math("MULTIPLY", height, 1 / NARROW), graph.math("MULTIPLY", compression, 1 / NARROW)
 
     def contact(self) -> Any:
-        """See `core.polylines.Polylines`."""
+        """See `core.playback.playback_curves.PlaybackCurves`."""
         node = self._graph.sample(self._splines, self._number, self._length)
         self._graph.link(self._graph.attribute(CONTACT), node.inputs["Value"])
         return node.outputs["Value"]

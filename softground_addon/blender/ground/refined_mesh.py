@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.refinement import Refinement, Surface
+from ...core.meshing.refinement import Refinement, Surface
 from .. import mesh_arrays
 
 Array = NDArray[np.float64]

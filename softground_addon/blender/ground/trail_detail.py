@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cell_keys import Keys, keys_of
 from ...core.errors import InputError
-from ...core.refinement import Refinement, Surface
-from ...core.region import Region
+from ...core.meshing.refinement import Refinement, Surface
+from ...core.meshing.region import Region
+from ...core.numerics.cell_keys import Keys, keys_of
 from . import ground_mesh, playback, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
 

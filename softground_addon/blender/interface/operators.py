@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import InputError
-from ...core.manifest import BatchShot
-from ...core.shell import command_line
+from ...core.files.manifest import BatchShot
+from ...core.files.shell import command_line
 from .. import jobs, session, settings
 from ..characters import character_setup
 from ..command_line import batch

@@ -12,15 +12,15 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from ...core import record
 from ...core.errors import InputError
-from ...core.footprints import Footprint
+from ...core.record import record
+from ...core.record.footprints import Footprint
 from .. import session, settings
 from ..ground import baked_ground
 from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
-from . import forecast, overlay_shapes
+from . import overlay_shapes, prediction
 from .overlay_shapes import Cells, Outline
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def draw_shapes() -> None:
     context: Any = bpy.context
     if not state.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
         return
-    foretold = forecast.of(settings.scene_of(context))
+    foretold = prediction.of(settings.scene_of(context))
     if foretold is None:
         return
     known = foretold.analysis
@@ -104,7 +104,7 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if not (state.show_overlay and state.show_footfalls) or not context.space_data.overlay.show_overlays:
         return
-    foretold = forecast.of(settings.scene_of(context))
+    foretold = prediction.of(settings.scene_of(context))
     if foretold is None:
         return
     known = foretold.analysis

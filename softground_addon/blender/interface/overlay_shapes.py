@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cell_keys import cells_of, keys_of
-from ...core.contacts import runs
-from ...core.footprints import Footprint
-from ...core.heightfield import Terrain, Window
-from ...core.motion import Sole
-from ...core.outlines import convex_hull
-from ...core.rim import dilate
-from ...core.simulation import CharacterLoads
-from ...core.solids import posed
+from ...core.ground.heightfield import Terrain, Window
+from ...core.loads.estimate import CharacterLoads
+from ...core.motion.motion import Sole
+from ...core.motion.props import posed
+from ...core.numerics.cell_keys import cells_of, keys_of
+from ...core.numerics.intervals import runs
+from ...core.pressing.rim import dilate
+from ...core.record.footprints import Footprint
+from ...core.soles.outlines import convex_hull
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.integer[Any]]
@@ -178,9 +178,9 @@ def squares(cells: Cells, size: float, terrain: Terrain) -> Array:
 
 
 def _posed(sole: Sole, transforms: Array) -> Array:
-    """The outline in world space, on the underside of the sole's first piece; of a solid, as seen from above."""
-    if sole.solid:
-        points = posed(sole.solid.probes, transforms[0])
+    """The outline in world space, on the underside of the sole's first piece; of a prop, as seen from above."""
+    if sole.prop:
+        points = posed(sole.prop.probes, transforms[0])
         hull = convex_hull(points[:, :2])
         return np.column_stack([hull, np.full(len(hull), points[:, 2].min())])
     flat = np.column_stack([sole.outline, np.zeros(len(sole.outline))])

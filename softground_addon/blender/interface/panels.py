@@ -6,13 +6,13 @@ from typing import Any
 
 import bpy
 
-from ...core.cell_limits import BYTES_PER_CELL
-from ...core.motion import JOINTS
+from ...core.loads.cell_limits import BYTES_PER_CELL
+from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..characters.character_setup import is_set_up, is_thing
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..translation import iface_
-from . import bake_result, forecast
+from . import bake_result, prediction
 from .character_editing import active_character, active_sole
 from .panel_base import SidebarPanel
 
@@ -182,7 +182,7 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
         column.prop(options, "shape_keys")
-        foretold = forecast.of(settings.scene_of(context))
+        foretold = prediction.of(settings.scene_of(context))
         if foretold:
             _note(layout, _estimate(foretold.analysis.area, settings.cell_size_of(settings.scene_of(context))))
 
@@ -205,7 +205,7 @@ class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
         column.prop(material, "stiffness_mpa")
         column.prop(material, "poisson_ratio")
         column.prop(material, "characteristic_time")
-        foretold = forecast.of(scene)
+        foretold = prediction.of(scene)
         row = layout.row(align=True)
         if foretold is None:
             row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")

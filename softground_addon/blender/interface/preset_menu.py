@@ -8,8 +8,9 @@ from typing import Any
 import bpy
 from bpy.props import FloatProperty, StringProperty
 
-from ...core import files, presets
 from ...core.errors import InputError
+from ...core.files import files
+from ...core.ground import presets
 from .. import settings
 from ..characters.character_setup import characters_of, title_of
 from ..operator_base import OnShot, reports_errors

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ...core.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
+from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
 from .. import settings
 from ..animation_layer import nla_layer
 from ..response import response_job

@@ -14,14 +14,14 @@ import numpy as np
 from bpy.props import BoolProperty
 from numpy.typing import NDArray
 
-from ...core import record
-from ...core.cell_keys import cells_at, keys_at
 from ...core.errors import InputError
-from ...core.heightfield import Window
+from ...core.ground.heightfield import Window
+from ...core.meshing.refinement import refine
+from ...core.numerics.cell_keys import cells_at, keys_at
+from ...core.playback.playback_curves import playback_curves_at
 from ...core.playhead import Playhead
-from ...core.polylines import polylines_at
-from ...core.pressed_ground import PressedGround
-from ...core.refinement import refine
+from ...core.record import record
+from ...core.record.pressed_ground import PressedGround
 from .. import jobs, session, settings
 from ..baking import bake_report
 from ..baking.bake_checks import coverage, shortest_sole, wants_detail
@@ -135,14 +135,14 @@ class LiveMode:
         stored = record.dump(footprints, {"inputs": so_far, "input_hash": ""})
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
-        spans, lines = polylines_at(
+        spans, lines = playback_curves_at(
             footprints,
             *across,
             blur_sigma=sigma,
             frame_rate=self._frame_rate,
             time_stretch=settings.time_stretch_of(scene),
         )
-        with playback.timelines(lines) as table:
+        with playback.keyframe_tables(lines) as table:
             writing = baked_ground.write(
                 place,
                 pressed.sample(*across),

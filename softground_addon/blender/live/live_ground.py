@@ -10,12 +10,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import record
-from ...core.footprints import NEVER
-from ...core.heightfield import TILE, HeightField, Window
+from ...core.ground.display_blur import blurred_window, gaussian_kernel
+from ...core.ground.heightfield import TILE, HeightField, Window
 from ...core.playhead import Playhead
-from ...core.pressed_ground import GroundSample
-from ...core.smoothing import blurred_window, gaussian_kernel
+from ...core.record import record
+from ...core.record.footprints import NEVER
+from ...core.record.pressed_ground import GroundSample
 from ..ground import ground_mesh
 from ..reading.shots import Shot
 

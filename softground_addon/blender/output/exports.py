@@ -12,10 +12,10 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core import point_cache
 from ...core.errors import InputError
-from ...core.files import check_not_full, check_room, replacing
-from ...core.histories import histories
+from ...core.files import point_cache
+from ...core.files.files import check_not_full, check_room, replacing
+from ...core.playback.vertex_histories import vertex_histories
 from ..ground import baked_ground, display_key, ground_mesh, playback
 
 
@@ -33,7 +33,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     moved = playback.moved_vertices(ground_mesh.mesh_of(carrier))
     world = ground_mesh.rest_vertices(carrier, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
-    over_time = histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
+    over_time = vertex_histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
     up = ground_mesh.up_of(carrier, unit_scale)
 
     def samples() -> Iterator[NDArray[np.float32]]:

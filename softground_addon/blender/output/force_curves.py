@@ -13,8 +13,8 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 from numpy.typing import NDArray
 
-from ...core import files
-from ...core.footprints import Footprint
+from ...core.files import files
+from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.files import replacing
-from ...core.footprints import NEVER, Footprint
-from ...core.histories import Histories, histories
-from ...core.triangles import barycentric
-from ...core.uv_raster import Pixels, rasterise
+from ...core.files.files import replacing
+from ...core.meshing.uv_raster import Pixels, rasterise
+from ...core.numerics.triangles import barycentric
+from ...core.playback.vertex_histories import VertexHistories, vertex_histories
+from ...core.record.footprints import NEVER, Footprint
 from .. import settings
 from ..ground import baked_ground, ground_mesh, refined_mesh
 from .exports import baked_carrier, written_by_blender
@@ -72,7 +72,7 @@ def export_images(
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)
-    over_time = histories(footprints, *pixels.position.T, blur_sigma=sigma)
+    over_time = vertex_histories(footprints, *pixels.position.T, blur_sigma=sigma)
     if not folder.is_dir():
         raise InputError(f"There is no folder '{folder}': create it first, or choose another.")
     stem = name or bpy.path.clean_name(ground.name)
@@ -92,7 +92,7 @@ def export_images(
     return paths
 
 
-def _age(over_time: Histories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
+def _age(over_time: VertexHistories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
     visits = over_time.visits
     latest = np.full(points, -np.inf)
     begun = visits.start <= frame

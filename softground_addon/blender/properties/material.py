@@ -7,7 +7,8 @@ from typing import Any, cast
 import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ...core.presets import MATERIAL_RANGES, SURFACES
+from ...core.ground.material import MATERIAL_RANGES
+from ...core.ground.presets import SURFACES
 from .fields import in_unit
 
 
@@ -17,7 +18,7 @@ def _limits(field: str) -> dict[str, float]:
 
 
 class SoftGroundMaterial(bpy.types.PropertyGroup):
-    """The ground's physics; see `core.deformation.GroundMaterial`."""
+    """The ground's physics; see `core.ground.material.GroundMaterial`."""
 
     preset: StringProperty(name="Preset", description="Preset that was loaded last", default="Snow")
     surface: EnumProperty(
@@ -197,7 +198,7 @@ def _paintable(painted: SoftGroundPainted, _context: bpy.types.Context, _typed: 
 
 
 class SoftGroundPainted(bpy.types.PropertyGroup):
-    """Vertex groups or float attributes of the ground's mesh that scale its material; see `core.variation`."""
+    """Vertex groups or float attributes of the ground's mesh that scale its material; see `core.ground.variation`."""
 
     stiffness: StringProperty(
         name="Stiffness",

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, FloatProperty
 
 
 class SoftGroundTilt(bpy.types.PropertyGroup):
-    """How bodies lean on sloping and yielding ground; see `core.tilt`."""
+    """How bodies lean on sloping and yielding ground; see `core.response.tilt`."""
 
     use: BoolProperty(
         name="Tilt",
@@ -54,7 +54,7 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
 
 
 class SoftGroundGrounding(bpy.types.PropertyGroup):
-    """How feet, legs and hips follow the pressed ground; see `core.grounding`."""
+    """How feet, legs and hips follow the pressed ground; see `core.response.grounding`."""
 
     use: BoolProperty(
         name="Grounding",

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...core import report
-from ...core.cell_limits import pressed_area
-from ...core.deformation import GroundMaterial
 from ...core.errors import InputError
-from ...core.prediction import TAKES_NO_PRINT, SolidLoad, StanceLoad, deepest, matching_modulus, stance_loads
-from ...core.pressure import Pressure
-from ...core.simulation import CharacterLoads, simulate
+from ...core.files import report
+from ...core.ground.material import GroundMaterial, Pressure
+from ...core.loads.cell_limits import pressed_area
+from ...core.loads.estimate import CharacterLoads
+from ...core.prediction import TAKES_NO_PRINT, PropLoad, StanceLoad, deepest, matching_modulus, stance_loads
+from ...core.simulation import simulate
 from .. import jobs, settings
 from ..characters.character_setup import characters_of
 from . import staleness
@@ -44,7 +44,7 @@ class Analysis:
         What the loads depend on beside that.
     shot : Shot
     loads : list of CharacterLoads
-    stances : list of StanceLoad or SolidLoad
+    stances : list of StanceLoad or PropLoad
     area : float
         That the soles cover on the ground, with each step counted [m²].
     """
@@ -54,7 +54,7 @@ class Analysis:
     terms: Hashable
     shot: Shot
     loads: list[CharacterLoads]
-    stances: list[StanceLoad | SolidLoad]
+    stances: list[StanceLoad | PropLoad]
     area: float
 
 

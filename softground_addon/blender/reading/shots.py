@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.ground.heightfield import Terrain
+from ...core.ground.soft_ground import SoftGround
+from ...core.ground.terrain import MeshTerrain
+from ...core.ground.variation import PaintedSurface
 from ...core.ground_plan import GroundPlan, plan_ground
-from ...core.heightfield import Terrain
-from ...core.motion import CharacterMotion
-from ...core.simulation import CharacterLoads, estimate_loads
-from ...core.soft_ground import SoftGround
-from ...core.terrain import MeshTerrain
-from ...core.variation import PaintedSurface
+from ...core.loads.estimate import CharacterLoads, estimate_loads
+from ...core.motion.motion import CharacterMotion
 from .. import settings
 from ..characters.character_setup import characters_of, mapping_of, title_of
+from ..characters.prop_extraction import check_things
 from ..characters.rig_sampling import sample_character, sample_thing
-from ..characters.solid_extraction import check_things
 from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, aside, counted

@@ -9,15 +9,15 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
-from ...core import report
 from ...core.errors import InputError
+from ...core.files import report
 from ..characters.character_setup import ancestors, characters_of, leaders, movers_of, title_of
 from ..characters.sole_extraction import meshes_on
 from ..compat import SERIES
 from ..ground import ground_mesh, painted_ground, playback
 from ..ground.baked_ground import carrier_of
 from ..properties import SoftGroundCharacter
-from . import digests
+from . import input_hashes
 
 FINGERPRINTS = "softground_fingerprints"
 """Property of the mesh that carries a bake: what it was made from, as JSON."""
@@ -96,8 +96,8 @@ def of_movers(scene: bpy.types.Scene) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
     ground, movers = scene.softground.ground, movers_of(scene)
     return {
-        **{f"{ANIMATION}:{mover.name}": digests.of_keys(mover) for mover in movers},
-        **{f"{PLACE}:{mover.name}": digests.of_place([mover, *ancestors(mover)]) for mover in movers},
+        **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
+        **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{title_of(one)}": _of_body(scene, one) for one in characters_of(scene)},
     }
@@ -117,7 +117,7 @@ def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: 
         WRITING: f"{options.detail} {options.shape_keys}",
         GROUND: f"{_of_ground(ground)}-{_modifiers_of(ground)}",
         SURFACE: _of_surface(scene),
-        PRINTS: digests.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
+        PRINTS: input_hashes.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
         **movers,
     }
 
@@ -125,7 +125,7 @@ def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: 
 def _of_ground(ground: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(ground)
     place = np.round(ground_mesh.to_world_of(ground, 1.0), 6) + 0.0  # no negative zeros
-    return f"{digests.of_topology(mesh)}-{digests.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}"
+    return f"{input_hashes.of_topology(mesh)}-{input_hashes.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}"
 
 
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:
@@ -137,20 +137,22 @@ def _modifiers_of(ground: bpy.types.Object) -> list[str]:
 def _of_surface(scene: bpy.types.Scene) -> str:
     """What the ground's modifiers do, and how its material varies."""
     ground = scene.softground.ground
-    keyed = digests.animated_paths_of(ground)
-    told = [text for modifier in ground_mesh.users_modifiers(ground) for text in digests.of_settings(modifier, keyed)]
-    told += filter(None, [digests.of_keys(ground)])
+    keyed = input_hashes.animated_paths_of(ground)
+    told = [
+        text for modifier in ground_mesh.users_modifiers(ground) for text in input_hashes.of_settings(modifier, keyed)
+    ]
+    told += filter(None, [input_hashes.of_keys(ground)])
     try:
         painted = [name for name in painted_ground.names_of(scene) if name]
     except InputError as error:
         return str(error)
-    told += [digests.of_attribute(ground_mesh.mesh_of(ground), name) for name in painted]
-    return digests.joined([*told, digests.of_weights(ground, painted)])
+    told += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in painted]
+    return input_hashes.joined([*told, input_hashes.of_weights(ground, painted)])
 
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
     """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
-    told = [digests.of_animation(mover)]
+    told = [input_hashes.of_animation(mover)]
     parents = ancestors(mover)
     known = {mover, *((ground, carrier_of(ground)) if ground else ())}
     waiting = [*parents, *leaders(mover)]
@@ -159,11 +161,11 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
         if one in known:
             continue
         known.add(one)
-        told += [digests.of_keys(one), digests.of_animation(one)]
+        told += [input_hashes.of_keys(one), input_hashes.of_animation(one)]
         if one not in parents:
-            told.append(digests.of_place([one]))
+            told.append(input_hashes.of_place([one]))
         waiting += [*([one.parent] if one.parent else []), *leaders(one)]
-    return digests.joined(sorted(told))
+    return input_hashes.joined(sorted(told))
 
 
 def _bodies_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -178,16 +180,17 @@ def _of_body(scene: bpy.types.Scene, character: SoftGroundCharacter) -> str:
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     told = []
     for thing in (sole.object for sole in character.soles if sole.object):
-        modifiers = (text for modifier in thing.modifiers for text in digests.of_settings(modifier))
-        told.append(f"{_of_mesh(thing)} {digests.joined(modifiers)}")
+        modifiers = (text for modifier in thing.modifiers for text in input_hashes.of_settings(modifier))
+        told.append(f"{_of_mesh(thing)} {input_hashes.joined(modifiers)}")
     if character.armature:
         told += [
-            f"{_of_mesh(worn)} {worn.parent_bone} {digests.of_weights(worn, bones)} {digests.of_place([worn])}"
+            f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} "
+            f"{input_hashes.of_place([worn])}"
             for worn in meshes_on(scene, character.armature)
         ]
-    return digests.joined(sorted(told))
+    return input_hashes.joined(sorted(told))
 
 
 def _of_mesh(thing: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(thing)
-    return f"{digests.of_topology(mesh)} {digests.of_positions(mesh)}"
+    return f"{input_hashes.of_topology(mesh)} {input_hashes.of_positions(mesh)}"

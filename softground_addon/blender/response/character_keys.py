@@ -8,11 +8,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.grounding import Response
-from ...core.key_reduction import kept_samples
-from ...core.motion import CharacterMotion
-from ...core.orientation import euler_angles, quaternions, rotation_matrices
-from ...core.rigid import carried, rotation, unit
+from ...core.motion.motion import CharacterMotion
+from ...core.numerics.key_reduction import kept_samples
+from ...core.numerics.orientation import euler_angles, quaternions, rotation_matrices
+from ...core.numerics.rigid import carried, rotation, unit
+from ...core.response.grounding import Response
 from ..animation_layer.layer_curves import LayerCurve
 from ..characters.rig_mapping import RigMapping
 from ..settings import time_stretch_of

@@ -11,14 +11,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.footprints import Footprint
-from ...core.grounding import Response, responding
-from ...core.heightfield import Terrain
-from ...core.motion import CharacterMotion
-from ...core.performance import Performance, suggested_speed
-from ...core.response import Gaps, GroundingOptions, TiltOptions, at_scene_frames, gaps, mean_sinkage, respond, stood_on
-from ...core.simulation import CharacterLoads
-from ...core.tilt import TiltGains
+from ...core.ground.heightfield import Terrain
+from ...core.loads.estimate import CharacterLoads
+from ...core.motion.motion import CharacterMotion
+from ...core.record.footprints import Footprint
+from ...core.response.grounding import Response, responding
+from ...core.response.performance import Performance, suggested_speed
+from ...core.response.response import (
+    Gaps,
+    GroundingOptions,
+    TiltOptions,
+    at_scene_frames,
+    gaps,
+    mean_sinkage,
+    respond,
+    stood_on,
+)
+from ...core.response.tilt import TiltGains
 from .. import settings
 from ..animation_layer import nla_layer
 from ..characters.character_setup import mapping_of
@@ -56,7 +65,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CharacterResponse:
     """One character's response and what it did for its feet.
 
     Attributes
@@ -146,15 +155,15 @@ def leans_anew(now: Leaning, before: Leaning | None) -> bool:
     return any(float(np.abs(lean - was).max()) > NOTICEABLE_LEAN for lean, was in zip(now.leans, then, strict=True))
 
 
-def answers_of(
+def responses_of(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
     footprints: Sequence[Footprint],
     options: ResponseOptions | None,
-) -> list[Answer]:
+) -> list[CharacterResponse]:
     """Each rigged character's response to the pressed ground, on top of its source."""
-    answers: list[Answer] = []
+    answers: list[CharacterResponse] = []
     if options is None:
         return answers
     for of_character, motion in zip(loads, motions, strict=True):
@@ -164,12 +173,12 @@ def answers_of(
         response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
         before = gaps(motion, touching, terrain, footprints)
         after = gaps(responding(motion, response), touching, terrain, footprints)
-        answers.append(Answer(motion, response, before, after, mean_sinkage(footprints, motion.name)))
+        answers.append(CharacterResponse(motion, response, before, after, mean_sinkage(footprints, motion.name)))
     return answers
 
 
 def layers_of(
-    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[Answer]
+    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[CharacterResponse]
 ) -> Job[list[Layer]]:
     """The keys of each character's layer; none without answers."""
     layers: list[Layer] = []
@@ -189,7 +198,7 @@ WORST = "softground_worst_gaps"
 """Note of the frames where a gap is left, as JSON."""
 
 
-def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: Answer) -> dict[str, str]:
+def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: CharacterResponse) -> dict[str, str]:
     controls = controls_of(scene, character.armature, mapping_of(character))
     return {
         CARRIER: controls.bones[0],
@@ -235,7 +244,7 @@ def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
     return (armature for armature in armatures if nla_layer.has_layer(armature))
 
 
-def gap_table(answers: Sequence[Answer]) -> dict[str, object] | None:
+def gap_table(answers: Sequence[CharacterResponse]) -> dict[str, object] | None:
     """Penetration and float of the standing soles before and after [mm], for the report; None without a response."""
     if not answers:
         return None
@@ -282,7 +291,7 @@ WORST_GAPS = 10
 """Frames that the report lists as the worst."""
 
 
-def worst_gaps(answers: Sequence[Answer]) -> list[dict[str, object]]:
+def worst_gaps(answers: Sequence[CharacterResponse]) -> list[dict[str, object]]:
     """The largest gaps that are left, largest first, one for each character, sole and frame."""
     gaps_left = [
         (abs(height), answer.motion.name, answer.motion.soles[sole].sole.name, frame, height)
@@ -295,7 +304,7 @@ def worst_gaps(answers: Sequence[Answer]) -> list[dict[str, object]]:
     ]
 
 
-def warnings(answers: Sequence[Answer]) -> list[str]:
+def warnings(answers: Sequence[CharacterResponse]) -> list[str]:
     """What the user should know about the responses."""
     return [
         f"'{answer.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its joints in "

@@ -1,0 +1,73 @@
+"""What panels and the overlay tell of a bake before there is one.
+
+Nothing is computed while they are drawn: what has changed is worked out right after, and until then they show what they
+knew last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from .. import session
+from ..live import live
+from ..reading import analysis
+from ..reading.analysis import Analysis
+
+SOON = 0.03
+"""Time from the drawing that finds something changed until it is worked out anew [s]."""
+
+_told: dict[int, float] = {}
+"""The depth that each scene was told last [m], by session uid."""
+
+
+@dataclass(frozen=True)
+class DepthPrediction:
+    """What is known of a bake to come.
+
+    Attributes
+    ----------
+    analysis : Analysis
+        The shot; masses and force models may have changed since.
+    depth : float or None
+        Of the deepest print to expect [m], as it was known last.
+    is_current : bool
+        Whether nothing has changed since.
+    """
+
+    analysis: Analysis
+    depth: float | None
+    is_current: bool
+
+
+def of(scene: bpy.types.Scene) -> DepthPrediction | None:
+    """The prediction for a scene whose shot is known; to be shown, and worked out soon where it is outdated."""
+    known = analysis.known(scene)
+    if known is None:
+        return None
+    depth = analysis.known_depth(scene)
+    if depth is None:
+        if not bpy.app.timers.is_registered(_work_out):
+            bpy.app.timers.register(_work_out, first_interval=SOON)
+        return DepthPrediction(known, _told.get(scene.session_uid), is_current=False)
+    _told[scene.session_uid] = depth
+    return DepthPrediction(known, depth, is_current=True)
+
+
+def _work_out() -> None:
+    """Bring the predictions that are shown up to date, and live mode with them."""
+    for scene in {window.scene for window in bpy.context.window_manager.windows}:
+        if analysis.known(scene):
+            analysis.expected_depth(scene)
+    live.after_edit()
+    session.redraw()
+    if session.current().show_overlay:
+        session.redraw(region_type="WINDOW")
+
+
+def unregister() -> None:
+    """Work nothing out any more."""
+    if bpy.app.timers.is_registered(_work_out):
+        bpy.app.timers.unregister(_work_out)
+    _told.clear()

@@ -1,0 +1,354 @@
+"""The manifest of a batch: which shots to bake, how, and where the results go, in TOML or JSON.
+
+[defaults]                        # for every shot that does not say otherwise
+preset = "snow"                   # a preset's name, or a .json file
+save = "baked/{name}.blend"
+report = "baked/{name}.json"
+set = { "material.layer_depth" = 0.4 }
+
+[[shots]]
+file = "shots/010.blend"          # paths are relative to the manifest
+
+[[shots]]
+files = "shots/0[2-9]*.blend"     # a pattern: one shot for each file
+preset = "mud"
+frames = [1001, 1120]
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+
+LONGEST_NAME = 150
+"""Most bytes of a shot's name in UTF-8: file systems take 255, of which the names of partial files need some."""
+
+FRAME_LIMIT = 1_048_574
+"""Largest frame number that Blender takes, and minus the smallest."""
+
+_FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report")
+_OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
+
+
+@dataclass(frozen=True)
+class BatchShot:
+    """One bake of a batch.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its manifest, whatever the case of its letters.
+    file : Path
+        The .blend file, absolute.
+    scene : str
+        The scene in it to bake, or "" for the one that it opens with.
+    preset : str
+        Name of a preset, absolute path of a preset file, or "" for what the shot has.
+    frames : (int, int) or None
+        First and last frame; None for what the shot has.
+    cell_size : float or None
+        Size of the ground's cells [m]; None for what the shot has.
+    settings : tuple of (str, str)
+        Paths below `scene.softground` and their values, in order.
+    save : Path or None
+        Where the baked shot goes, absolute; None for nowhere or in place.
+    in_place : bool
+        Whether the baked shot replaces `file`.
+    report : Path or None
+        Where the report goes, absolute.
+    """
+
+    name: str
+    file: Path
+    scene: str = ""
+    preset: str = ""
+    frames: tuple[int, int] | None = None
+    cell_size: float | None = None
+    settings: tuple[tuple[str, str], ...] = ()
+    save: Path | None = None
+    in_place: bool = False
+    report: Path | None = None
+
+    @property
+    def outputs(self) -> tuple[Path, ...]:
+        """The files that the bake writes."""
+        shot = self.file if self.in_place else self.save
+        return tuple(path for path in (shot, self.report) if path)
+
+    @property
+    def options(self) -> list[str]:
+        """The bake as options of `softground bake`."""
+        options = [f"--scene={self.scene}"] if self.scene else []
+        if self.preset:
+            options.append(f"--preset={self.preset}")
+        if self.frames:
+            options.append(f"--frames={self.frames[0]}-{self.frames[1]}")
+        if self.cell_size is not None:
+            options.append(f"--cell-size={self.cell_size!r}")
+        options += [f"--set={path}={value}" for path, value in self.settings]
+        if self.save:
+            options.append(f"--save={self.save}")
+        if self.in_place:
+            options.append("--in-place")
+        if self.report:
+            options.append(f"--report={self.report}")
+        return options
+
+
+def load(path: Path) -> tuple[BatchShot, ...]:
+    """The shots of a manifest file, each of which exists.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or says nothing that can be baked; names every missing shot.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"Manifest '{path}' cannot be read: {error}") from None
+    folder = Path(os.path.realpath(path)).parent
+    shots = parse(text, folder, f"Manifest '{path}'", is_json=path.suffix.lower() == ".json")
+    missing = [str(shot.file) for shot in shots if not is_file(shot.file)]
+    if missing:
+        listed = ", ".join(f"'{name}'" for name in missing[:10]) + (" and more" if len(missing) > 10 else "")
+        raise InputError(f"Manifest '{path}': {len(missing)} of {len(shots)} shots are not there: {listed}.")
+    return shots
+
+
+def parse(text: str, folder: Path, origin: str, *, is_json: bool = False) -> tuple[BatchShot, ...]:
+    """The shots of a manifest's text.
+
+    Parameters
+    ----------
+    text : str
+        TOML, or JSON if `is_json`.
+    folder : Path
+        What relative paths are relative to, absolute.
+    origin : str
+        What error messages call the manifest.
+
+    Raises
+    ------
+    InputError
+        Naming `origin`, the shot, and what is wrong with it.
+    """
+    try:
+        content = json.loads(text) if is_json else tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{origin} is no {'JSON' if is_json else 'TOML'}: {error}.") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{origin} must be a table with a list 'shots'.")
+    _check_keys(content, ("defaults", "shots"), origin)
+    defaults, entries = content.get("defaults", {}), content.get("shots")
+    if not isinstance(defaults, dict):
+        raise InputError(f"{origin}: 'defaults' must be a table.")
+    _check_keys(defaults, _FROM_DEFAULTS, f"{origin}, defaults")
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{origin} has no shots: give at least one [[shots]] with a 'file'.")
+    shots: list[BatchShot] = []
+    for number, entry in enumerate(entries, start=1):
+        where = f"{origin}, shot {number}"
+        if not isinstance(entry, dict):
+            raise InputError(f"{where}: must be a table with a 'file'.")
+        _check_keys(entry, _OF_A_SHOT, where)
+        shots += _shots(entry, defaults, folder, where)
+    _check_unique(shots, origin)
+    return tuple(shots)
+
+
+def chosen(shots: tuple[BatchShot, ...], wanted: list[str]) -> tuple[BatchShot, ...]:
+    """Those shots that are wanted, by name or by number from 1, in the manifest's order; all if none is wanted.
+
+    Raises
+    ------
+    InputError
+        If one of them is none of the manifest's.
+    """
+    if not wanted:
+        return shots
+    numbers = {name: number for number, shot in enumerate(shots) for name in (str(number + 1), shot.name)}
+    unknown = [name for name in wanted if name not in numbers]
+    if unknown:
+        known = ", ".join(shot.name for shot in shots[:20]) + (" ..." if len(shots) > 20 else "")
+        raise InputError(f"There is no shot '{unknown[0]}'. There are {len(shots)}: {known}.")
+    return tuple(shots[number] for number in sorted({numbers[name] for name in wanted}))
+
+
+def frame_range(text: str) -> tuple[int, int]:
+    """First and last frame from a text such as 1-250; ValueError for any other."""
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
+    if not match:
+        raise ValueError(f"'{text}' is no frame range like 1-250")
+    return int(match[1]), int(match[2])
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; False also for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _shots(entry: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, where: str) -> Iterator[BatchShot]:
+    if ("file" in entry) == ("files" in entry):
+        raise InputError(
+            f"{where}: give either 'file', one .blend file, or 'files', a pattern such as \"shots/*.blend\"."
+        )
+    if "file" in entry:
+        yield _shot(entry, defaults, folder / _text(entry["file"], f"{where}: 'file'"), folder, where)
+        return
+    if "name" in entry:
+        raise InputError(f"{where}: a pattern's shots are named after their files; leave 'name' out.")
+    pattern = _text(entry["files"], f"{where}: 'files'")
+    base = Path(folder.anchor) if Path(pattern).is_absolute() else folder
+    try:
+        found = sorted(base.glob(os.path.relpath(pattern, base) if Path(pattern).is_absolute() else pattern))
+    except (ValueError, IndexError, NotImplementedError, OSError, RecursionError) as error:
+        raise InputError(f"{where}: 'files' is {pattern!r}, which is no pattern: {error}.") from None
+    if not found:
+        raise InputError(f"{where}: no file fits the pattern {pattern!r} in '{folder}'.")
+    for path in found:
+        yield _shot(entry, defaults, path, folder, where)
+
+
+def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, folder: Path, where: str) -> BatchShot:
+    name = _name(entry.get("name", file.stem), where)
+    file = _path(str(file), folder, f"{where}: 'file'")
+    where = f"{where} ({name})"
+    given = {key: entry[key] for key in _FROM_DEFAULTS if key in entry}
+    # a shot that says where it goes overrides both ways of saying it
+    destination = () if "save" not in given and "in_place" not in given else ("save", "in_place")
+    values = {key: value for key, value in defaults.items() if key not in destination} | given
+    overrides = dict(_flat(defaults.get("set", {}), f"{where}: 'set'"))
+    overrides |= dict(_flat(entry.get("set", {}), f"{where}: 'set'"))
+    in_place = values.get("in_place", False)
+    if not isinstance(in_place, bool):
+        raise InputError(f"{where}: 'in_place' must be true or false.")
+    save, report = (
+        _path(_text(values[key], f"{where}: '{key}'").replace("{name}", name), folder, f"{where}: '{key}'")
+        if key in values
+        else None
+        for key in ("save", "report")
+    )
+    if in_place and save:
+        raise InputError(f"{where}: give either 'save' or 'in_place', not both.")
+    if not (in_place or save or report):
+        raise InputError(f"{where}: nothing would be kept: give 'save', 'in_place' or 'report'.")
+    if save == file:
+        raise InputError(f"{where}: 'save' is the shot itself: say in_place = true to replace it.")
+    cell_size = values.get("cell_size")
+    if cell_size is not None and not _is_number(cell_size):
+        raise InputError(f"{where}: 'cell_size' is {cell_size!r}; it must be a number of metres.")
+    return BatchShot(
+        name=name,
+        file=file,
+        scene=_text(values["scene"], f"{where}: 'scene'") if "scene" in values else "",
+        preset=_preset(values.get("preset", ""), folder, where),
+        frames=_frames(values["frames"], where) if "frames" in values else None,
+        cell_size=None if cell_size is None else float(cell_size),
+        settings=tuple(overrides.items()),
+        save=save,
+        in_place=in_place,
+        report=report,
+    )
+
+
+def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    unknown = [key for key in table if key not in known]
+    if unknown:
+        raise InputError(f"{where}: unknown key {unknown[0]!r}. Known are: {', '.join(known)}.")
+
+
+def _check_unique(shots: list[BatchShot], origin: str) -> None:
+    """Refuse two shots of one name, and files that two bakes would write or one would write under another's feet."""
+    names: set[str] = set()
+    sources = {shot.file for shot in shots}
+    written: dict[Path, str] = {}
+    for shot in shots:
+        if shot.name.casefold() in names:
+            raise InputError(f"{origin}: two shots are named '{shot.name}': give each a 'name' of its own.")
+        names.add(shot.name.casefold())
+        for path in shot.outputs:
+            if path in written:
+                raise InputError(
+                    f"{origin}: '{written[path]}' and '{shot.name}' both write '{path}': use {{name}} in the path."
+                )
+            if path in sources and path != shot.file:
+                raise InputError(f"{origin}: '{shot.name}' would write over the shot '{path}'.")
+            written[path] = shot.name
+
+
+def _name(value: object, where: str) -> str:
+    name = _text(value, f"{where}: 'name'")
+    if name in (".", "..") or "/" in name or "\\" in name or len(name.encode()) > LONGEST_NAME:
+        raise InputError(
+            f"{where}: the name {name!r} cannot be part of a file's name: give a 'name' without slashes, of at most "
+            f"{LONGEST_NAME} bytes."
+        )
+    return name
+
+
+def _text(value: object, where: str) -> str:
+    if not isinstance(value, str) or not value.strip() or "\0" in value:
+        raise InputError(f"{where} is {value!r}; it must be text.")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{where} is {value!r}, which is no Unicode text: rename the file.") from None
+    return value
+
+
+def _path(value: object, folder: Path, where: str) -> Path:
+    return Path(os.path.realpath(folder / _text(value, where)))
+
+
+def _preset(value: object, folder: Path, where: str) -> str:
+    if value == "":
+        return ""
+    name = _text(value, f"{where}: 'preset'")
+    return str(_path(name, folder, where)) if name.lower().endswith(".json") else name
+
+
+def _frames(value: object, where: str) -> tuple[int, int]:
+    if (
+        not isinstance(value, list)
+        or len(value) != 2
+        or not all(isinstance(frame, int) and not isinstance(frame, bool) for frame in value)
+        or not all(abs(frame) <= FRAME_LIMIT for frame in value)
+        or value[0] >= value[1]
+    ):
+        raise InputError(f"{where}: 'frames' is {value!r}; it must be the first and the last frame, such as [1, 250].")
+    return value[0], value[1]
+
+
+def _flat(table: object, where: str, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Nested tables as paths and values: {"material": {"layer_depth": 0.4}} is material.layer_depth = 0.4."""
+    if not isinstance(table, dict):
+        raise InputError(f'{where} must be a table such as {{ "material.layer_depth" = 0.4 }}.')
+    for key, value in table.items():
+        path = _text(f"{prefix}{key}", where).strip()
+        if isinstance(value, dict):
+            yield from _flat(value, where, f"{path}.")
+        elif isinstance(value, bool):
+            yield path, str(value).lower()
+        elif isinstance(value, str):
+            yield path, _text(value, f"{where}: '{path}'").strip()
+        elif _is_number(value):
+            yield path, repr(value)
+        else:
+            raise InputError(f"{where}: '{path}' is {value!r}; it must be a number, true or false, or a text.")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

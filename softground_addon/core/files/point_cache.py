@@ -1,0 +1,59 @@
+"""PC2 point caches: the positions of a mesh's vertices at every frame, as many programs read them."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .files import replacing
+
+_HEADER = struct.Struct("<12siiffi")
+_MAGIC = b"POINTCACHE2\0"
+_VERSION = 1
+
+
+def write(path: Path, samples: Iterable[NDArray[np.float32]], *, start_frame: float, points: int, count: int) -> None:
+    """Write a cache with one sample per frame, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    samples : iterable of (points, 3) float32 arrays
+        Positions, frame by frame; they are written as they come.
+    start_frame : float
+        Frame of the first sample.
+    points, count : int
+        Number of vertices and of samples.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    with replacing(path) as partial, partial.open("wb") as cache:
+        cache.write(_HEADER.pack(_MAGIC, _VERSION, points, start_frame, 1.0, count))
+        for sample in samples:
+            cache.write(np.ascontiguousarray(sample, dtype="<f4").tobytes())
+
+
+def read(path: Path) -> tuple[float, NDArray[np.float32]]:
+    """First frame, and positions (samples, points, 3), of a cache.
+
+    Raises
+    ------
+    InputError
+        If the file is no PC2 cache or is cut short.
+    """
+    content = path.read_bytes()
+    if len(content) < _HEADER.size or not content.startswith(_MAGIC):
+        raise InputError(f"'{path}' is no PC2 point cache.")
+    _, _, points, start, _, count = _HEADER.unpack_from(content)
+    if len(content) != _HEADER.size + count * points * 12:
+        raise InputError(f"'{path}' is cut short: export it again.")
+    positions = np.frombuffer(content, dtype="<f4", offset=_HEADER.size)
+    return float(start), positions.reshape(count, points, 3)

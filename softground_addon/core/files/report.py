@@ -1,0 +1,139 @@
+"""The report of a bake: what happened, in numbers, as JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ..record.footprints import Footprint
+
+SCHEMA_VERSION = 1
+
+
+def build(
+    *,
+    inputs: Mapping[str, object],
+    input_hash: str,
+    footprints: Sequence[Footprint],
+    offsets_mm: Mapping[str, Mapping[str, float]],
+    timings: Mapping[str, float],
+    playback_error_m: float | None = None,
+    warnings: Sequence[str] = (),
+    forces: Mapping[str, object] | None = None,
+    gaps_mm: Mapping[str, object] | None = None,
+    worst_gaps: Sequence[Mapping[str, object]] = (),
+    suggested_speed: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """Everything that is said of a bake, ready for JSON.
+
+    Parameters
+    ----------
+    inputs : mapping
+        The settings of the bake, in SI units.
+    input_hash : str
+        From `hash_inputs`: equal for bakes with equal inputs.
+    footprints : sequence of Footprint
+        In the order of their first contact.
+    offsets_mm : mapping of character to (sole to mm)
+        Constant float (positive) or sink of the source animation that was taken out of each sole.
+    timings : mapping
+        Seconds by stage, and frames per second.
+    playback_error_m : float, optional
+        Largest error of the played heights against the record's [m].
+    warnings : sequence of str
+        What the user should know.
+    forces : mapping, optional
+        Force per frame and sole [N], on request.
+    gaps_mm : mapping, optional
+        Distance of the standing soles from the ground before and after grounding, by character.
+    worst_gaps : sequence of mapping
+        The frames and soles where it is largest after grounding.
+    suggested_speed : mapping, optional
+        Speed that people would choose on this ground, over that on hard ground, by character.
+    """
+    steps: list[dict[str, Any]] = [
+        {
+            "contact": footprint.sole,
+            "character": footprint.character,
+            "frame_start": round(float(footprint.start_frame), 3),
+            "frame_end": round(float(footprint.end_frame), 3),
+            "position": [round(float(value), 5) for value in footprint.position],
+            "area_m2": float(footprint.area_m2),
+            "peak_force_n": float(footprint.peak_force_n),
+            "max_depth_m": float(footprint.max_depth_m),
+            "compressed_m3": float(footprint.compressed_m3),
+            "rim_m3": float(footprint.rim_m3),
+        }
+        for footprint in footprints
+    ]
+    report: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "inputs": dict(inputs),
+        "input_hash": input_hash,
+        "steps": steps,
+        "totals": {
+            "steps": len(steps),
+            "peak_force_n": max((step["peak_force_n"] for step in steps), default=0.0),
+            "max_depth_m": max((step["max_depth_m"] for step in steps), default=0.0),
+            "compressed_m3": sum(step["compressed_m3"] for step in steps),
+            "rim_m3": sum(step["rim_m3"] for step in steps),
+        },
+        "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
+        "timings": dict(timings),
+        "warnings": list(warnings),
+    }
+    if playback_error_m is not None:
+        report["playback_error_mm"] = playback_error_m * 1e3
+    if gaps_mm is not None:
+        report["gaps_mm"] = dict(gaps_mm)
+        report["worst_gaps"] = [dict(gap) for gap in worst_gaps]
+    if suggested_speed is not None:
+        report["suggested_speed"] = dict(suggested_speed)
+    if forces is not None:
+        report["forces"] = dict(forces)
+    return report
+
+
+def summary(report: Mapping[str, Any]) -> str:
+    """The report in one line, for people."""
+    totals, timings = report["totals"], report["timings"]
+    seconds = sum(timings[stage] for stage in ("sample", "simulate", "write"))
+    return (
+        f"{totals['steps']} steps, deepest {totals['max_depth_m'] * 100:.1f} cm, peak force "
+        f"{totals['peak_force_n']:.0f} N, {seconds:.1f} s"
+    )
+
+
+def dump(report: Mapping[str, object]) -> str:
+    """The report as the text of a JSON file."""
+    return json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def hash_inputs(*inputs: object) -> str:
+    """A SHA-256 over nested dataclasses, mappings, sequences, arrays, numbers and texts, by value."""
+    digest = hashlib.sha256()
+    _feed(digest, inputs)
+    return digest.hexdigest()
+
+
+def _feed(digest: hashlib._Hash, value: object) -> None:
+    if isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype.str}{value.shape}".encode())
+        digest.update(np.ascontiguousarray(value).tobytes())
+    elif is_dataclass(value):
+        for field in fields(value):
+            _feed(digest, (field.name, getattr(value, field.name)))
+    elif isinstance(value, Mapping):
+        for key in sorted(value):
+            _feed(digest, (key, value[key]))
+    elif isinstance(value, list | tuple):
+        digest.update(f"({len(value)}".encode())
+        for item in value:
+            _feed(digest, item)
+    else:
+        digest.update(f"{type(value).__name__}:{value!r};".encode())

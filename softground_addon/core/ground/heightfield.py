@@ -1,0 +1,382 @@
+"""The ground as a height field over an endless plane, kept in sparse tiles.
+
+Cell (i, j), column along x and row along y, covers [i·cell_size, (i+1)·cell_size) and is centred half a cell further;
+the world origin is a corner of cell (0, 0). Tiles exist only where something was written, so that memory follows
+the touched ground and not its extent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+TILE = 32
+"""Cells along a tile's side: a footprint at 1 cm cells touches about four tiles of 16 KB."""
+
+PLACES_AT_ONCE = 1 << 16
+"""Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
+
+STEEPEST_CELL = np.tan(np.radians(60.0))
+"""Slope of the steepest cell that takes a print: more is a wall."""
+
+
+class Terrain(Protocol):
+    """The undisturbed ground."""
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m], NaN where there is no ground."""
+        ...
+
+
+class FlatTerrain:
+    """An endless horizontal plane.
+
+    Parameters
+    ----------
+    height : float
+        Its height [m].
+    """
+
+    def __init__(self, height: float = 0.0) -> None:
+        self.height = height
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m]."""
+        return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), float(self.height))
+
+
+class SlopingTerrain:
+    """An endless inclined plane.
+
+    Parameters
+    ----------
+    height : float
+        Its height at the origin of the world [m].
+    slope : (2,) float array
+        Rise along x and y.
+    """
+
+    def __init__(self, height: float, slope: Array) -> None:
+        self.height = height
+        self.slope = np.asarray(slope, dtype=np.float64)
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Heights at world positions [m]."""
+        return np.asarray(self.height + self.slope[0] * np.asarray(x) + self.slope[1] * np.asarray(y))
+
+
+class Window(NamedTuple):
+    """A rectangle of cells: its first column and row, and how many of each."""
+
+    column: int
+    row: int
+    columns: int
+    rows: int
+
+    @classmethod
+    def around(cls, low: Array, high: Array, cell_size: float) -> Window:
+        """The cells that the box from `low` to `high` (world x, y [m]) reaches into."""
+        first = np.floor(np.asarray(low[:2]) / cell_size).astype(int)
+        last = np.floor(np.asarray(high[:2]) / cell_size).astype(int)
+        return cls(int(first[0]), int(first[1]), int(last[0] - first[0]) + 1, int(last[1] - first[1]) + 1)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.columns * self.rows
+
+    def expanded(self, margin: int) -> Window:
+        """The window with `margin` more cells on every side."""
+        return Window(self.column - margin, self.row - margin, self.columns + 2 * margin, self.rows + 2 * margin)
+
+    def cells_under(self, x: Array, y: Array, cell_size: float) -> tuple[Indices, Indices]:
+        """Rows and columns within the window of the cells under world positions [m]; beyond it, of the nearest."""
+        column = np.floor(x / cell_size).astype(np.intp) - self.column
+        row = np.floor(y / cell_size).astype(np.intp) - self.row
+        return np.clip(row, 0, self.rows - 1), np.clip(column, 0, self.columns - 1)
+
+    def union(self, other: Window) -> Window:
+        """The smallest window that holds both."""
+        column, row = min(self.column, other.column), min(self.row, other.row)
+        end_column = max(self.column + self.columns, other.column + other.columns)
+        end_row = max(self.row + self.rows, other.row + other.rows)
+        return Window(column, row, end_column - column, end_row - row)
+
+    def intersects(self, other: Window) -> bool:
+        """Whether the two share a cell."""
+        return (
+            self.column < other.column + other.columns
+            and other.column < self.column + self.columns
+            and self.row < other.row + other.rows
+            and other.row < self.row + self.rows
+        )
+
+    def refined(self, factor: int) -> Window:
+        """The same rectangle in cells that are `factor` times smaller."""
+        return Window(self.column * factor, self.row * factor, self.columns * factor, self.rows * factor)
+
+    def centres(self, cell_size: float) -> tuple[Array, Array]:
+        """World x of the columns' centres (columns,) and y of the rows' centres (rows,) [m]."""
+        return (
+            (self.column + 0.5 + np.arange(self.columns)) * cell_size,
+            (self.row + 0.5 + np.arange(self.rows)) * cell_size,
+        )
+
+
+class SparseGrid:
+    """Values per cell over an endless plane, in square tiles that are made on demand.
+
+    Parameters
+    ----------
+    cell_size : float
+        Side of a cell [m].
+    channels : int
+        Number of values per cell.
+    fill : float
+        Value of cells that were never written.
+
+    Raises
+    ------
+    InputError
+        If the cell size is not a positive number.
+    """
+
+    def __init__(self, cell_size: float, *, channels: int, fill: float = 0.0) -> None:
+        if not (np.isfinite(cell_size) and cell_size > 0):
+            raise InputError(f"The cell size is {cell_size!r} m: set it to a positive length, such as 0.01 m.")
+        self.cell_size = float(cell_size)
+        self.channels = channels
+        self.fill = fill
+        self.tiles: dict[tuple[int, int], Array] = {}
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the cells' values [bytes]."""
+        return sum(tile.nbytes for tile in self.tiles.values())
+
+    def tile_windows(self) -> list[Window]:
+        """The windows of all tiles, in the order of their place."""
+        return [Window(column * TILE, row * TILE, TILE, TILE) for column, row in sorted(self.tiles)]
+
+    def read(self, window: Window) -> Array:
+        """A copy of the values of a window, (channels, rows, columns)."""
+        values = np.full((self.channels, window.rows, window.columns), self.fill)
+        for key, in_tile, in_window in _overlaps(window):
+            tile = self.tiles.get(key)
+            if tile is not None:
+                values[in_window] = tile[in_tile]
+        return values
+
+    def write(self, window: Window, values: Array) -> None:
+        """Set the values of a window, (channels, rows, columns). Tiles that would stay untouched are not made."""
+        for key, in_tile, in_window in _overlaps(window):
+            tile = self.tiles.get(key)
+            if tile is None:
+                if not (values[in_window] != self.fill).any():
+                    continue
+                tile = self.tiles[key] = np.full((self.channels, TILE, TILE), self.fill)
+            tile[in_tile] = values[in_window]
+
+    def sample(self, x: Array, y: Array) -> Array:
+        """Values at world positions of any shape, bilinear between cell centres: (channels, ...)."""
+        return self._in_parts(self._between, x, y)
+
+    def _in_parts(self, look_up: Callable[[Array, Array], Array], x: Array, y: Array) -> Array:
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        values = np.empty((self.channels, x.size))
+        for first in range(0, x.size, PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            values[:, part] = look_up(x.ravel()[part], y.ravel()[part])
+        return values.reshape(self.channels, *x.shape)
+
+    def _between(self, x: Array, y: Array) -> Array:
+        column, row = x / self.cell_size - 0.5, y / self.cell_size - 0.5
+        left, low = np.floor(column), np.floor(row)
+        u, v = column - left, row - low
+        left, low = left.astype(int), low.astype(int)
+        around = self._gather(np.concatenate([left, left + 1] * 2), np.concatenate([low, low, low + 1, low + 1]))
+        below, below_right, above, above_right = np.split(around, 4, axis=1)
+        values = (below * (1 - u) + below_right * u) * (1 - v)
+        values += (above * (1 - u) + above_right * u) * v
+        return values
+
+    def nearest(self, x: Array, y: Array) -> Array:
+        """Values of the cells that hold the world positions of any shape: (channels, ...)."""
+        return self._in_parts(self._holding, x, y)
+
+    def _holding(self, x: Array, y: Array) -> Array:
+        column, row = np.floor(x / self.cell_size), np.floor(y / self.cell_size)
+        return self._gather(column.astype(int), row.astype(int))
+
+    def _gather(self, column: NDArray[np.intp], row: NDArray[np.intp]) -> Array:
+        """Values of single cells, (channels, N)."""
+        if not self.tiles or not column.size:
+            return np.full((self.channels, column.size), self.fill)
+        keys = sorted(self.tiles)
+        slot_of = np.array(keys)
+        first = slot_of.min(axis=0)
+        span = slot_of.max(axis=0) - first + 1
+        order = (slot_of - first) @ (span[1], 1)
+        tile = np.stack([column // TILE, row // TILE], axis=-1) - first
+        wanted = tile @ (span[1], 1)
+        slot = np.minimum(np.searchsorted(order, wanted), len(keys) - 1)
+        known = (order[slot] == wanted) & (tile >= 0).all(axis=-1) & (tile < span).all(axis=-1)
+        values = np.full((self.channels, column.size), self.fill)
+        used = np.zeros(len(keys), dtype=bool)
+        used[slot[known]] = True
+        if used.any():
+            stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()])
+            place = (np.cumsum(used) - 1)[slot[known]]
+            values[:, known] = stack[place, :, row[known] % TILE, column[known] % TILE].T
+        return values
+
+
+class HeightField(SparseGrid):
+    """The deformed ground: compression and rim height of every cell [m], 0 where nothing happened.
+
+    The ground's height is that of the undisturbed terrain, less the compression, plus the rim.
+    """
+
+    def __init__(self, cell_size: float) -> None:
+        super().__init__(cell_size, channels=2)
+
+    def volumes(self) -> tuple[float, float]:
+        """Compressed volume and rim volume [m³]."""
+        total = sum((tile.sum(axis=(1, 2)) for _, tile in sorted(self.tiles.items())), np.zeros(2))
+        return float(total[0]) * self.cell_size**2, float(total[1]) * self.cell_size**2
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The undisturbed ground over a window.
+
+    Attributes
+    ----------
+    window : Window
+    cell_size : float
+        Side of a cell [m].
+    heights : (rows, columns) float array
+        At the centres of cells [m], NaN where there is no ground.
+    slope_x, slope_y : (rows, columns) float arrays
+        Rise along x and y: the mean of those to both sides; where they have opposite signs or one is unknown or
+        level, as at the foot of a wall and at the brink of a gap, the gentler one.
+    """
+
+    window: Window
+    cell_size: float
+    heights: Array
+    slope_x: Array
+    slope_y: Array
+
+    @cached_property
+    def bears(self) -> Mask:
+        """Cells that take a print: on the ground and no wall."""
+        mask: Mask = np.isfinite(self.heights) & (self.slope_x**2 + self.slope_y**2 <= STEEPEST_CELL**2)
+        return mask
+
+    def planes_at(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Heights at world positions [m]: of the cell there, and on its plane; NaN where the cell does not bear."""
+        row, column = cell = self.window.cells_under(x, y, self.cell_size)
+        level = np.where(self.bears, self.heights, np.nan)[cell]
+        rise = self.slope_x[cell] * (x / self.cell_size - self.window.column - column - 0.5)
+        rise += self.slope_y[cell] * (y / self.cell_size - self.window.row - row - 0.5)
+        return level, level + rise * self.cell_size
+
+
+class SampledGrid(SparseGrid):
+    """A function of place at cell centres, looked up once per tile.
+
+    Parameters
+    ----------
+    sample : callable
+        Values (channels, ...) at world positions x and y [m] of any one shape.
+    cell_size : float
+        Side of a cell [m].
+    channels : int
+        Number of values per cell.
+    """
+
+    def __init__(self, sample: Callable[[Array, Array], Array], cell_size: float, *, channels: int) -> None:
+        super().__init__(cell_size, channels=channels)
+        self._sample = sample
+
+    def read(self, window: Window) -> Array:
+        """A copy of the values of a window, (channels, rows, columns)."""
+        for key, _, _ in _overlaps(window):
+            if key not in self.tiles:
+                tile = Window(key[0] * TILE, key[1] * TILE, TILE, TILE)
+                self.tiles[key] = self._sample(*np.meshgrid(*tile.centres(self.cell_size)))
+        return super().read(window)
+
+
+class TerrainTiles:
+    """A terrain's heights and slopes at cell centres, looked up once per tile.
+
+    Parameters
+    ----------
+    terrain : Terrain
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, terrain: Terrain, cell_size: float) -> None:
+        self.terrain = terrain
+        self._heights = SampledGrid(lambda x, y: terrain.heights(x, y)[None], cell_size, channels=1)
+
+    @property
+    def cell_size(self) -> float:
+        """Side of a cell [m]."""
+        return self._heights.cell_size
+
+    def heights(self, window: Window) -> Array:
+        """Heights of a window, (rows, columns) [m], NaN where there is no ground."""
+        values: Array = self._heights.read(window)[0]
+        return values
+
+    def surface(self, window: Window) -> Surface:
+        """Heights and slopes of a window."""
+        heights = self.heights(window.expanded(1))
+        along_x = np.diff(heights[1:-1], axis=1) / self.cell_size
+        along_y = np.diff(heights[:, 1:-1], axis=0) / self.cell_size
+        return Surface(
+            window,
+            self.cell_size,
+            heights[1:-1, 1:-1],
+            _slope(along_x[:, :-1], along_x[:, 1:]),
+            _slope(along_y[:-1], along_y[1:]),
+        )
+
+
+def _slope(before: Array, after: Array) -> Array:
+    """Slope of cells from those to both sides, 0 where neither is known."""
+    before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
+    gentler = np.where(np.abs(before) < np.abs(after), before, after)
+    return np.nan_to_num(np.where(before * after > 0, (before + after) / 2, gentler))
+
+
+def _overlaps(window: Window) -> Iterator[tuple[tuple[int, int], tuple[slice, ...], tuple[slice, ...]]]:
+    """Each tile that a window reaches into, with the shared cells as slices of the tile and of the window."""
+    for tile_row in range(window.row // TILE, (window.row + window.rows - 1) // TILE + 1):
+        first_row = max(window.row, tile_row * TILE)
+        last_row = min(window.row + window.rows, (tile_row + 1) * TILE)
+        tile_rows = slice(first_row - tile_row * TILE, last_row - tile_row * TILE)
+        window_rows = slice(first_row - window.row, last_row - window.row)
+        for tile_column in range(window.column // TILE, (window.column + window.columns - 1) // TILE + 1):
+            first = max(window.column, tile_column * TILE)
+            last = min(window.column + window.columns, (tile_column + 1) * TILE)
+            yield (
+                (tile_column, tile_row),
+                (slice(None), tile_rows, slice(first - tile_column * TILE, last - tile_column * TILE)),
+                (slice(None), window_rows, slice(first - window.column, last - window.column)),
+            )

@@ -1,0 +1,142 @@
+"""Ground presets: named materials as JSON, validated; nothing in a preset is executed."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from ..errors import InputError
+from .material import MATERIAL_RANGES, GroundMaterial
+
+FOLDER = Path(__file__).parents[2] / "presets"
+"""Where the presets that come with the add-on are."""
+
+SCHEMA_VERSION = 1
+
+
+SURFACES = ("snow", "sand", "wet_sand", "mud", "soil")
+"""Looks that a preset may ask for; each is a procedural render material."""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A named ground.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees.
+    source : str
+        Where its numbers come from.
+    surface : str
+        One of `SURFACES`.
+    material : GroundMaterial
+    """
+
+    name: str
+    source: str
+    surface: str
+    material: GroundMaterial
+
+
+def validate_material(values: Mapping[str, object], origin: str) -> GroundMaterial:
+    """The material with these values, each checked against `MATERIAL_RANGES`.
+
+    Raises
+    ------
+    InputError
+        Naming `origin`, the field and the accepted range. Fields that have a default may be missing.
+    """
+    known = {field.name for field in fields(GroundMaterial)}
+    for name, value in values.items():
+        if name not in known:
+            raise InputError(f"{origin}: unknown field '{name}'. Known are: {', '.join(sorted(known))}.")
+        low, high = MATERIAL_RANGES.get(name, (-math.inf, math.inf))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number from {low:g} to {high:g}.")
+    try:
+        return GroundMaterial(**{name: float(value) for name, value in values.items()})  # type: ignore[arg-type]
+    except TypeError:
+        missing = sorted({"youngs_modulus", "poisson_ratio", "characteristic_time"} - set(values))
+        raise InputError(f"{origin}: the material lacks {', '.join(missing)}.") from None
+
+
+def parse(text: str, origin: str) -> Preset:
+    """A preset from the text of its JSON file.
+
+    Raises
+    ------
+    InputError
+        If the text is no JSON, is of another schema, or holds values out of range. Names `origin` and the remedy.
+    """
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{origin}: this is no JSON ({error}). Save the preset again, or delete the file.") from None
+    if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
+        raise InputError(f"{origin}: this is no SoftGround preset of schema_version {SCHEMA_VERSION}.")
+    name, source, surface = (
+        content.get(key, default) for key, default in (("name", ""), ("source", ""), ("surface", "soil"))
+    )
+    material = content.get("material")
+    if not isinstance(name, str) or not name.strip():
+        raise InputError(f"{origin}: the preset has no 'name'.")
+    if not isinstance(source, str):
+        raise InputError(f"{origin}: 'source' must be text.")
+    if surface not in SURFACES:
+        raise InputError(f"{origin}: 'surface' is {surface!r}; it must be one of {', '.join(SURFACES)}.")
+    if not isinstance(material, dict):
+        raise InputError(f"{origin}: the preset has no 'material' table.")
+    return Preset(name, source, surface, validate_material(material, origin))
+
+
+def load(path: Path) -> Preset:
+    """The preset in a file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is no valid preset.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"Preset '{path}' cannot be read: {error}") from None
+    return parse(text, f"Preset '{path}'")
+
+
+def dump(preset: Preset) -> str:
+    """The text of the preset's JSON file."""
+    content = {"schema_version": SCHEMA_VERSION, **asdict(preset)}
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def _bare(name: str) -> str:
+    """A name as it is compared: letters and digits, whatever their case and what stands between them."""
+    return re.sub(r"[\W_]+", "_", name.casefold()).strip("_")
+
+
+def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
+    """The preset of that file stem or display name, the first found in `folders`.
+
+    Raises
+    ------
+    InputError
+        If there is none, listing those that there are.
+    """
+    wanted = _bare(name)
+    paths = [path for folder in folders for path in sorted(folder.glob("*.json"))]
+    for path in paths:
+        if _bare(path.stem) == wanted:
+            return load(path)
+    for path in paths:
+        with suppress(InputError):  # another preset's file may be broken
+            if _bare((preset := load(path)).name) == wanted:
+                return preset
+    known = ", ".join(path.stem for path in paths)
+    raise InputError(f"There is no preset '{name}'. There are: {known}; or give the path of a .json file.")

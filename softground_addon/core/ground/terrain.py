@@ -1,0 +1,195 @@
+"""The undisturbed ground as a function of place: a plane, or the upper side of a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..numerics.triangles import barycentric, enumerated
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+UPWARD = 0.05
+"""Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
+
+CROWDED = 10
+"""Triangles per bin from which smaller bins are worth their table: those of a grid have 8 each, where the mesh's faces
+are slivers, as at the pole of a sphere, each has hundreds."""
+LARGEST_TABLE = 1 << 17
+"""Triangles in all bins, each as often as it is in one, up to which the bins are made smaller."""
+
+PLACES_AT_ONCE = 1 << 14
+"""Places that are looked up together; what it takes for a moment follows this, and not how many there are."""
+
+SAME_LAYER = 1e-3
+"""Surfaces over one place that are closer than this are one [m]."""
+
+
+@dataclass(frozen=True)
+class MeshTerrain:
+    """The upper side of a triangle mesh, looked up by place.
+
+    Triangles are binned over the plane once; a look-up tests the few that share the point's bin. Where several
+    upward-facing surfaces lie over one place, the highest counts.
+
+    Attributes
+    ----------
+    corners : (T, 3, 3) float array
+        World positions of the upward-facing triangles' corners [m].
+    origin, bin_size : (2,) float arrays
+        Lower corner and size of the bins [m].
+    shape : (2,) int array
+        Number of bins along x and y.
+    first : (bins + 1,) int array
+        Where each bin's triangles start in `members`.
+    members : (M,) int array
+        Triangles by bin.
+    values : (T, 3, C) float array
+        What is said of the triangles' corners, if anything.
+    """
+
+    corners: Array
+    origin: Array
+    bin_size: Array
+    shape: Indices
+    first: Indices
+    members: Indices
+    values: Array
+
+    @classmethod
+    def from_mesh(
+        cls,
+        vertices: Array,
+        triangles: Indices,
+        bounds: Array | None = None,
+        values: Array | None = None,
+        *,
+        name: str = "The ground",
+    ) -> MeshTerrain:
+        """Bin the triangles of a mesh.
+
+        Parameters
+        ----------
+        vertices : (V, 3) float array
+            World positions [m], Z up.
+        triangles : (T, 3) int array
+            Corners of each triangle, counter-clockwise from outside. Where none faces upward, as on a plane whose
+            normals are flipped, they are taken from their other side.
+        bounds : (2, 2) float array, optional
+            Lower and upper corner of the region of interest in the plane [m]; triangles outside it are dropped.
+        values : (V, C) float array, optional
+            What is said of the vertices, to be interpolated between them.
+        name : str
+            For messages.
+
+        Raises
+        ------
+        InputError
+            If within the bounds there is none, or nothing but walls.
+        """
+        if bounds is not None and len(triangles):
+            place = vertices[:, :2]
+            beyond = np.stack([place < bounds[0], place > bounds[1]], axis=-1)
+            triangles = triangles[~beyond[triangles].all(axis=1).any(axis=(1, 2))]
+        corners = vertices[triangles].astype(np.float64)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        steep = UPWARD * np.maximum(length, 1e-300)
+        upward = normal[:, 2] > steep
+        if not upward.any():
+            upward = normal[:, 2] < -steep
+            corners, triangles = corners[:, ::-1], triangles[:, ::-1]
+        corners, triangles = corners[upward], triangles[upward]
+        if not len(corners):
+            raise InputError(
+                f"{name} has no face under the character's path that could be stood on: move it under the feet."
+            )
+        bins = _bins(corners[..., :2])
+        of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
+        return cls(corners, *bins, of_corners)
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
+        across, along = np.ravel(x), np.ravel(y)
+        highest = np.full(np.size(x), -np.inf)
+        for first in range(0, len(highest), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            np.maximum.at(highest[part], hits.point, hits.z)
+        return np.where(np.isinf(highest), np.nan, highest).reshape(np.shape(x))
+
+    def interpolated(self, x: Array, y: Array) -> Array:
+        """The values of the highest upward-facing surface at each place, (C, ...); NaN where there is none."""
+        hits = self._surfaces(np.ravel(x), np.ravel(y))
+        order = np.argsort(hits.z, kind="stable")  # the highest is written last
+        a, b, c = np.moveaxis(self.values[hits.triangle[order]], 1, 0)
+        u, v = hits.u[order, None], hits.v[order, None]
+        values = np.full((np.size(x), self.values.shape[2]), np.nan)
+        values[hits.point[order]] = a + u * (b - a) + v * (c - a)
+        return values.T.reshape(-1, *np.shape(x))
+
+    def is_height_field(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether no second upward-facing surface lies below the highest one, for each place."""
+        across, along = np.ravel(x), np.ravel(y)
+        top = self.heights(across, along)
+        single = np.ones(np.size(x), dtype=bool)
+        for first in range(0, len(single), PLACES_AT_ONCE):
+            part = slice(first, first + PLACES_AT_ONCE)
+            hits = self._surfaces(across[part], along[part])
+            single[part][hits.point[hits.z < top[part][hits.point] - SAME_LAYER]] = False
+        return single.reshape(np.shape(x))
+
+    def _surfaces(self, x: Array, y: Array) -> _Hits:
+        """Every pair of a point and a triangle that lies over or under it."""
+        place = np.stack([x, y], axis=-1)
+        at_bin = np.floor((place - self.origin) / self.bin_size)
+        inside = np.flatnonzero(((at_bin >= 0) & (at_bin < self.shape)).all(axis=1))
+        at_bin = at_bin[inside].astype(np.intp)
+        bin_index = at_bin[:, 1] * self.shape[0] + at_bin[:, 0]
+        start, stop = self.first[bin_index], self.first[bin_index + 1]
+        pair, within = enumerated(stop - start)
+        triangle = self.members[start[pair] + within]
+        point = inside[pair]
+        corners = self.corners[triangle]
+        u, v, hit = barycentric(corners[..., :2], place[point])
+        a, b, c = corners[..., 2].T
+        return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
+
+
+def _bins(corners: Array) -> tuple[Array, Array, Indices, Indices, Indices]:
+    """Bins over the triangles (T, 3, 2): origin, size, shape, first and members, as in `MeshTerrain`."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    origin = low.min(axis=0)
+    extent = high.max(axis=0) - origin
+    bins_along = max(1.0, np.sqrt(len(corners) / 2))
+    size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
+    while True:
+        shape = np.floor(extent / size).astype(np.intp) + 1
+        from_bin = np.floor((low - origin) / size).astype(np.intp)
+        span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
+        members = span.prod(axis=1).sum()
+        if members <= CROWDED * shape.prod() or members > LARGEST_TABLE / 4:  # half the size: up to four times
+            break
+        size = size / 2
+    triangle, within = enumerated(span.prod(axis=1))
+    bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
+    bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
+    bin_index = bin_y * shape[0] + bin_x
+    order = np.argsort(bin_index, kind="stable")
+    first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
+    return origin, size, shape, first, triangle[order]
+
+
+class _Hits(NamedTuple):
+    """Points and the triangles over or under them: place on the triangle a + u·(b - a) + v·(c - a), and its height."""
+
+    point: Indices
+    triangle: Indices
+    u: Array
+    v: Array
+    z: Array

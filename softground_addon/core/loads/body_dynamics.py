@@ -1,0 +1,229 @@
+"""What a body's motion says about the forces on it: their sum, and the point of the ground through which they act."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..numerics.intervals import runs
+from ..numerics.smoothing_spline import share_of_noise, smooth_path
+from .centre_of_mass import MassPoints, fitted_to_free_fall, mass_points
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CUTOFF = 16.0
+"""Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, as is usual for
+gait (Winter 2009, "Biomechanics and Motor Control of Human Movement", chapter 3: 6 Hz and more). It holds where the
+motion itself does not tell better."""
+CUTOFF_RANGE = 2.0
+"""How far the motion may move the cut-off from there, down or up [octaves]."""
+CUTOFF_STEP = 0.25
+"""Steps of the search for it [octaves]."""
+HIGHEST_CUTOFF = 0.34
+"""Highest cut-off as a fraction of the scene's frame rate: 8 Hz at 24 fps."""
+FREE_FALL = 0.5
+"""A body that nothing touches is in flight when its motion asks for less than this on average, in body weights.
+Otherwise it hangs or flies by other means, and its motion says nothing about free fall."""
+LIGHT = 0.2
+"""Below this total force the point of action is not known, in body weights."""
+TRUE_FALL = 0.2
+"""A flight whose fall differs from gravity by less shows the error of the body's mass, not another time scale."""
+RATES_OF_FALL = (0.5, 3.0)
+"""Slowest and fastest fall that is taken for a flight, in gravities."""
+STEADY_ENDS = 0.01
+"""How much a force of 1 body weight is expected at both ends of the action, where half of the evidence is missing."""
+
+
+@dataclass(frozen=True)
+class BodyDynamics:
+    """Motion of the body as a whole at each step.
+
+    Attributes
+    ----------
+    centre : (N, 3) float array
+        Centre of mass [m].
+    force : (N, 3) float array
+        Force that the motion asks for, per weight [body weights].
+    moment : (N, 3) float array
+        Rate of the angular momentum about the centre of mass, per weight [m].
+    points : MassPoints
+        The body that this holds for, at the scene frames among the steps.
+    cutoff : float
+        Cut-off of the low-pass that suits the motion [Hz].
+    """
+
+    centre: Array
+    force: Array
+    moment: Array
+    points: MassPoints
+    cutoff: float
+
+    def point_of_action(self, ground: Array, steps: slice | NDArray[np.intp] = slice(None)) -> Array:
+        """Where the total force meets the level `ground` (...,) [m] at steps (...,): the zero moment point.
+
+        Where the force is too small to have one, the projection of the centre of mass.
+
+        Returns
+        -------
+        (..., 2) float array [m]
+        """
+        centre, force, moment = self.centre[steps], self.force[steps], self.moment[steps]
+        up = np.maximum(force[..., 2], LIGHT)
+        height = centre[..., 2] - ground
+        x = centre[..., 0] - (height * force[..., 0] + moment[..., 1]) / up
+        y = centre[..., 1] - (height * force[..., 1] - moment[..., 0]) / up
+        known = force[..., 2, None] > LIGHT
+        return np.where(known, np.stack([x, y], axis=-1), centre[..., :2])
+
+
+def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> BodyDynamics:
+    """Forces that the motion asks for, so far as it goes without knowing that they are 0 in flight.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    airborne : (N,) bool array, optional
+        Steps at which nothing seems to touch. Where they are flights and tell that contacts are brief, the cut-off is
+        raised to suit them.
+    """
+    sampled, frame_step = motion.on_frames, motion.frame_step
+    points = mass_points(motion.at_frames())
+    usual = _usual_cutoff(motion)
+    path = np.zeros((len(sampled), 6))
+    path[sampled] = np.concatenate([_angular_momentum(points, frame_step), points.centre], axis=1)
+
+    def smoothed(cutoff: float) -> BodyDynamics:
+        smooth, rate, acceleration = smooth_path(
+            path, motion.time_step, cutoff, sampled=sampled, steady_ends=STEADY_ENDS
+        )
+        force = acceleration[:, 3:] / motion.gravity + (0.0, 0.0, 1.0)
+        return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
+
+    body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
+    flying = _flights(airborne, body.force[:, 2]) if airborne is not None else np.zeros(0, dtype=bool)
+    if flying.any():
+        cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
+        body = smoothed(cutoff) if cutoff > body.cutoff else body
+    return body
+
+
+def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
+    """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,).
+
+    In flight the force is 0: the body's mass is fitted to that, and the low-pass is the one that shows it best. Where
+    the motion is nowhere near free fall while nothing touches, it stays as it was.
+    """
+    flying = _flights(airborne, body.force[:, 2])
+    if not flying.any():
+        return body
+    points, cutoff, fall = _falling_freely(motion, body, flying)
+    sampled = motion.on_frames
+    path = np.zeros((len(sampled), 3))
+    path[sampled] = points.centre
+    centre, _, acceleration = smooth_path(
+        path, motion.time_step, cutoff, sampled=sampled, falling=_inner(flying), fall=fall, steady_ends=STEADY_ENDS
+    )
+    force = acceleration / fall + (0.0, 0.0, 1.0)
+    force[flying] = 0.0
+    return BodyDynamics(centre, force, body.moment, points, cutoff)
+
+
+def _usual_cutoff(motion: CharacterMotion) -> float:
+    """Cut-off for a body of this size at this frame rate [Hz]."""
+    return min(CUTOFF / (2 * np.pi * motion.pendulum_time), HIGHEST_CUTOFF / motion.frame_step)
+
+
+def _falling_freely(
+    motion: CharacterMotion, body: BodyDynamics, flying: Mask, stride: float = CUTOFF_STEP
+) -> tuple[MassPoints, float, float]:
+    """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and its fall [m/s²].
+
+    A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
+    the shaking of soft tissue through: both show as a force where there is none.
+    """
+    step, usual = motion.frame_step, _usual_cutoff(motion)
+    fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * motion.time_step)))
+    parts, flying = body.points.part_centres(), flying[motion.on_frames]
+    highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
+
+    @cache
+    def fitted(octaves: float) -> tuple[MassPoints, float]:
+        _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), step, usual * 2.0**octaves)
+        falling = acceleration.reshape(parts.shape)[flying]
+        return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0))
+
+    start = np.log2(body.cutoff / usual)
+    best = _downhill(lambda octaves: fitted(octaves)[1], start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
+    return fitted(best)[0], usual * 2.0**best, fall
+
+
+def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:
+    """Cut-off that predicts each sample best from the others [Hz]: the usual one, lower for noise.
+
+    Generalised cross-validation (Craven and Wahba 1979, "Smoothing noisy data with spline functions").
+    """
+
+    @cache
+    def score(octaves: float) -> float:
+        cutoff = usual * 2.0**octaves
+        smooth, _, _ = smooth_path(path, step, cutoff)
+        return float(((smooth - path) ** 2).sum()) / (1 - share_of_noise(cutoff * step)) ** 2
+
+    return float(usual * 2.0 ** _downhill(score, 0.0, CUTOFF_STEP, (-CUTOFF_RANGE, 0.0)))
+
+
+def _downhill(score: Callable[[float], float], start: float, stride: float, limits: tuple[float, float]) -> float:
+    """Where a function with one valley is lowest: from `start` on by strides, then on the parabola through three."""
+    low, high = limits
+    best = start
+    for further in (stride, -stride):
+        while low <= best + further <= high and score(best + further) < score(best):
+            best += further
+    if low <= best - stride and best + stride <= high:
+        below, here, above = (score(best + offset) for offset in (-stride, 0.0, stride))
+        curvature = below - 2 * here + above
+        best += stride * (below - above) / (2 * curvature) if curvature > 0 else 0.0
+    return best
+
+
+def _flights(airborne: Mask, force: Array) -> Mask:
+    """Those stretches without contact in which the motion asks for little force (N,) [body weights]."""
+    flights = airborne.copy()
+    for first, last in zip(*runs(airborne), strict=True):
+        flights[first:last] = force[first:last].mean() < FREE_FALL
+    return flights
+
+
+def _rate_of_fall(body: BodyDynamics, flying: Mask, gravity: float, edge: int) -> float:
+    """Acceleration of the body in flight [m/s²]: gravity, unless the animation's time or size is another.
+
+    A jump made by hand, retimed or put on a larger rig hangs in the air or drops like a stone. Its forces are those
+    of the same motion at the time scale at which it falls with gravity.
+    """
+    window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge // 2, mode="edge"), edge // 2 * 2 + 1)
+    inner = 1 - body.force[window.all(axis=1), 2]
+    if not len(inner):
+        return gravity
+    ratio = float(np.clip(np.median(inner), *RATES_OF_FALL))
+    return ratio * gravity if abs(ratio - 1) > TRUE_FALL else gravity
+
+
+def _angular_momentum(points: MassPoints, step: float) -> Array:
+    """Angular momentum of the point masses about their centre, per body mass, (N, 3) [m²/s]."""
+    if len(points.positions) < 2:
+        return np.zeros((len(points.positions), 3))
+    x, y, z = arm = (points.positions - points.centre[:, None]).transpose(2, 0, 1)
+    u, v, w = np.gradient(arm, step, axis=1)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u]).dot(points.fractions).T
+
+
+def _inner(state: Mask) -> Mask:
+    """Steps whose neighbours are in the same state."""
+    return state & np.append(state[1:], state[-1:]) & np.append(state[:1], state[:-1])

@@ -1,0 +1,81 @@
+"""Where on each sole the ground presses: from the heel to the toes as the foot rolls."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+
+Array = NDArray[np.float64]
+
+PRESSED_DEPTH = 0.01
+"""Landmarks this much higher than the lowest one bear e times less of the pressure, in leg lengths."""
+
+
+def lowest_points(motion: CharacterMotion) -> Array:
+    """The middle of each sole's landmarks, the lowest ones counting most, (N, S, 3) [m].
+
+    It tells where a sole can press: the heel at heel strike, the whole sole in mid-stance, the toes at toe-off.
+    """
+    centres = []
+    for sole in motion.soles:
+        points = sole.landmark_positions()
+        centres.append((_nearness(points, motion)[..., None] * points).sum(axis=1))
+    return np.stack(centres, axis=1)
+
+
+def extents(motion: CharacterMotion, lowest: Array) -> Array:
+    """How far each sole can press about its `lowest_points` (N, S, 3), on the level: standard deviation, (N, S) [m].
+
+    Little on the heel or on the toes, most on a flat foot.
+    """
+    spread = []
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        off = ((points[..., :2] - lowest[:, index, None, :2]) ** 2).sum(axis=-1)
+        spread.append((_nearness(points, motion) * off).sum(axis=1))
+    return np.sqrt(np.stack(spread, axis=1))
+
+
+def _nearness(points: Array, motion: CharacterMotion) -> Array:
+    """Shares of the pressure that a sole's landmarks (N, L, 3) can bear by their height, (N, L)."""
+    height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    nearness = np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
+    shares: Array = nearness / nearness.sum(axis=1, keepdims=True)
+    return shares
+
+
+def centres_of_pressure(motion: CharacterMotion, lowest: Array, share: Array, target: Array, trust: Array) -> Array:
+    """Where each sole presses when the loads' common point of action is known, (N, S, 3) [m].
+
+    Each sole's centre moves along the sole from its `lowest_points` toward the place at which the loads' moment
+    agrees with the point of action, as far as landmarks are low enough to bear: from the heel at heel strike to the
+    toes at toe-off.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    lowest : (N, S, 3) float array
+        Its `lowest_points` [m].
+    share : (N, S) float array
+        Each sole's share of the total force.
+    target : (N, 2) float array
+        Point of action of the total force on the ground [m].
+    trust : (N,) float array
+        How far `target` is followed, 0 to 1.
+    """
+    centres = lowest.copy()
+    missing = trust[:, None] * (target - (share[..., None] * centres[..., :2]).sum(axis=1))
+    emphasis = share / np.maximum((share**2).sum(axis=1, keepdims=True), 1e-9)
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        along = points[:, -1, :2] - points[:, 0, :2]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+        place = ((points[..., :2] - centres[:, index, None, :2]) * along[:, None]).sum(axis=-1)
+        height = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+        place *= np.exp(-height / (PRESSED_DEPTH * motion.leg_length))
+        wanted = (missing * along).sum(axis=1) * emphasis[:, index]
+        centres[:, index, :2] += np.clip(wanted, place.min(axis=1), place.max(axis=1))[:, None] * along
+    return centres

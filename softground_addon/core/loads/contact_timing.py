@@ -1,0 +1,332 @@
+"""Heel strike and toe-off to a few milliseconds, from the forces on the whole body.
+
+Heights and speeds tell that a foot is on the ground, not quite when it got there: a swinging foot comes in flat and
+slow, and a toe leaves while it hardly moves. The forces do: in double support the point through which the total force
+acts moves from the trailing to the leading foot.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..numerics.intervals import close_short, runs
+from ..numerics.smoothing_spline import smooth_path
+from .body_dynamics import FREE_FALL, BodyDynamics
+from .centre_of_pressure import extents, lowest_points
+from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts
+from .load_sharing import whole_body_shares
+
+Array = NDArray[np.float64]
+
+SEARCH = 0.33
+"""How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""
+TIMING_DEVIATION = 0.1
+"""Standard deviation of the times found from heights and speeds, in the same unit (30 ms)."""
+SHARE_DEVIATION = 0.07
+"""Least standard deviation of the leading foot's share as the point of action tells it."""
+SURE = 2.0
+"""How far from the times found the other foot is surely off the ground, in `TIMING_DEVIATION`."""
+SHARE_MEMORY = 0.25
+"""Time over which the error of that share is about the same, in the same unit (one period of the low-pass at 4/5)."""
+SHORTEST_OVERLAP = 0.1
+"""Shortest double support, in the same unit (30 ms)."""
+
+LANDING_DEVIATION = 0.07
+"""Standard deviation of the time of a landing after flight as heights and speeds tell it, in the same unit (20 ms)."""
+ONSET_DEVIATION = 0.035
+"""Standard deviation of that time as the rise of the total force tells it, in the same unit (10 ms)."""
+SHORTEST_SUPPORT = 0.165
+"""A push up that lasts less does not prove a contact, in the same unit (50 ms)."""
+HIGHEST_SUPPORT = 0.2
+"""A sole higher than this bears nothing, whatever pushes the body up, in leg lengths."""
+SUPPORT_RANGE = 0.08
+"""A sole bears while it is within this of its lowest place, in leg lengths."""
+IDLE_LOAD = 0.15
+"""A sole that never bears more than this only drags, in body weights."""
+QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
+"""Phases at which a sine has a quarter and a half of its peak."""
+
+COARSE_STRIDE = 3
+"""Steps between the times that are tried first."""
+WINDOW_UNIT = 8
+"""Steps to a whole number of which a transition's window is extended, so that many are fitted at once."""
+AT_ONCE = 32
+"""Transitions that are fitted at once: a thousand ramps are tried on each."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """The load passes from one sole to another.
+
+    Attributes
+    ----------
+    trailing, leading : int
+        Soles.
+    strike, leave : int
+        Step at which the leading sole lands and the trailing one has left; they overlap when strike < leave.
+    """
+
+    trailing: int
+    leading: int
+    strike: int
+    leave: int
+
+
+def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynamics) -> Contacts:
+    """Contacts that agree with the forces on the whole body.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Found from heights and speeds.
+    body : BodyDynamics
+        Of that motion, before anything is known about flight.
+    """
+    unit = motion.pendulum_time / motion.time_step
+    touching = _supported(motion, contacts, body.force[:, 2])
+    for sole in range(touching.shape[1]):
+        touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
+    lowest = lowest_points(motion)
+    changes = [
+        change
+        for change in transitions(touching, round(SEARCH * unit))
+        # In flight the feet are right, there is no double support.
+        if body.force[change.leave : change.strike, 2].min(initial=np.inf) >= FREE_FALL
+    ]
+    for change, (strike, leave) in zip(
+        changes, _fit_overlaps(changes, lowest, extents(motion, lowest), body, unit), strict=True
+    ):
+        touching[min(strike, change.strike) : max(strike, change.strike), change.leading] = strike < change.strike
+        touching[min(leave, change.leave) : max(leave, change.leave), change.trailing] = leave > change.leave
+    for first, sole in _landings(touching):
+        onset = _onset(body.force[:, 2], first, round(SEARCH * unit))
+        weight = LANDING_DEVIATION**2 / (LANDING_DEVIATION**2 + ONSET_DEVIATION**2)
+        strike = round(first + weight * (onset - first))
+        touching[min(strike, first) : max(strike, first), sole] = strike < first
+    load = whole_body_shares(motion, lowest, touching, body) * body.force[:, 2:]
+    return dataclasses.replace(contacts, touching=_without_idle(touching, load))
+
+
+def _without_idle(touching: NDArray[np.bool_], load: Array) -> NDArray[np.bool_]:
+    """Contacts less those whose load (N, S) [body weights] is never worth the name: a foot that drags bears nothing."""
+    bearing = touching.copy()
+    for sole in range(touching.shape[1]):
+        for first, last in zip(*runs(touching[:, sole]), strict=True):
+            bearing[first:last, sole] = load[first:last, sole].max() > IDLE_LOAD
+    return np.where(bearing.any(axis=1, keepdims=True), bearing, touching)
+
+
+def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDArray[np.bool_]:
+    """Contacts, with a sole on the ground wherever the body is pushed up: the lowest one, any about as low and slow.
+
+    Feet that float by more in one step than in another are missed by their height. Such a contact may overlap those
+    before and after it for a moment, as in double support.
+    """
+    unit = motion.pendulum_time / motion.time_step
+    overlap = round(SEARCH * unit)
+    same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
+    clearance, touching = contacts.clearance, contacts.touching.copy()
+    unsupported = [
+        (first, last)
+        for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True)
+        if last - first >= round(SHORTEST_SUPPORT * unit) and clearance[first:last].min() <= highest
+    ]
+    if not unsupported:
+        return touching
+    speed = _sole_speeds(motion)
+    about_as_low = clearance < clearance.min(axis=1, keepdims=True) + same_height
+    slowest = np.where(about_as_low, speed, np.inf).min(axis=1, keepdims=True)
+    about_as_slow = speed < slowest + TOUCH_SPEED * motion.froude_speed
+    bearing = about_as_low & about_as_slow & (force > 0)[:, None]
+    for first, last in unsupported:
+        begin, end = max(first - overlap, 0), last + overlap
+        for sole in range(touching.shape[1]):
+            for start, stop in zip(*runs(bearing[begin:end, sole]), strict=True):
+                if begin + start < last and begin + stop > first:
+                    height = clearance[begin + start : begin + stop, sole]
+                    touching[begin + start : begin + stop, sole] |= height < height.min() + same_height
+    return touching
+
+
+def _sole_speeds(motion: CharacterMotion) -> Array:
+    """Horizontal speed of each sole's slowest landmark, (N, S) [m/s]."""
+    cutoff = EDGE_CUTOFF / (2 * np.pi * motion.pendulum_time)
+    frames = motion.at_frames()
+    points = [sole.landmark_positions()[..., :2] for sole in frames.soles]
+    path = np.concatenate(points, axis=1)
+    _, velocity, _ = smooth_path(path.reshape(len(path), -1), frames.time_step, cutoff)
+    first = np.cumsum([0, *(place.shape[1] for place in points)])[:-1]
+    slowest = np.minimum.reduceat(np.linalg.norm(velocity.reshape(path.shape), axis=-1), first, axis=1)
+    return np.stack([np.interp(motion.frames, frames.frames, speed) for speed in slowest.T], axis=1)
+
+
+def _landings(touching: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First steps of contacts that end a flight, with their soles."""
+    grounded, _ = runs(touching.any(axis=1))
+    return [(int(first), int(sole)) for first in grounded[grounded > 0] for sole in np.flatnonzero(touching[first])]
+
+
+def _onset(force: Array, first: int, search: int) -> float:
+    """Step at which the vertical force (N,) [body weights] starts to rise, near the landing at step `first`.
+
+    The low-pass leads the force into the flight; its steep flank stays in place. The flank is that of a half sine, as
+    running and landing show: from one half of the peak through one quarter to 0 in known proportion.
+    """
+    window = force[max(first - search, 0) : first + max(search, 1)]
+    crest = int(window.argmax())
+    peak = window[crest]
+    quarter, half = (_last_below(window[: crest + 1], level * peak) for level in (0.25, 0.5))
+    if peak < 1.0 or quarter < 0 or window[: crest + 1].min() > 0.25 * peak:
+        return float(first)
+    onset = quarter - (half - quarter) * QUARTER_SINE / (HALF_SINE - QUARTER_SINE)
+    return max(first - search, 0) + float(np.clip(onset, 0, len(window)))
+
+
+def _last_below(rising: Array, level: float) -> float:
+    """Where a curve crosses a level for the last time, in fractional samples; -1 where it never is below it."""
+    below = np.flatnonzero(rising < level)
+    if not len(below) or below[-1] == len(rising) - 1:
+        return -1.0
+    i = below[-1]
+    return float(i + (level - rising[i]) / (rising[i + 1] - rising[i]))
+
+
+def transitions(touching: NDArray[np.bool_], reach: int) -> list[Transition]:
+    """Changes of load from one sole to another that no third sole has a part in.
+
+    Parameters
+    ----------
+    touching : (N, S) bool array
+    reach : int
+        Longest gap between the trailing sole's contact and the leading one's [steps].
+    """
+    count = len(touching)
+    intervals = [
+        (int(first), int(last), sole)
+        for sole in range(touching.shape[1])
+        for first, last in zip(*runs(touching[:, sole]), strict=True)
+    ]
+    found = []
+    for first, last, leading in intervals:
+        if first == 0:
+            continue
+        partners = [
+            (end, sole)
+            for start, end, sole in intervals
+            if sole != leading and start < first and first - reach <= end < min(last, count)
+        ]
+        if len(partners) != 1:
+            continue
+        leave, trailing = partners[0]
+        window = slice(max(min(first, leave) - reach, 0), max(first, leave) + reach)
+        others = np.delete(touching[window], (leading, trailing), axis=1)
+        if not others.any():
+            found.append(Transition(trailing, leading, first, leave))
+    return found
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """Transitions that are fitted together, and the steps at which each is looked at.
+
+    Attributes
+    ----------
+    found : (T, 2) int array
+        Strike and leave as they were found.
+    feet : (T, 2) int array
+        The trailing and the leading sole.
+    step : (T, W) int array
+        Steps of each window, as many for all.
+    end : (T,) int array
+        Where each window ends: its steps from there on say nothing.
+    """
+
+    found: NDArray[np.intp]
+    feet: NDArray[np.intp]
+    step: NDArray[np.intp]
+    end: NDArray[np.intp]
+
+
+def _fit_overlaps(
+    changes: list[Transition], lowest: Array, extent: Array, body: BodyDynamics, unit: float
+) -> NDArray[np.intp]:
+    """Strike and leave of each transition whose cosine ramp fits the point of action best, (T, 2)."""
+    search = max(round(SEARCH * unit), 1)
+    found = np.array([(change.strike, change.leave) for change in changes]).reshape(-1, 2)
+    begin = np.maximum(found.min(axis=1) - search, 0)
+    end = np.minimum(found.max(axis=1) + search, len(lowest))
+    fitted = found.copy()
+    # Those whose windows are about as long are fitted together.
+    width = -(-(end - begin) // WINDOW_UNIT) * WINDOW_UNIT
+    alike = [np.flatnonzero(width == steps) for steps in np.unique(width)]
+    for some in (part for group in alike for part in np.split(group, range(AT_ONCE, len(group), AT_ONCE))):
+        feet = np.array([(changes[index].trailing, changes[index].leading) for index in some])
+        windows = _Windows(found[some], feet, begin[some, None] + np.arange(width[some[0]]), end[some])
+        share, telling = _shares_told(windows, lowest, extent, body, unit)
+        fitted[some] = _best_ramps(windows, share, telling, unit)
+    return fitted
+
+
+def _shares_told(
+    windows: _Windows, lowest: Array, extent: Array, body: BodyDynamics, unit: float
+) -> tuple[Array, Array]:
+    """The leading foot's share at each step as the point of action tells it, and how much that says, both (T, W).
+
+    Surely before the strikes and after the leaves that were found the share is 0 and 1: what the point of action tells
+    there shows how far it can be trusted. A body animated by eye moves with little regard to the foot that bears it.
+    """
+    step, end = windows.step, windows.end[:, None]
+    trailing, leading = windows.feet[:, :1], windows.feet[:, 1:]
+    inside = step < end
+    sure = round(SURE * TIMING_DEVIATION * unit)
+    before = step < windows.found.min(axis=1, keepdims=True) - sure
+    after = (step >= windows.found.max(axis=1, keepdims=True) + sure) & inside
+    within = np.minimum(step, end - 1)
+    back, front = lowest[within, trailing], lowest[within, leading]
+    ground = np.select([before, after], [back[..., 2], front[..., 2]], (back[..., 2] + front[..., 2]) / 2)
+    along = (front - back)[..., :2]
+    length = (along**2).sum(axis=-1)
+    share = ((body.point_of_action(ground, within) - back[..., :2]) * along).sum(axis=-1) / np.maximum(length, 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    # The point of action wanders under each sole as far as that can press: so much less it tells about the shares.
+    wander = (1 - share) * extent[within, trailing] ** 2 + share * extent[within, leading] ** 2
+    wander /= np.maximum(length, 1e-12)
+    off = np.select([before, after], [share, 1 - share], 0.0) ** 2
+    beyond = np.maximum(off - wander, 0.0).sum(axis=1, keepdims=True)
+    beyond /= np.maximum((before | after).sum(axis=1, keepdims=True), 1)
+    # Where the point of action leaves a foot that bears alone, shares near 0 and 1 tell nothing of the other.
+    trust = (SHARE_DEVIATION**2 / (SHARE_DEVIATION**2 + beyond)) ** 2
+    telling = trust + (1 - trust) * (4 * share * (1 - share)) ** 2
+    telling /= SHARE_MEMORY * unit * (SHARE_DEVIATION**2 + wander + beyond)
+    return share, np.where(inside, telling, 0.0)
+
+
+def _best_ramps(windows: _Windows, share: Array, telling: Array, unit: float) -> NDArray[np.intp]:
+    """The pairs of strike and leave near those found whose ramps fit the shares (T, W) best, (T, 2)."""
+    found, step, end = windows.found, windows.step, windows.end[:, None]
+    search = max(round(SEARCH * unit), 1)
+    best = found
+    for stride in (COARSE_STRIDE, 1):
+        reach = search // stride * stride if stride > 1 else COARSE_STRIDE - 1
+        offset = np.arange(-reach, reach + 1, stride)
+        pairs = best[:, None] + np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2)
+        strike, leave = pairs[..., 0], pairs[..., 1]
+        possible = (leave - strike >= SHORTEST_OVERLAP * unit) & (strike > step[:, :1]) & (leave < end)
+        overlap = np.where(possible, leave - strike, 1)[..., None]
+        phase = (step[:, None] - strike[..., None]) / overlap
+        ramp = np.cos(np.pi * np.clip(phase, 0.0, 1.0, out=phase), out=phase)
+        ramp += 2 * share[:, None] - 1  # minus twice the misfit of a ramp (1 - cos)/2
+        # A matrix product would wake the threads of the BLAS library, which cost more than they save here.
+        misfit = np.einsum("gpw,gw->gp", np.square(ramp, out=ramp), telling / 4)
+        moved = (pairs - found[:, None]) / unit
+        cost = np.where(possible, misfit + ((moved / TIMING_DEVIATION) ** 2).sum(axis=-1), np.inf)
+        least = np.take_along_axis(pairs, cost.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+        best = np.where(possible.any(axis=1, keepdims=True), least, best)
+    return best

@@ -1,0 +1,261 @@
+"""When each sole touches its ground.
+
+Detection is scale-free: heights are compared as fractions of the leg length and speeds as fractions of
+sqrt(gravity·leg length), so that the same numbers serve a mouse and a giant, metres and centimetres
+(MODEL.md section 3, "Contact").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion, SoleMotion
+from ..numerics.interpolation import in_stretches
+from ..numerics.intervals import close_short, hysteresis, runs
+from ..numerics.smoothing_spline import smooth_path
+
+if TYPE_CHECKING:
+    from ..ground.heightfield import Terrain
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOUCH_HEIGHT = 0.025
+"""A sole lower than this starts to touch, in leg lengths (2 cm for an adult)."""
+LEAVE_HEIGHT = 0.05
+"""A touching sole higher than this has left, in leg lengths."""
+TOUCH_SPEED = 0.25
+"""A sole slower than this, or than the body, starts to touch, in sqrt(gravity·leg length) (0.8 m/s for an adult). The
+foot that swings overtakes the body, the foot that stands falls behind it."""
+LEAVE_SPEED = 1.5
+"""A touching sole faster than this many times that speed has left."""
+LANDED_HEIGHT = 0.01
+"""A sole has landed when one of its landmarks is this near to where it will stand, in leg lengths."""
+REST_SPEED = 0.15
+"""A sole slower than this may be standing: such samples tell the float, in sqrt(gravity·leg length)."""
+SOLID_FLOAT_LIMIT = 0.03
+"""The same for what is not a foot: hands, knees and canes come near the ground without touching it, in leg lengths."""
+FLOAT_PERCENTILE = 10.0
+"""The clearance of a standing sole that counts as float or sink: low, but no single outlier."""
+FLOAT_LIMIT = 0.15
+"""A sole that never comes nearer than this to its ground does not float, it does not touch, in leg lengths."""
+SHORTEST_CONTACT = 0.165
+"""Gaps and blips shorter than this close, in sqrt(leg length/gravity) (0.05 s for an adult)."""
+STEEPEST_GROUND = np.cos(np.radians(60.0))
+"""Vertical part of the normal of the steepest ground that bears a sole: more is a wall."""
+EDGE_SEARCH = 0.2
+"""How far toe-off may lie from the instant that height and speed tell, in sqrt(leg length/gravity) (60 ms)."""
+EDGE_CUTOFF = 24.0
+"""Cut-off of the low-pass before a sole's acceleration is taken, in pendulum frequencies sqrt(gravity/leg
+length)/(2·pi) (12 Hz for an adult)."""
+SLOPE_PROBE = 0.02
+"""Half the distance over which the ground's slope is read, in leg lengths."""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Which soles touch at each step.
+
+    Attributes
+    ----------
+    touching : (N, S) bool array
+    offset : (S,) float array
+        Constant float (positive) or sink (negative) of each sole that detection removed [m].
+    normal : (N, S, 3) float array
+        The ground's unit normal under each sole.
+    clearance : (N, S) float array
+        Distance of each sole from its ground after `offset` is removed [m], infinite where nothing can bear it.
+    """
+
+    touching: Mask
+    offset: Array
+    normal: Array
+    clearance: Array
+
+    def during(self, steps: slice) -> Contacts:
+        """The contacts at some of the steps."""
+        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps])
+
+
+def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
+    """Find when each sole touches the terrain, by height and speed with hysteresis.
+
+    A contact starts when the sole has come down to where it will stand, and ends when its last landmark accelerates
+    upward most (Hreljac and Marshall 2000, "Algorithms to determine event timing during normal walking using
+    kinematic data", J. Biomechanics 33(6)).
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    terrain : Terrain
+        The undisturbed ground. Where it is missing or steeper than 60° there is no contact.
+
+    Returns
+    -------
+    Contacts
+    """
+    tracks = [_track(sole, motion, terrain) for sole in motion.soles]
+    feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
+    drift = _ground_drift(feet or tracks, motion)
+    body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
+    limit = np.maximum(TOUCH_SPEED * motion.froude_speed, body_speed)
+    found = [
+        _detect(track, drift, limit, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
+        for track, sole in zip(tracks, motion.soles, strict=True)
+    ]
+    touching, offset = zip(*found, strict=True)
+    normal = np.stack([track.normal for track in tracks], axis=1)
+    clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
+    return Contacts(np.stack(touching, axis=1), np.array(offset), normal, clearance)
+
+
+def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:
+    """Unit normals of the terrain at positions of any shape (...,), from central differences over ±reach [m].
+
+    Returns
+    -------
+    (..., 3) float array, NaN where the ground is missing.
+    """
+    slope_x = (terrain.heights(x + reach, y) - terrain.heights(x - reach, y)) / (2 * reach)
+    slope_y = (terrain.heights(x, y + reach) - terrain.heights(x, y - reach)) / (2 * reach)
+    normal = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def clearances(points: Array, terrain: Terrain, *, reach: float) -> tuple[Array, Array]:
+    """Distances of a sole's landmarks from the ground, measured along its normal.
+
+    Parameters
+    ----------
+    points : (N, L, 3) float array
+        World positions of the landmarks [m].
+    terrain : Terrain
+    reach : float
+        Half the distance over which the ground's slope is read [m].
+
+    Returns
+    -------
+    clearance : (N, L) float array [m]
+        Infinite where the ground is missing or too steep to stand on.
+    normal : (N, L, 3) float array
+        The ground's unit normal, vertical where there is none.
+    """
+    x, y, z = np.moveaxis(points, -1, 0)
+    normal = ground_normal(terrain, x, y, reach=reach)
+    clearance = (z - terrain.heights(x, y)) * normal[..., 2]
+    bears = np.isfinite(clearance) & (normal[..., 2] >= STEEPEST_GROUND)
+    return np.where(bears, clearance, np.inf), np.where(np.isfinite(normal), normal, (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class _Track:
+    """One sole over its ground: clearance, velocity and height of the ground's normal at its lowest landmark."""
+
+    clearance: Array  # (N,) [m]
+    velocity: Array  # (N, 3) [m/s]
+    rise: Array  # (N, L) clearance of every landmark [m]
+    normal: Array  # (N, 3)
+
+
+def _track(sole: SoleMotion, motion: CharacterMotion, terrain: Terrain) -> _Track:
+    points = sole.landmark_positions()
+
+    def during(steps: slice) -> Array:
+        clearance, normals = clearances(points[steps], terrain, reach=SLOPE_PROBE * motion.leg_length)
+        lowest = clearance.argmin(axis=1)[:, None]
+        return np.concatenate([clearance, np.take_along_axis(normals, lowest[..., None], axis=1)[:, 0]], axis=1)
+
+    rise, normal = np.split(in_stretches(during, len(points)), [points.shape[1]], axis=1)
+    lowest = rise.argmin(axis=1)
+    velocity = _velocities(points, lowest, motion.time_step)
+    return _Track(rise.min(axis=1), velocity, rise, normal)
+
+
+def _velocities(points: Array, chosen: NDArray[np.intp], step: float) -> Array:
+    """Velocity at each step of the chosen one (N,) of some points (N, L, 3), (N, 3) [m/s]: the slower of the steps
+    before and after, so that a jump of the pose does not widen."""
+    if len(points) < 2:
+        return np.zeros_like(points[:, 0])
+    now, last = np.arange(len(points)), len(points) - 2
+    before, after = (
+        (points[start + 1, chosen] - points[start, chosen]) / step
+        for start in (np.maximum(now - 1, 0), np.minimum(now, last))
+    )
+    slower = np.linalg.norm(before, axis=-1, keepdims=True) < np.linalg.norm(after, axis=-1, keepdims=True)
+    return np.where(slower, before, after)
+
+
+def _body_velocity(motion: CharacterMotion) -> Array:
+    """Horizontal velocity of the body, (N, 3) [m/s]: that of its hips."""
+    path = motion.hips
+    if len(path) < 2:
+        return np.zeros_like(path)
+    return np.gradient(path, motion.time_step, axis=0) * (1.0, 1.0, 0.0)
+
+
+def _ground_drift(tracks: list[_Track], motion: CharacterMotion) -> Array:
+    """Horizontal velocity that the soles have while they stand, (3,) [m/s].
+
+    0 in a sound animation; the belt's in a walk on the spot.
+    """
+    low = [track.velocity[track.clearance < _low(track.clearance, motion.leg_length)] for track in tracks]
+    drift = np.median(np.concatenate(low), axis=0) * (1.0, 1.0, 0.0) if any(map(len, low)) else np.zeros(3)
+    return drift * (np.linalg.norm(drift) > REST_SPEED * motion.froude_speed)
+
+
+def _low(clearance: Array, leg_length: float) -> float:
+    """The clearance below which a sole may well be standing [m]."""
+    finite = clearance[np.isfinite(clearance)]
+    return float(np.percentile(finite, FLOAT_PERCENTILE)) + TOUCH_HEIGHT * leg_length if len(finite) else 0.0
+
+
+def _detect(
+    track: _Track, drift: Array, limit: Array, motion: CharacterMotion, float_limit: float
+) -> tuple[Mask, float]:
+    """When one sole touches, and the float that was removed."""
+    leg = motion.leg_length
+    speed = np.linalg.norm(track.velocity - drift, axis=-1)
+    offset = _float(track.clearance, speed / motion.froude_speed, float_limit * leg)
+    height = (track.clearance - offset) / leg
+    touching = hysteresis(
+        (height < TOUCH_HEIGHT) & (speed < limit), (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED * limit)
+    )
+    unit = motion.pendulum_time / motion.time_step
+    touching = close_short(touching, round(SHORTEST_CONTACT * unit))
+    return _sharpened(touching, track, motion), offset
+
+
+def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
+    """Contacts from landing to toe-off: later starts, and ends where the last landmark accelerates upward most."""
+    unit = motion.pendulum_time / motion.time_step
+    search = round(EDGE_SEARCH * unit)
+    rise = np.where(np.isfinite(track.rise), track.rise, 0.0)
+    cutoff = EDGE_CUTOFF / (2 * np.pi * motion.pendulum_time)
+    _, _, acceleration = smooth_path(rise, motion.time_step, cutoff)
+    sharp = np.zeros_like(touching)
+    for first, last in zip(*runs(touching), strict=True):
+        start, end = first, last
+        if first > 0:
+            standing = np.percentile(rise[first:last], FLOAT_PERCENTILE, axis=0)
+            landed = (rise[first:last] < standing + LANDED_HEIGHT * motion.leg_length).any(axis=1)
+            start += int(landed.argmax())
+        if last < len(touching):
+            landmark = rise[last].argmin()
+            begin = max(last - search, start + 1)
+            end = begin + int(np.argmax(acceleration[begin : last + max(search, 1), landmark]))
+        sharp[start:end] = True
+    return sharp
+
+
+def _float(height: Array, speed: Array, limit: float) -> float:
+    """The clearance at which a sole stands [m], 0 when it never does."""
+    near = np.abs(height) < limit
+    standing = near & (speed < REST_SPEED)
+    if not standing.any():
+        standing = near
+    return float(np.percentile(height[standing], FLOAT_PERCENTILE)) if standing.any() else 0.0

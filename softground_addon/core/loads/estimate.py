@@ -1,0 +1,69 @@
+"""From a character's motion to its loads: contacts and forces on the simulation's time grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..ground.heightfield import Terrain
+from ..ground.material import GroundMaterial
+from ..motion.motion import CharacterMotion, steps_per_frame
+from .body_dynamics import body_dynamics
+from .contact_timing import refine_contacts
+from .contacts import Contacts, detect_contacts
+from .continuation import continued, without_holds
+from .forces import ContactForces, impulse_forces, whole_body_forces
+from .free_bodies import free_loads
+
+ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
+
+
+@dataclass(frozen=True)
+class CharacterLoads:
+    """What one character does to the ground, on the simulation's time grid."""
+
+    motion: CharacterMotion
+    contacts: Contacts
+    forces: ContactForces
+
+
+def estimate_loads(
+    motion: CharacterMotion,
+    terrain: Terrain,
+    *,
+    force_model: ForceModel,
+    material: GroundMaterial,
+    crisp_landings: bool = False,
+) -> CharacterLoads:
+    """Resample the motion to the simulation's time grid, find its contacts and estimate its forces.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        At scene frames.
+    terrain : Terrain
+        The undisturbed ground.
+    force_model : 'WHOLE_BODY' or 'IMPULSE'
+    material : GroundMaterial
+        Its characteristic time shapes the impulse model and the landings of things without a skeleton; the
+        whole-body model of a character does not depend on it.
+    crisp_landings : bool
+        See `whole_body_forces`.
+    """
+    steps = steps_per_frame(motion.frame_rate)
+    if motion.centre is not None:
+        tau = material.characteristic_time
+        return CharacterLoads(
+            *free_loads(motion, terrain, steps=steps, characteristic_time=tau, force_model=force_model)
+        )
+    source, given = continued(without_holds(motion))
+    source = source.resampled(steps)
+    contacts = detect_contacts(source, terrain)
+    if force_model == "IMPULSE":
+        forces = impulse_forces(source, contacts, material.characteristic_time)
+    else:
+        body = body_dynamics(source, ~contacts.touching.any(axis=1))
+        contacts = refine_contacts(source, contacts, body)
+        forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
+    shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
+    return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))

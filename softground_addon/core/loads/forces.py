@@ -1,0 +1,182 @@
+"""Ground reaction forces on the soles of one character.
+
+Two models (MODEL.md section 3): the paper's impulse model, causal, and the whole-body model.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..numerics.intervals import runs
+from .body_dynamics import BodyDynamics, body_dynamics, with_flight
+from .centre_of_mass import centre_of_mass
+from .centre_of_pressure import centres_of_pressure, lowest_points
+from .contacts import Contacts
+from .load_sharing import point_of_action, share_by_moment, whole_body_shares
+
+Array = NDArray[np.float64]
+
+UP = np.array([0.0, 0.0, 1.0])
+
+FOOT_FRACTION = 0.08
+"""Mass that stops with a landing foot, of the body mass (Clark, Ryan and Weyand 2017)."""
+IMPACT_TIME = 0.16
+"""Time in which it stops, in sqrt(leg length/gravity) (50 ms for an adult)."""
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """Forces of the ground on every sole at each step.
+
+    Attributes
+    ----------
+    forces : (N, S, 3) float array
+        Ground reaction force on each sole [N].
+    total : (N, 3) float array
+        Their sum [N].
+    centre_of_pressure : (N, S, 3) float array
+        Where each force acts, on the sole's underside [m].
+    weight : (N, S) float array
+        Part of the vertical force that carries the weight, for display [N].
+    momentum : (N, S) float array
+        The rest of it: what stops a landing sole or accelerates the body, for display [N].
+    """
+
+    forces: Array
+    total: Array
+    centre_of_pressure: Array
+    weight: Array
+    momentum: Array
+
+    def during(self, steps: slice) -> ContactForces:
+        """The forces at some of the steps."""
+        return ContactForces(*(getattr(self, field.name)[steps] for field in dataclasses.fields(self)))
+
+
+def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> ContactForces:
+    """The paper's model, Eq. 3-8 with the corrections 1, 5 and 6 of MODEL.md section 2.
+
+    The weight is split by the projection of the centre of mass on the segment between the soles; a sole that lands
+    with velocity v into the ground adds share·mass·v/tau from the moment of contact on for tau. Causal: each step
+    depends on the steps before it only.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Of that motion.
+    characteristic_time : float
+        tau of the ground [s].
+
+    Returns
+    -------
+    ContactForces
+        A sole's momentum part lasts only while it touches.
+    """
+    pressure = lowest_points(motion)
+    share = share_by_moment(pressure[..., :2], centre_of_mass(motion)[:, :2], contacts.touching)
+    weight = share * motion.mass * motion.gravity
+    momentum = share * motion.mass * _landing_deceleration(motion, contacts, characteristic_time)
+    forces = (weight + momentum)[..., None] * UP
+    return ContactForces(forces, forces.sum(axis=1), pressure, weight, momentum)
+
+
+def whole_body_forces(
+    motion: CharacterMotion,
+    contacts: Contacts,
+    body: BodyDynamics | None = None,
+    *,
+    crisp_landings: bool = False,
+) -> ContactForces:
+    """Forces that accelerate the centre of mass as the motion shows: m·(g + a_com), where something touches.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        On the simulation's time grid.
+    contacts : Contacts
+        Of that motion, best after `refine_contacts`.
+    body : BodyDynamics, optional
+        Of that motion, where it is known already.
+    crisp_landings : bool
+        Give a landing foot's momentum to the ground as fast as it stops, as on hard ground (see `_foot_impacts`);
+        the low-pass spreads it over some tenths of a second.
+
+    Returns
+    -------
+    ContactForces
+        None pulls; they are 0 where nothing touches.
+    """
+    grounded = contacts.touching.any(axis=1)
+    body = with_flight(motion, body or body_dynamics(motion, ~grounded), ~grounded)
+    body_weight = motion.mass * motion.gravity
+    total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
+    lowest = lowest_points(motion)
+    share = whole_body_shares(motion, lowest, contacts.touching, body)
+    target = point_of_action(lowest, contacts.touching, body)
+    pressure = centres_of_pressure(motion, lowest, share, target, np.clip(total[:, 2], 0.0, 1.0))
+    forces = body_weight * share[..., None] * total[:, None]
+    if crisp_landings:
+        impacts = _foot_impacts(motion, contacts, 1 / (2 * body.cutoff))
+        forces[..., 2] = np.maximum(forces[..., 2] + impacts, 0.0)
+    weight = np.minimum(body_weight * share, forces[..., 2])
+    return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)
+
+
+def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> Array:
+    """v_n/tau of each sole's last landing, for tau after it, (N, S) [m/s²]."""
+    step = motion.time_step
+    deceleration = np.zeros(contacts.touching.shape)
+    for sole, first, last, speed in _landings(motion, contacts):
+        # The part of each step that lies within tau, so that the impulse is mass·v at any frame rate.
+        lasting = np.clip(characteristic_time / step - np.arange(last - first), 0.0, 1.0)
+        deceleration[first:last, sole] = speed / characteristic_time * lasting
+    return deceleration
+
+
+def _foot_impacts(motion: CharacterMotion, contacts: Contacts, smoothing: float) -> Array:
+    """What a low-pass takes from the impact of landing feet, (N, S) [N]; each impact sums to 0 over time.
+
+    A landing foot and shank, 8 % of the body mass, stop within some 50 ms (Clark, Ryan and Weyand 2017, "A general
+    relationship links gait mechanics and running ground reaction forces", J. Exp. Biology 220). The smooth force holds
+    that momentum already, spread over the time `smoothing` [s]: the same momentum is taken there and given as a
+    raised cosine over the time that the foot takes to stop.
+    """
+    step = motion.time_step
+    impacts = np.zeros(contacts.touching.shape)
+    duration = IMPACT_TIME * motion.pendulum_time
+    for sole, first, last, speed in _landings(motion, contacts):
+        momentum = FOOT_FRACTION * motion.mass * speed
+        time = (np.arange(last - first) + 0.5) * step
+        crisp, smooth = (_raised_cosine(time, width) for width in (duration, duration + 2 * smoothing))
+        if crisp.sum() > 0:
+            impacts[first:last, sole] = momentum / step * (crisp / crisp.sum() - smooth / smooth.sum())
+    return impacts
+
+
+def _raised_cosine(time: Array, width: float) -> Array:
+    """A smooth pulse from 0 to `width`."""
+    return np.where(time < width, 1 - np.cos(2 * np.pi * time / width), 0.0)
+
+
+def _landings(motion: CharacterMotion, contacts: Contacts) -> Iterator[tuple[int, int, int, float]]:
+    """Sole, first and last step of each contact that begins within the motion, and its speed into the ground [m/s].
+
+    The speed is that of the step before the first one that touches.
+    """
+    for index, sole in enumerate(motion.soles):
+        points = sole.landmark_positions()
+        for first, last in zip(*runs(contacts.touching[:, index]), strict=True):
+            if first < 2:
+                continue  # it stood from the beginning, or landed too early to have a velocity
+            normal = contacts.normal[first, index]
+            landmark = (points[first] @ normal).argmin()
+            into_ground = (points[first - 2, landmark] - points[first - 1, landmark]) @ normal / motion.time_step
+            yield index, int(first), int(last), max(float(into_ground), 0.0)

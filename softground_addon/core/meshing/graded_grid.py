@@ -1,0 +1,114 @@
+"""A rectangular grid that is fine where it is wanted and coarse elsewhere: the leaves of a balanced quadtree.
+
+Faces are squares of 1, 2, 4, ... cells. Those that share a side or a corner differ by at most a factor of two, and a
+square with smaller ones beside it has their corners on its sides too, so that no crack opens when they move.
+
+References
+----------
+de Berg et al., "Computational Geometry", 3rd ed. (2008), chapter 14: quadtrees and non-uniform mesh generation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.cell_keys import AROUND, Keys, among, cells_of, keys_of, parents_of
+
+Indices = NDArray[np.intp]
+
+_CORNERS = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+
+
+@dataclass(frozen=True)
+class GradedGrid:
+    """Squares of different sizes that fill a rectangle, as polygons without cracks.
+
+    Attributes
+    ----------
+    vertices : (V, 2) int array
+        Column and row of each vertex [cells], row by row.
+    corner_vertex : (L,) int array
+        Vertex of each corner, face by face, counter-clockwise.
+    face_size : (P,) int array
+        Number of corners of each face, 4 to 8.
+    """
+
+    vertices: Indices
+    corner_vertex: Indices
+    face_size: Indices
+
+
+def graded_grid(fine: Indices, level: int, lower: Indices, upper: Indices, coarsest: int) -> GradedGrid:
+    """Fill a rectangle with squares that are one cell large in given blocks and grow with the distance from them.
+
+    Parameters
+    ----------
+    fine : (N, 2) int array
+        Column and row of the blocks that are to be made of single cells; those outside the rectangle do not count.
+    level : int
+        Side of those blocks, as a power of two [cells].
+    lower, upper : (2,) int arrays
+        Corners that the rectangle reaches at least [cells]; it consists of whole squares of the largest size.
+    coarsest : int
+        Side of the largest squares, as a power of two [cells]; not below `level`.
+
+    Examples
+    --------
+    >>> grid = graded_grid(np.array([[0, 0]]), 0, np.array([0, 0]), np.array([8, 8]), 3)
+    >>> grid.face_size.tolist()  # three squares of 4 cells, three of 2, four of 1
+    [5, 5, 4, 5, 5, 4, 4, 4, 4, 4]
+    """
+    side = 1 << coarsest
+    origin = lower // side * side
+    count = np.maximum(-(-upper // side) - lower // side, 1)
+    cut = _cut_blocks(np.asarray(fine) - origin // (1 << level), level, count, coarsest)
+    blocks = keys_of(np.stack(np.meshgrid(*map(np.arange, count)), axis=-1)).ravel()
+    place, size = [], []
+    for number in range(coarsest, -1, -1):
+        whole = ~among(cut.get(number, blocks[:0]), blocks)
+        place.append(cells_of(blocks[whole]) << number)
+        size.append(np.full(len(place[-1]), 1 << number))
+        blocks = _quarters(blocks[~whole])
+    return _polygons(np.concatenate(place), np.concatenate(size), origin)
+
+
+def _cut_blocks(fine: Indices, level: int, count: Indices, coarsest: int) -> dict[int, Keys]:
+    """Keys of the blocks that are cut in four, by level: those above a fine one, and what keeps the sizes balanced."""
+    inside = ((fine >= 0) & (fine < count << coarsest - level)).all(axis=1)
+    blocks = np.unique(keys_of(fine[inside]))
+    for _ in range(1, level):
+        blocks = _quarters(blocks)
+    if level == 0:
+        blocks = parents_of(blocks)
+    cut = {}
+    for number in range(1, coarsest + 1):
+        cut[number] = blocks
+        around = cells_of(np.unique(blocks[:, None] + AROUND))
+        inside = ((around >= 0) & (around < count << coarsest - number)).all(axis=1)
+        blocks = parents_of(keys_of(around[inside]))
+    return cut
+
+
+def _quarters(blocks: Keys) -> Keys:
+    return np.sort((2 * blocks[:, None] + keys_of(_CORNERS)).ravel())
+
+
+def _polygons(place: Keys, size: Keys, origin: Indices) -> GradedGrid:
+    """Squares at given first corners (P, 2) with given sides as polygons with all vertices that lie on their sides."""
+    corners = place[:, None] + size[:, None, None] * _CORNERS
+    keys = keys_of(corners)
+    vertices = np.unique(keys)
+    large = np.flatnonzero(size > 1)
+    middles = keys_of((corners[large] + np.roll(corners[large], -1, axis=1)) // 2)
+    outline = np.full((len(place), 8), -1, dtype=np.int64)
+    outline[:, ::2] = keys
+    outline[large, 1::2] = np.where(among(vertices, middles), middles, -1)
+    on_it = outline >= 0
+    return GradedGrid(
+        vertices=(cells_of(vertices) + origin).astype(np.intp),
+        corner_vertex=np.searchsorted(vertices, outline[on_it]),
+        face_size=on_it.sum(axis=1),
+    )

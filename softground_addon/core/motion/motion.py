@@ -1,0 +1,314 @@
+"""What a rig did: sole poses and joints over time, as plain arrays in SI units, Z up.
+
+This is the border between Blender and the physics. Everything that the core knows about a character is in one
+`CharacterMotion`; nothing in it refers to bones or objects.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import ceil
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.interpolation import Between, cubic, in_stretches, linear, turning
+from .props import Prop
+
+Array = NDArray[np.float64]
+
+SIMULATION_RATE = 120.0
+"""Lowest rate of the internal time grid, in Hz: at 24, 30, 60 and 120 fps the steps fall on the same instants."""
+
+STILL = 1e-6
+"""What moves less does not move, in leg lengths: positions come in single precision."""
+
+ADULT_LEG = 0.9
+"""Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
+
+_LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
+
+JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
+"""Names that `CharacterMotion.joints` may hold. `toe` is the tip of the foot; any may be missing."""
+
+
+@dataclass(frozen=True)
+class SolePatch:
+    """The underside of one rigid piece of a sole, as two maps over a regular grid.
+
+    The patch frame has x toward the toes, y left and z up when the foot is planted, with z = 0 at the underside's
+    lowest point. Node (row, column) of a map is at x = origin[0] + column·spacing, y = origin[1] + row·spacing.
+
+    Attributes
+    ----------
+    heights : (rows, columns) float array
+        Height of the underside in the patch frame [m], continued smoothly outside the outline.
+    signed_distance : (rows, columns) float array
+        Distance to the patch's outline [m], negative inside.
+    origin : (2,) float array
+        Position of node (0, 0) [m].
+    spacing : float
+        Distance between nodes [m].
+    """
+
+    heights: Array
+    signed_distance: Array
+    origin: Array
+    spacing: float
+
+    @property
+    def area(self) -> float:
+        """Area inside the outline [m²], with edge nodes counted by their covered fraction."""
+        return float(np.clip(0.5 - self.signed_distance / self.spacing, 0.0, 1.0).sum() * self.spacing**2)
+
+
+@dataclass(frozen=True)
+class Sole:
+    """One thing that can print: a foot, a hand, a snowshoe.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "" for neither.
+    patches : tuple of SolePatch
+        Rigid pieces from back to front, e.g. (foot, toes); their seams overlap a little, so that a bend leaves no gap.
+    landmarks : (L, 3) float array
+        Points of the underside that contact detection follows, from back to front (heel, ball, toe tip) [m], each in
+        the frame of its patch.
+    landmark_patch : (L,) int array
+        Index of the patch that each landmark belongs to.
+    outline : (N, 2) float array
+        The flat sole's outline in the frame of the first patch [m], counter-clockwise, for drawing.
+    prop : Prop or None
+        The whole surface, in place of patches, of what prints by whatever faces down; its frame is that of the one
+        pose that it has.
+    """
+
+    name: str
+    side: str
+    patches: tuple[SolePatch, ...]
+    landmarks: Array
+    landmark_patch: NDArray[np.intp]
+    outline: Array
+    prop: Prop | None = None
+
+    @property
+    def area(self) -> float:
+        """Area of the flat sole [m²], from its outline (shoelace formula)."""
+        x, y = self.outline.T
+        return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+    @property
+    def length(self) -> float:
+        """Length of the flat sole from heel to toe tip [m]."""
+        return float(np.ptp(self.outline[:, 0]))
+
+
+@dataclass(frozen=True)
+class SoleMotion:
+    """A sole and the rigid pose of each of its patches over time.
+
+    Attributes
+    ----------
+    sole : Sole
+    transforms : (F, P, 4, 4) float array
+        Patch frame to world, rotation and translation only [m]; of the one frame of a prop.
+    """
+
+    sole: Sole
+    transforms: Array
+
+    def landmark_positions(self) -> Array:
+        """World positions of the sole's landmarks, (F, L, 3) [m]; worked out once, not to be written to."""
+        return self._landmark_positions
+
+    @cached_property
+    def _landmark_positions(self) -> Array:
+        patch, (x, y, z) = self.sole.landmark_patch, self.sole.landmarks.T[..., None]
+
+        def during(steps: slice) -> Array:
+            pose = self.transforms[steps][:, patch, :3]
+            return np.asarray(pose[..., 0] * x + pose[..., 1] * y + pose[..., 2] * z + pose[..., 3])
+
+        positions = in_stretches(during, len(self.transforms))
+        positions.flags.writeable = False
+        return positions
+
+    def lowest(self) -> Array:
+        """Height of the sole's lowest point, (F,) [m]; of a foot, of its lowest landmark."""
+        if self.sole.prop is None:
+            return np.asarray(self.landmark_positions()[..., 2].min(axis=1))
+        pose = self.transforms[:, 0]
+        return np.asarray((pose[:, 2, :3] @ self.sole.prop.probes.T).min(axis=1) + pose[:, 2, 3])
+
+    def at(self, position: Array) -> SoleMotion:
+        """The motion at fractional sample indices (K,), those of its samples exactly.
+
+        Between samples a foot moves along a C1 cubic; a prop turns evenly about the shortest way and moves straight,
+        so that what rolls keeps its shape and what stops at once does not swing past.
+        """
+        method = turning if self.sole.prop else _rigid_cubic
+        return dataclasses.replace(self, transforms=_between(self.transforms, position, method))
+
+
+@dataclass(frozen=True)
+class CharacterMotion:
+    """Everything the core knows about one character.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees: the armature's name.
+    mass : float
+        Body mass [kg].
+    leg_length : float
+        Hip to sole in the rest pose [m]; makes contact detection scale-free.
+    frames : (F,) float array
+        Scene frame numbers, evenly spaced.
+    frame_rate : float
+        Scene frames per second [Hz].
+    soles : tuple of SoleMotion
+    joints : dict of str to (F, 3) float array
+        World positions of those of `JOINTS` that are mapped [m].
+    gravity : float
+        Magnitude of gravity [m/s²].
+    centre : (F, 3) float array or None
+        Centre of mass of a thing without a skeleton, which falls, rolls and slides [m]; None for a character, whose
+        joints tell it.
+    four_legged : bool
+        An animal on four legs: its mass is distributed otherwise than a man's.
+    """
+
+    name: str
+    mass: float
+    leg_length: float
+    frames: Array
+    frame_rate: float
+    soles: tuple[SoleMotion, ...]
+    joints: dict[str, Array] = field(default_factory=dict)
+    gravity: float = 9.81
+    centre: Array | None = None
+    four_legged: bool = False
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples [s], 0 at the first."""
+        return (self.frames - self.frames[0]) / self.frame_rate
+
+    @property
+    def time_step(self) -> float:
+        """Time between samples [s]."""
+        return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether no joint and no sole moves from sample to sample."""
+        paths = (*self.joints.values(), *(sole.transforms for sole in self.soles))
+        return all(np.allclose(path, path[:1], rtol=0.0, atol=STILL * self.leg_length) for path in paths)
+
+    @property
+    def hips(self) -> Array:
+        """Path of the hips (F, 3) [m]; the middle of the hip joints, or above the soles, where they are not mapped."""
+        joints = self.joints
+        if "hips" in joints:
+            return joints["hips"]
+        if "hip_l" in joints and "hip_r" in joints:
+            return (joints["hip_l"] + joints["hip_r"]) / 2
+        middle = np.mean([sole.landmark_positions().mean(axis=1) for sole in self.soles], axis=0)
+        return np.asarray(middle + np.array((0.0, 0.0, self.leg_length)))
+
+    @property
+    def pendulum_time(self) -> float:
+        """sqrt(leg length/gravity) [s], 0.3 s for an adult: times in this unit suit a mouse and a giant."""
+        return float(np.sqrt(self.leg_length / self.gravity))
+
+    @property
+    def froude_speed(self) -> float:
+        """sqrt(gravity·leg length) [m/s], 3 m/s for an adult: the speed at a Froude number of 1."""
+        return float(np.sqrt(self.gravity * self.leg_length))
+
+    @property
+    def time_scale(self) -> float:
+        """How much slower than an adult's a motion of the same kind is."""
+        return float(np.sqrt(self.leg_length / ADULT_LEG))
+
+    @property
+    def adult_second(self) -> float:
+        """Scene frames in which this body does what an adult does in a second."""
+        return self.frame_rate * self.time_scale
+
+    @property
+    def on_frames(self) -> NDArray[np.bool_]:
+        """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
+        return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
+
+    @property
+    def frame_step(self) -> float:
+        """Time between the samples at scene frames [s]."""
+        return dataclasses.replace(self, frames=self.frames[self.on_frames]).time_step
+
+    def at_frames(self) -> CharacterMotion:
+        """The samples at scene frames alone."""
+        return self.of(self.on_frames)
+
+    def first(self, count: int) -> CharacterMotion:
+        """The first `count` samples."""
+        return self.of(slice(count))
+
+    def of(self, samples: slice | NDArray[np.bool_]) -> CharacterMotion:
+        """Some of the samples."""
+        return dataclasses.replace(
+            self,
+            frames=self.frames[samples],
+            soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[samples]) for sole in self.soles),
+            joints={name: path[samples] for name, path in self.joints.items()},
+            centre=None if self.centre is None else self.centre[samples],
+        )
+
+    def resampled(self, steps_per_frame: int) -> CharacterMotion:
+        """The same motion with `steps_per_frame` samples per frame, through C1 cubic interpolation.
+
+        The first sample of each frame is the given one, exactly.
+        """
+        if steps_per_frame == 1 or len(self.frames) < 2:
+            return self
+        count = (len(self.frames) - 1) * steps_per_frame + 1
+        position = np.arange(count) / steps_per_frame
+        return dataclasses.replace(
+            self,
+            frames=self.frames[0] + position * (self.frames[1] - self.frames[0]),
+            soles=tuple(sole.at(position) for sole in self.soles),
+            joints={name: _between(path, position, cubic) for name, path in self.joints.items()},
+            centre=None if self.centre is None else linear(self.centre, position),
+        )
+
+
+def steps_per_frame(frame_rate: float) -> int:
+    """Number of simulation steps in a frame, so that a step is at most 1/`SIMULATION_RATE` s long."""
+    return max(1, ceil(SIMULATION_RATE / frame_rate - 1e-6))
+
+
+def _between(samples: Array, position: Array, method: Callable[[Array, Array], Array]) -> Array:
+    """Samples at positions between them, for all who look at them an array."""
+    return cast(Array, Between(samples, position, method))
+
+
+def _rigid_cubic(poses: Array, position: Array) -> Array:
+    """Rigid poses along cubics."""
+    return orthonormal(cubic(poses, position))
+
+
+def orthonormal(transforms: Array) -> Array:
+    """Nearly rigid transforms made rigid: one Newton step of the polar decomposition."""
+    rotation = transforms[..., :3, :3]
+    gram = np.swapaxes(rotation, -1, -2) @ rotation
+    rigid = transforms.copy()
+    rigid[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
+    rigid[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return rigid

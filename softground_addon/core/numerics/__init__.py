@@ -1,0 +1,1 @@
+"""Mathematics that knows nothing of feet: rigid motions, interpolation, splines, intervals, keys of cells."""

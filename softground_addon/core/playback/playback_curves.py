@@ -1,0 +1,252 @@
+"""KeyframeTables as curves over time, the form in which Blender's nodes sample them.
+
+Between two points all is linear; where something jumps, two points share a frame. The pressure of a contact, which
+the tables keep as its frames and its peak, becomes points too. Some thirty places lie end to end on one: fewer curves
+are looked up faster. They are made part by part of the ground and packed, so that little takes memory everywhere at
+once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import SparseGrid
+from ..numerics.packed import PackedArray
+from ..record.footprints import Footprint
+from .keyframe_tables import NO_VISIT, KeyframeTables, keyframe_tables
+from .ramps import TOLERANCE
+from .vertex_histories import VertexHistories, vertex_histories
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Integers = NDArray[np.int32]
+Floats = NDArray[np.float32]
+
+LOADING = 0.2
+"""Part of a contact over which the pressure rises, and again falls: about that of a walking step."""
+
+NARROW = 2.0**-30
+"""Scale of heights across a curve, so small that the length along it is the time to the last bit."""
+
+LENGTH = 512.0
+"""Up to here places begin on a curve [frames]: in single precision its length is known to a `TICK`."""
+
+TICK = 2.0**-14
+"""Of the time along a curve [frames]."""
+
+VISITS_AT_ONCE = 5_000
+"""Footprints' cells over places whose vertex_histories are worked out together: some ten megabytes."""
+
+PART = 1.0
+"""Side of the squares by which places are put together [m]: as large as a few footprints."""
+
+
+@dataclass(frozen=True)
+class PlaybackCurves:
+    """The state of places over time, as R points of S curves; the places of each lie end to end.
+
+    Attributes
+    ----------
+    size : (S,) int array
+        Points of each curve.
+    position : (R, 3) packed float32 array
+        Time along the curve [frames]; change of the displayed height, and displayed compression [m], both times
+        `NARROW`.
+    contact : (R,) packed float32 array
+        While a contact lasts its pressure [Pa], after it minus the time since [s], before the first -`NO_VISIT`.
+    """
+
+    size: Indices
+    position: PackedArray[np.float32]
+    contact: PackedArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Spans:
+    """When something happens to each of P places, and where it lies on the curves.
+
+    Attributes
+    ----------
+    point : (P,) int array
+        The places.
+    start, end : (P,) float32 arrays
+        First and last frame of each place: before, nothing has happened to it; after, all but the time since the
+        contact stays as it is at the last, where nothing presses any more.
+    curve : (P,) int32 array
+        Which of the curves it lies on.
+    offset : (P,) float32 array
+        Where on that it starts [frames].
+    last_height : (P,) float32 array
+        Change of the displayed height at the last frame [m].
+    last_contact : (P,) float32 array
+        Last frame of the last contact; `keyframe_tables.NO_VISIT` where there was none.
+    frame_rate : float
+        Frames per second [Hz].
+    error : float
+        Largest error of a displayed height, at any place and frame [m].
+    """
+
+    point: Indices
+    start: Floats
+    end: Floats
+    curve: Integers
+    offset: Floats
+    last_height: Floats
+    last_contact: Floats
+    frame_rate: float
+    error: float
+
+
+def playback_curves_at(
+    footprints: Sequence[Footprint],
+    x: Array,
+    y: Array,
+    *,
+    blur_sigma: float,
+    frame_rate: float,
+    time_stretch: float = 1.0,
+    tolerance: float = TOLERANCE,
+) -> tuple[Spans, PlaybackCurves]:
+    """The record as curves at given places.
+
+    Parameters
+    ----------
+    footprints, x, y, blur_sigma, tolerance
+        See `vertex_histories.vertex_histories`.
+    frame_rate : float
+        Frames of the footprints per second [Hz].
+    time_stretch : float
+        Frames of the curves for each frame of the footprints.
+    """
+    nowhere = np.zeros(0, dtype=np.intp)
+    nothing = np.zeros(0, dtype=np.float32)
+    sizes, count, error = [nowhere], 0, 0.0
+    whole: dict[str, PackedArray[Any]] = {
+        "point": PackedArray(nowhere),
+        "curve": PackedArray(nowhere.astype(np.int32)),
+        **{name: PackedArray(nothing) for name in ("start", "end", "offset", "last_height", "last_contact")},
+    }
+    position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
+    for places in _parts(footprints, x, y):
+        over_time = vertex_histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance)
+        spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)
+        part = replace(spans, point=places[spans.point], curve=spans.curve + np.int32(count))
+        for name, packed in whole.items():
+            packed.extend(PackedArray(getattr(part, name)))
+        position.extend(lines.position)
+        contact.extend(lines.contact)
+        sizes.append(lines.size)
+        count += len(lines.size)
+        error = max(error, spans.error)
+    arrays: dict[str, NDArray[Any]] = {name: packed.unpacked() for name, packed in whole.items()}
+    spans = Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error)
+    return spans, PlaybackCurves(np.concatenate(sizes), position, contact)
+
+
+def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
+    """Places (K,) in parts that lie together, of which each takes about as much to work out."""
+    order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
+    visits = SparseGrid(footprints[0].cell_size if footprints else PART, channels=1)
+    for footprint in footprints:
+        visits.write(footprint.window, visits.read(footprint.window) + 1)
+    so_far = np.cumsum(visits.nearest(x[order], y[order])[0])
+    return np.split(order, np.flatnonzero(np.diff(so_far // VISITS_AT_ONCE)) + 1)
+
+
+def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, PlaybackCurves]:
+    """The vertex_histories as curves; their frames per second tell how long a contact has been over.
+
+    Examples
+    --------
+    A contact from frame 2 to 12 on ground that does not move:
+
+    >>> from softground_addon.core.playback.vertex_histories import Visits
+    >>> from softground_addon.core.playback.ramps import Ramps
+    >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
+    >>> spans, lines = curves(VertexHistories(Ramps.joined([], 2), visits, 0.0), 24.0)
+    >>> spans.start.tolist(), lines.position.unpacked()[:, 0].tolist(), lines.contact.unpacked().tolist()
+    ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
+    """
+    table = keyframe_tables(over_time)
+    place = np.repeat(np.arange(len(table.point)), np.diff(table.first))
+    row, frame = _with_turns(table, place)
+    jump = np.flatnonzero(table.frame == table.visit_start)
+    jump = jump[np.isin(jump, table.first, invert=True)]
+    # A point on either side of each jump: that before belongs to the contact of the row before.
+    rows = np.concatenate([jump - 1, row])
+    when = np.concatenate([table.frame[jump], frame])
+    after = np.repeat([0, 1], [len(jump), len(row)])
+    order = np.lexsort((after, when, place[rows]))
+    rows, when = rows[order], when[order]
+    size = np.bincount(place[rows], minlength=len(table.point))
+    last = table.first[1:] - 1
+    start, end = table.frame[table.first[:-1]], table.frame[last]
+    curve, offset = _end_to_end(end - start)
+    position = np.empty((len(rows), 3), dtype=np.float32)
+    position[:, 0] = np.round((when + np.repeat(offset - start, size)) / TICK) * TICK
+    position[:, 1:] = _movement(table, rows, when) * NARROW
+    spans = Spans(
+        point=table.point,
+        start=start.astype(np.float32),
+        end=end.astype(np.float32),
+        curve=curve.astype(np.int32),
+        offset=offset.astype(np.float32),
+        last_height=table.movement[last, 0].astype(np.float32),
+        last_contact=table.visit_end[last].astype(np.float32),
+        frame_rate=frame_rate,
+        error=over_time.error,
+    )
+    sizes = np.bincount(curve, size).astype(np.intp)
+    contact = _contact(table, rows, when, frame_rate)
+    return spans, PlaybackCurves(sizes, PackedArray(position), PackedArray(contact))
+
+
+def _end_to_end(length: Array) -> tuple[Indices, Array]:
+    """Which curve each place of some length is on if they are laid end to end, and where on it that begins [frames].
+
+    The gap behind each is at least a frame. PlaybackCurves begin no place beyond `LENGTH`.
+    """
+    begin = np.cumsum(np.ceil(length) + 1.0) - np.ceil(length) - 1.0
+    _, first, curve = np.unique(begin // LENGTH, return_index=True, return_inverse=True)
+    return curve, begin - begin[first[curve]]
+
+
+def _with_turns(table: KeyframeTables, place: Indices) -> tuple[Indices, Array]:
+    """The rows and frames of all points but those before jumps: the table's own, and where the pressure turns."""
+    contact = np.flatnonzero((table.frame == table.visit_start) & (table.visit_end > table.visit_start))
+    length = table.visit_end[contact] - table.visit_start[contact]
+    turns = [table.visit_start[contact] + part * length for part in (LOADING, 1.0 - LOADING)]
+    own = np.arange(len(place))
+    when = np.concatenate([table.frame, *turns])
+    source = np.concatenate([own, contact, contact])
+    order = np.lexsort((np.arange(len(when)) >= len(own), when, place[source]))
+    row = np.maximum.accumulate(np.where(order < len(own), order, -1))
+    # A turn counts while its contact is the latest, and where there is no row already.
+    kept = (order < len(own)) | (
+        (table.visit_start[row] == table.visit_start[source[order]]) & (table.frame[row] < when[order])
+    )
+    return row[kept], when[order][kept]
+
+
+def _movement(table: KeyframeTables, row: Indices, frame: Array) -> Array:
+    """Height and compression at given frames, each between a row and the next, (N, 2)."""
+    following = np.minimum(row + 1, max(len(table.frame) - 1, 0))
+    run = table.frame[following] - table.frame[row]
+    since = frame - table.frame[row]
+    share = np.divide(since, run, out=np.zeros(len(row)), where=since > 0)[:, None]
+    moved: Array = table.movement[row] + share * (table.movement[following] - table.movement[row])
+    return moved
+
+
+def _contact(table: KeyframeTables, row: Indices, frame: Array, frame_rate: float) -> Floats:
+    """See `PlaybackCurves.contact`, at given frames, each between a row and the next, (N,)."""
+    begin, end = table.visit_start[row], table.visit_end[row]
+    passed = np.divide(frame - begin, end - begin, out=np.zeros(len(row)), where=end > begin)
+    pressure = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0) * table.pressure[row]
+    contact = np.where(frame < end, pressure, (end - frame) / frame_rate)
+    return np.where(begin < NO_VISIT, contact, -NO_VISIT).astype(np.float32)

@@ -1,0 +1,167 @@
+"""How the ground moves over time, in closed form: a few ramps per point.
+
+A ramp changes a value by `change` between two frames, linearly, and holds it before and after. A point's value at any
+time is the sum of its ramps, so that frames can be shown in any order, and between frames, without a cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+TOLERANCE = 2e-4
+"""Largest error of a fitted height while it moves [m]; at rest there is none."""
+
+QUANTUM = 2.0**-20
+"""Step of fitted values [m], about a micrometre: sums of its multiples below 16 m are exact in single precision."""
+
+REST = 12
+"""Frames for which a value stays the same if it is at rest and not just between two movements of one step."""
+
+
+@dataclass(frozen=True)
+class Ramps:
+    """VertexHistories of points: value(t) = Σ change · clip((t - start) / (end - start), 0, 1).
+
+    Attributes
+    ----------
+    point : (R,) int array
+        The point that each ramp belongs to, ascending; each point's ramps are in the order of their start.
+    start, end : (R,) float arrays
+        Frames between which the values change; start < end.
+    change : (R, C) float array
+        By how much, each of the C values that a point has.
+    """
+
+    point: Indices
+    start: Array
+    end: Array
+    change: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Ramps], channels: int) -> Ramps:
+        """All ramps of several sets, which may share points; how many values these have must be told for none."""
+        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels)))
+        point, start, end, change = (
+            np.concatenate([getattr(part, name) for part in (none, *parts)])
+            for name in ("point", "start", "end", "change")
+        )
+        order = np.lexsort((start, point))
+        return cls(point[order], start[order], end[order], change[order])
+
+    def at(self, frame: float, points: int) -> Array:
+        """Values of points 0 to `points` - 1 at a frame, (points, C)."""
+        share = np.clip((frame - self.start) / (self.end - self.start), 0.0, 1.0)
+        values = np.zeros((points, self.change.shape[1]))
+        for channel, change in enumerate(self.change.T):
+            values[:, channel] += np.bincount(self.point, change * share, minlength=points)
+        return values
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Ramps and how far they are from what they stand for.
+
+    Attributes
+    ----------
+    ramps : Ramps
+    error : (K, C) float array
+        Largest difference of each value at each point, over time.
+    """
+
+    ramps: Ramps
+    error: Array
+
+
+def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
+    """Stand a few ramps in for vertex_histories that change now and then.
+
+    Each movement begins as one straight line through its ends; where the values are farther from it than the tolerance,
+    it is bent to them where they are farthest, and so on [1]_. All values of a point bend at the same frames. Points at
+    rest for `REST` frames are where they were, to half a `QUANTUM`.
+
+    Parameters
+    ----------
+    frames : (T,) float array
+        Frame numbers, ascending.
+    vertex_histories : (T, K, C) float array
+        Values of K points, 0 at the first frame.
+    tolerance : (C,) or (K, C) float array
+        Largest error of each value while it moves.
+
+    Returns
+    -------
+    Fit
+
+    References
+    ----------
+    .. [1] Douglas, D., Peucker, T. (1973). Algorithms for the reduction of the number of points required to represent
+       a digitized line or its caricature. Cartographica 10(2), 112-122.
+
+    Examples
+    --------
+    A print that is pressed between frames 2 and 4 takes one ramp:
+
+    >>> pressed = fit(np.arange(6.0), -np.array([0, 0, 0, 1, 2, 2])[:, None, None] / 128, np.array([TOLERANCE]))
+    >>> pressed.ramps.start, pressed.ramps.end, pressed.ramps.change
+    (array([2.]), array([4.]), array([[-0.015625]]))
+    """
+    count, points, channels = vertex_histories.shape
+    values = np.round(vertex_histories / QUANTUM) * QUANTUM
+    # One point after the other, so that what lies between two knots lies together.
+    knot = _ends_of_movements(values).T.ravel()
+    values = values.transpose(1, 0, 2).reshape(-1, channels)
+    when = np.tile(frames, points)
+    margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), (points, channels))
+    error = np.zeros((points, channels))
+
+    at = np.flatnonzero(knot)
+    begin, end = _with_frames_between(at[:-1], at[1:], count)
+    while len(begin):
+        inside = end - begin - 1
+        first = np.cumsum(inside) - inside
+        line = np.repeat(np.arange(len(begin)), inside)
+        sample = np.arange(len(line)) - first[line] + begin[line] + 1
+        share = (when[sample] - when[begin][line]) / (when[end] - when[begin])[line]
+        rise = values[end] - values[begin]
+        missed = np.abs(values[begin][line] + share[:, None] * rise[line] - values[sample])
+        excess = (missed / margin[begin // count][line]).max(axis=1)
+        worst = np.maximum.reduceat(excess, first)
+        fits = worst <= 1.0
+        np.maximum.at(error, begin[fits] // count, np.maximum.reduceat(missed, first)[fits])
+        farthest = np.flatnonzero(excess == worst[line])
+        bend = sample[farthest[np.searchsorted(line[farthest], np.flatnonzero(~fits))]]
+        knot[bend] = True
+        begin, end = _with_frames_between(
+            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
+        )
+
+    at = np.flatnonzero(knot)
+    change = np.diff(values[at], axis=0)
+    ramp = np.flatnonzero((at[:-1] // count == at[1:] // count) & change.any(axis=1))
+    start, stop = at[:-1][ramp], at[1:][ramp]
+    return Fit(Ramps(start // count, when[start], when[stop], change[ramp]), error + QUANTUM / 2)
+
+
+def _ends_of_movements(values: Array) -> NDArray[np.bool_]:
+    """Where movements of points begin and end, (T, K), from their values (T, K, C)."""
+    moves = (np.diff(values, axis=0) != 0).any(axis=-1)
+    step, never = np.arange(len(moves))[:, None], len(moves) + REST
+    before = np.maximum.accumulate(np.where(moves, step, -never), axis=0)
+    after = np.minimum.accumulate(np.where(moves, step, 2 * never)[::-1], axis=0)[::-1]
+    moving = np.zeros((len(values) + 1, values.shape[1]), dtype=bool)
+    moving[1:-1] = after - before <= REST
+    ends: NDArray[np.bool_] = moving[1:] != moving[:-1]
+    return ends
+
+
+def _with_frames_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
+    """Those of some lines between rows of points, `count` each, that have rows between their ends."""
+    kept = (end - begin > 1) & (begin // count == end // count)
+    return begin[kept], end[kept]

@@ -1,0 +1,287 @@
+"""What each place of the ground goes through during a bake: the record of footprints as ramps and visits.
+
+Footprints add up and the display blur is linear, so that each footprint is looked at alone, where and while it moves
+the ground. Time and memory follow the number of footprints, not the length of the shot or the size of the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.display_blur import blurred_inside, gaussian_kernel
+from ..ground.heightfield import Window
+from ..record.footprints import QUANTUM, Footprint
+from .ramps import TOLERANCE, Ramps, fit
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+SHADING_TOLERANCE = 1e-3
+"""Largest error of the compression that materials read, while it grows [m]."""
+
+BLOCK = 64
+"""Cells along the sides of what is worked on at once: most footprints fit into one block."""
+
+
+@dataclass(frozen=True)
+class Visits:
+    """When soles touched places, and how hard.
+
+    Attributes
+    ----------
+    point : (N,) int array
+        Place of each visit, ascending; each place's visits are in the order of their start.
+    start, end : (N,) float arrays
+        First and last scene frame of the contact.
+    pressure : (N,) float array
+        Largest mean pressure under the sole during the contact [Pa].
+    """
+
+    point: Indices
+    start: Array
+    end: Array
+    pressure: Array
+
+
+@dataclass(frozen=True)
+class VertexHistories:
+    """The ground over time at K places.
+
+    Attributes
+    ----------
+    movement : Ramps
+        Change of the displayed height, and displayed compression, this to `SHADING_TOLERANCE` [m]; the rim is the sum
+        of both.
+    visits : Visits
+    error : float
+        Largest error of a displayed height, at any place and frame [m].
+    """
+
+    movement: Ramps
+    visits: Visits
+    error: float
+
+    def stretched(self, factor: float) -> VertexHistories:
+        """The same on a clock that counts `factor` frames where this one counts 1."""
+        ramps, visits = self.movement, self.visits
+        return VertexHistories(
+            replace(ramps, start=factor * ramps.start, end=factor * ramps.end),
+            replace(visits, start=factor * visits.start, end=factor * visits.end),
+            self.error,
+        )
+
+
+def vertex_histories(
+    footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
+) -> VertexHistories:
+    """The record as it is seen from given places.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    x, y : (K,) float arrays
+        World positions [m].
+    blur_sigma : float
+        Standard deviation of the display blur [m].
+    tolerance : float
+        Largest error of a displayed height while it moves [m]; where footprints move the same ground at the same
+        time, they share it.
+    """
+    places = _Places(x, y)
+    kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
+    footprints = _near(footprints, places, kernels)
+    spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
+    reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
+    movements: list[Ramps] = []
+    visits: list[Visits] = []
+    error = 0.0
+    for number, footprint in enumerate(footprints):
+        together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
+        for points, frames, moved in _movements(footprint, places, kernels[footprint.cell_size]):
+            shared = np.zeros(len(points))
+            for other in together:
+                shared += _inside(reach[other], footprints[other].cell_size, x[points], y[points])
+            fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
+            movements.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
+            error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
+        visits.append(_visits(footprint, places))
+    return VertexHistories(Ramps.joined(movements, 2), _joined(visits), error)
+
+
+class _Places:
+    """Places in the plane, found by window.
+
+    Parameters
+    ----------
+    x, y : (K,) float arrays
+        World positions [m].
+    """
+
+    BIN = 0.5
+    """Side of the bins [m]."""
+
+    def __init__(self, x: Array, y: Array) -> None:
+        self.x, self.y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        column, row = np.floor(self.x / self.BIN), np.floor(self.y / self.BIN)
+        self._order = np.lexsort((column, row))
+        bins, self._first = np.unique(
+            np.stack([row[self._order], column[self._order]], axis=-1), axis=0, return_index=True
+        )
+        self._rows, self._columns = bins.T
+        self._first = np.append(self._first, len(self._order))
+
+    def within(self, window: Window, cell_size: float) -> Indices:
+        """Places in the cells of a window, (N,), ascending."""
+        low = np.floor(np.array([window.column, window.row]) * cell_size / self.BIN)
+        high = np.floor(np.array([window.column + window.columns, window.row + window.rows]) * cell_size / self.BIN)
+        near = (self._columns >= low[0]) & (self._columns <= high[0]) & (self._rows >= low[1]) & (self._rows <= high[1])
+        found = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
+        points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
+        return points[_inside(window, cell_size, self.x[points], self.y[points])]
+
+    def window(self, points: Indices, cell_size: float) -> Window:
+        """The cells around some of the places."""
+        place = self.x[points], self.y[points]
+        return Window.around(np.min(place, axis=1), np.max(place, axis=1), cell_size)
+
+
+def _inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
+    """Which places lie in the cells of a window."""
+    column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
+    return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)
+
+
+def _near(footprints: Sequence[Footprint], places: _Places, kernels: Mapping[float, Array]) -> list[Footprint]:
+    """The footprints that may reach some of the places."""
+    if not len(places.x) or not footprints:
+        return []
+    margin = {size: _margin(kernel) for size, kernel in kernels.items()}
+    windows = [(footprint.window, footprint.cell_size) for footprint in footprints]
+    first = np.array([(window.column, window.row) for window, _ in windows])
+    cells = np.array([(window.columns, window.rows) for window, _ in windows])
+    size, reach = np.array([(size, margin[size]) for _, size in windows]).T[..., None]
+    low, high = (np.array([bound(places.x), bound(places.y)]) for bound in (np.min, np.max))
+    near = ((first - reach) * size <= high) & ((first + cells + reach) * size >= low)
+    return [footprints[number] for number in np.flatnonzero(near.all(axis=1))]
+
+
+def _margin(kernel: Array) -> int:
+    """How many cells around a change the display moves: the blur's, and one for the look-up between cell centres."""
+    return len(kernel) // 2 + 1
+
+
+def _span(footprint: Footprint) -> tuple[float, float]:
+    """Frames between which a footprint moves the ground."""
+    frames = np.concatenate([footprint.compression.frames, footprint.rim.frames])
+    if not len(frames):
+        return footprint.start_frame, footprint.start_frame
+    return float(frames.min()) - footprint.frame_step, float(frames.max())
+
+
+def _movements(footprint: Footprint, places: _Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
+    """Displayed height and compression of the places that a footprint moves, block by block.
+
+    Yields
+    ------
+    points : (N,) int array
+    frames : (T,) float array
+        From the frame before the first movement.
+    moved : (T, N, 2) float array
+        Change of height, and compression, by this footprint alone [m]; 0 at the first frame.
+    """
+    for part in _blocks(footprint.window.expanded(_margin(kernel))):
+        points = places.within(part, footprint.cell_size)
+        if not len(points):
+            continue
+        block = places.window(points, footprint.cell_size)
+        frames, changes = _changes(footprint, block.expanded(_margin(kernel)))
+        if not len(frames):
+            continue
+        blurred = blurred_inside(changes, kernel)
+        grown = np.cumsum(_look_up(blurred, block.expanded(1), footprint.cell_size, places, points), axis=0)
+        moved = np.stack([grown[:, 1] - grown[:, 0], grown[:, 0]], axis=-1)
+        before = frames[:1] - footprint.frame_step
+        yield points, np.concatenate([before, frames]), np.concatenate([np.zeros_like(moved[:1]), moved])
+
+
+def _blocks(window: Window) -> Iterator[Window]:
+    """A window in parts of at most `BLOCK` cells along each side."""
+    for row in range(0, window.rows, BLOCK):
+        for column in range(0, window.columns, BLOCK):
+            yield Window(
+                window.column + column,
+                window.row + row,
+                min(BLOCK, window.columns - column),
+                min(BLOCK, window.rows - row),
+            )
+
+
+def _changes(footprint: Footprint, window: Window) -> tuple[Array, Array]:
+    """Changes of compression and rim within a window, (T, 2, rows, columns) [m], at frames (T,) without gaps."""
+    own = footprint.window
+    when, where, amounts = [], [], []
+    for channel, changes in enumerate((footprint.compression, footprint.rim)):
+        row, column = np.divmod(changes.cells, own.columns)
+        row, column = row + own.row - window.row, column + own.column - window.column
+        inside = (row >= 0) & (row < window.rows) & (column >= 0) & (column < window.columns)
+        when.append(np.repeat(changes.frames, np.diff(changes.first))[inside])
+        where.append(((channel * window.rows + row) * window.columns + column)[inside])
+        amounts.append(changes.amounts[inside])
+    frame = np.concatenate(when)
+    if not len(frame):
+        return np.zeros(0), np.zeros((0, 2, window.rows, window.columns))
+    number = np.rint((frame - frame.min()) / footprint.frame_step).astype(np.intp)
+    count = int(number.max()) + 1
+    cell = number * (2 * window.cells) + np.concatenate(where)
+    heights = np.zeros(count * 2 * window.cells)
+    heights += np.bincount(cell, weights=np.concatenate(amounts) * QUANTUM, minlength=len(heights))
+    frames = frame.min() + np.arange(count) * footprint.frame_step
+    return frames, heights.reshape(count, 2, window.rows, window.columns)
+
+
+def _look_up(values: Array, window: Window, cell_size: float, places: _Places, points: Indices) -> Array:
+    """Values (T, channels, rows, columns) of a window at places, bilinear between cell centres: (T, channels, N)."""
+    column = places.x[points] / cell_size - 0.5 - window.column
+    row = places.y[points] / cell_size - 0.5 - window.row
+    left, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
+    u, v = column - left, row - low
+    flat = values.reshape(*values.shape[:2], -1)
+    corner = low * window.columns + left
+    below = flat[..., corner] * (1 - u) + flat[..., corner + 1] * u
+    above = flat[..., corner + window.columns] * (1 - u) + flat[..., corner + window.columns + 1] * u
+    looked_up: Array = below * (1 - v) + above * v
+    return looked_up
+
+
+def _visits(footprint: Footprint, places: _Places) -> Visits:
+    """Contacts of a footprint with the places in its cells."""
+    window = footprint.window
+    points = places.within(window, footprint.cell_size)
+    column = np.floor(places.x[points] / footprint.cell_size).astype(np.intp) - window.column
+    row = np.floor(places.y[points] / footprint.cell_size).astype(np.intp) - window.row
+    contact = np.full(window.cells, -1, dtype=np.intp)
+    contact[footprint.contact_cells] = np.arange(len(footprint.contact_cells))
+    touched = contact[row * window.columns + column]
+    points, touched = points[touched >= 0], touched[touched >= 0]
+    pressure = footprint.peak_force_n / footprint.area_m2 if footprint.area_m2 > 0 else 0.0
+    return Visits(
+        points,
+        footprint.contact_start[touched],
+        footprint.contact_end[touched],
+        np.full(len(points), pressure),
+    )
+
+
+def _joined(parts: Sequence[Visits]) -> Visits:
+    """All visits, by place and time."""
+    none = Visits(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
+    point, start, end, pressure = (
+        np.concatenate([getattr(part, name) for part in (none, *parts)])
+        for name in ("point", "start", "end", "pressure")
+    )
+    order = np.lexsort((start, point))
+    return Visits(point[order], start[order], end[order], pressure[order])

@@ -1,0 +1,1 @@
+"""The ground solver: from a contact to its imprint, compression, rim and slides."""

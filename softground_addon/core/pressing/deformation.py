@@ -1,0 +1,250 @@
+"""Compression of the ground, step by step (MODEL.md section 4; the paper, Eq. 10-11 as corrected); its rim is in `rim`.
+
+Functions over arrays: whatever is said of a cell may be a number or an array over cells, so that a material that
+varies over the ground only changes what is passed in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.material import FIRM_RATIO, GroundMaterial
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Fraction = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Sinking:
+    """How a sole sinks into the ground, at each of N steps.
+
+    Attributes
+    ----------
+    area : (N,) float array
+        Area of contact at the moment [m²].
+    target : (N,) float array
+        Compression that the stress of the moment would lead to [m].
+    sinkage : (N,) float array
+        How far the ground had given way under the sole's lowest point when the step began [m].
+    reached : float
+        The same after the last step [m].
+    """
+
+    area: Array
+    target: Array
+    sinkage: Array
+    reached: float
+
+
+def target_compression(
+    stress: Array | float, material: GroundMaterial, *, stiffness: Array | float = 1.0, depth: Array | float = 1.0
+) -> Array:
+    """Compression that a lasting stress leads to [m]: stress·L0/E, at most the layer's depth (Eq. 10).
+
+    Beyond the firm depth it grows `FIRM_RATIO` times more slowly.
+
+    Parameters
+    ----------
+    stress : float array of any shape
+        Normal stress [Pa]; over cells where the pressure varies under the sole.
+    material : GroundMaterial
+    stiffness, depth : float or float array
+        Factors on the modulus and on the depth of the layer, and of what is firm below, where the ground varies.
+
+    Examples
+    --------
+    >>> snow = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
+    >>> round(float(target_compression(21.9e3, snow)), 5)
+    0.02628
+    """
+    strain = np.asarray(stress) / (material.youngs_modulus * stiffness)
+    return np.asarray(np.minimum(_over_firm(strain, material), 1.0) * (material.layer_depth * depth))
+
+
+def _over_firm(strain: Any, material: GroundMaterial) -> Any:
+    """The strain of the whole layer, from what it would be if the layer were loose all through."""
+    if not material.firm_depth:
+        return strain
+    loose = material.firm_depth / material.layer_depth
+    return np.minimum(strain, loose) + np.maximum(strain - loose, 0.0) / FIRM_RATIO
+
+
+def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> float:
+    """Depth at which the ground carries a lasting force on an area [m], in closed form.
+
+    For a standing character: the weight and the area of all its soles.
+    """
+    return float(target_compression(force / area, material))
+
+
+def compression_rate(step: float, material: GroundMaterial, target: Any = 0.0, landing_speed: float = 0.0) -> Any:
+    """Fraction of the target by which the ground gives way in a step (Eq. 11).
+
+    Parameters
+    ----------
+    step : float
+        Duration of the step [s].
+    material : GroundMaterial
+    target : float or float array
+        Compression that the stress leads to [m].
+    landing_speed : float
+        Speed into the ground at which the sole landed [m/s]; with a `shortest_time`, it sets the pace.
+    """
+    if not (material.shortest_time and landing_speed):
+        return step / material.characteristic_time
+    shortest = min(material.shortest_time, material.characteristic_time)
+    time = np.minimum(np.maximum(2.0 * target / landing_speed, shortest), material.characteristic_time)
+    return step / time
+
+
+def touching_fraction(clearance: Any, sinkage: Any, tolerance: float) -> Any:
+    """How much of each piece of a posed sole touches the ground, 0 to 1.
+
+    The animated sole does not sink, so that whatever is posed within the sinkage of its lowest point has reached the
+    ground too. A tolerance on top stands for what is not known: the softness of skin and shoe and the exact pose.
+    It ends in a ramp as wide as itself, so that the area is continuous over space and time.
+
+    Parameters
+    ----------
+    clearance : float array
+        Height above the undisturbed ground, less that of the sole's lowest point [m].
+    sinkage : float array
+        How far the ground has given way under the lowest point [m].
+    tolerance : float [m]
+    """
+    fraction = sinkage - clearance
+    fraction *= 1.0 / tolerance
+    fraction += 1.5
+    return np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
+
+
+def sink(
+    clearance: Array,
+    area: Array,
+    force: Array,
+    *,
+    tolerance: float,
+    step: float,
+    material: GroundMaterial,
+    sinkage: float = 0.0,
+    landing_speed: float = 0.0,
+    softness: Array | None = None,
+) -> Sinking:
+    """Follow a loaded sole into the ground.
+
+    The ground under the sole's lowest point gives way like any cell on untouched ground: it is the cell that is in
+    contact all along.
+
+    Parameters
+    ----------
+    clearance : (N, Q) float array
+        Height of Q points of the underside above the undisturbed ground, less that of the lowest [m].
+    area : (N, Q) float array
+        Horizontal area that each point stands for [m²], 0 where it does not face the ground.
+    force : (N,) float array
+        Normal force on the sole [N].
+    tolerance : float
+        See `touching_fraction` [m].
+    step : float
+        Time step [s].
+    material : GroundMaterial
+    sinkage : float
+        That reached before the first step [m].
+    landing_speed : float
+        See `compression_rate` [m/s].
+    softness : (N, Q) float array, optional
+        Compression of the ground under each point per that of the material, where the ground varies.
+
+    Returns
+    -------
+    Sinking
+    """
+    steps = len(force)
+    touching_area, target, reached = np.zeros(steps), np.zeros(steps), np.zeros(steps + 1)
+    rate = compression_rate(step, material)
+    per_pascal = material.layer_depth / material.youngs_modulus
+    follows_landing = bool(material.shortest_time and landing_speed)
+    reached[0] = sinkage
+    for k in range(steps):
+        touching = touching_fraction(clearance[k], sinkage, tolerance)
+        touching_area[k] = touching @ area[k]
+        if force[k] > 0 and touching_area[k] > 0:
+            stress = force[k] / touching_area[k]
+            fresh = stress * per_pascal
+            if material.firm_depth:
+                fresh = float(_over_firm(stress / material.youngs_modulus, material)) * material.layer_depth
+            if softness is not None:
+                fresh *= float(touching @ (area[k] * softness[k])) / touching_area[k]
+            target[k] = min(fresh, material.layer_depth)
+            if follows_landing:
+                rate = compression_rate(step, material, target[k], landing_speed)
+            if sinkage > 0 or stress >= material.crust_stress:
+                sinkage += max(0.0, min(rate * target[k], target[k] - sinkage))
+        reached[k + 1] = sinkage
+    return Sinking(touching_area, target, reached[:-1], float(sinkage))
+
+
+def compress(
+    compression: Array,
+    coverage: Fraction,
+    target: Array | float,
+    rate: float,
+    *,
+    holds: Mask | bool = False,
+    found: Array | None = None,
+    hardening: float = 0.0,
+) -> Array:
+    """Compression of each cell after one more step [m] (Eq. 11).
+
+    It grows by min(rate·target, target - compression) where that is positive. A cell that the contact covers in part
+    is compressed in that part only; what is kept is the mean over the cell.
+
+    A contact that finds a cell compressed by c0 already compresses it further against a modulus that is
+    1 + hardening·c0/target times as large: of what the plain law adds beyond c0, it adds one part in so many. First
+    prints are as without hardening; ground that carries such a load already gives way no further. (Soils and snow
+    answer repeated loading far more stiffly than the first: Wong, Terramechanics and Off-Road Vehicle Engineering.)
+
+    Parameters
+    ----------
+    compression : (rows, columns) float array
+        Mean compression of each cell so far [m].
+    coverage : (rows, columns) float array
+        Fraction of each cell that is in contact.
+    target : float or float array
+        Compression that the stress leads to [m].
+    rate : float
+        From `compression_rate`.
+    holds : bool or bool array
+        Cells whose crust carries the stress, if it is whole; one that was ever compressed is broken.
+    found : (rows, columns) float array, optional
+        Compression of each cell before this contact [m].
+    hardening : float
+        See above.
+
+    Returns
+    -------
+    (rows, columns) float array, nowhere less than before and nowhere raised above the target.
+
+    Examples
+    --------
+    It never overshoots, however long the step, and never comes back:
+
+    >>> compress(np.array([0.02, 0.04]), np.array([1.0, 1.0]), target=0.03, rate=0.5)
+    array([0.03, 0.04])
+    """
+    aim = np.multiply(coverage, target, dtype=np.float64)
+    if holds is not False:
+        aim[holds & (compression == 0)] = 0.0
+    further = rate * aim
+    if found is not None and hardening:
+        stiffer = 1.0 + hardening * np.divide(found, aim, out=np.ones_like(aim), where=aim > found)
+        aim = found + (aim - found) / stiffer
+        further /= stiffer
+    further += compression
+    np.minimum(further, aim, out=further)
+    return np.maximum(further, compression, out=further)

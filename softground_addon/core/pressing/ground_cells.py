@@ -1,0 +1,137 @@
+"""What stances are laid out on: the ground in cells, the steps of time, and the cells that are pressed at each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import Surface, Terrain, TerrainTiles, Window
+from ..ground.material import GroundMaterial
+from ..ground.soft_ground import SoftGround
+from ..ground.variation import Factors, Variation, VariationTiles
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How simulation steps and scene frames relate.
+
+    Attributes
+    ----------
+    step : float
+        Duration of a step [s].
+    steps_per_frame : int
+        Steps between the frames that are recorded.
+    frame_step : float
+        Scene frames between the frames that are recorded.
+    """
+
+    step: float
+    steps_per_frame: int
+    frame_step: float
+
+
+class UndisturbedCells:
+    """The undisturbed ground in cells: its surface, and how it varies; looked up once per tile.
+
+    Parameters
+    ----------
+    terrain : Terrain
+    variation : Variation or None
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, terrain: Terrain, variation: Variation | None, cell_size: float) -> None:
+        self.cell_size = cell_size
+        self._terrain = terrain
+        self._tiles: dict[int, TerrainTiles] = {}
+        self._variation = VariationTiles(variation, cell_size) if variation else None
+
+    def surface(self, window: Window, divisions: int = 1) -> Surface:
+        """The ground under a window, its cells divided in so many parts along each side."""
+        if divisions not in self._tiles:
+            self._tiles[divisions] = TerrainTiles(self._terrain, self.cell_size / divisions)
+        return self._tiles[divisions].surface(window.refined(divisions))
+
+    def factors(self, window: Window) -> Factors | None:
+        """How the ground varies over a window; None where it does not."""
+        return self._variation.factors(window) if self._variation else None
+
+
+class Bed(UndisturbedCells):
+    """The ground that soles are laid on, in cells, and how they press on it.
+
+    Parameters
+    ----------
+    ground : SoftGround
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, ground: SoftGround, cell_size: float) -> None:
+        super().__init__(ground.terrain, ground.variation, cell_size)
+        self.ground = ground
+
+    @property
+    def material(self) -> GroundMaterial:
+        """What the ground is made of."""
+        return self.ground.material
+
+    @property
+    def rim_reach(self) -> float:
+        """Reach of the rim in cells."""
+        return self.material.rim_reach / self.cell_size
+
+
+@dataclass(frozen=True)
+class Imprints:
+    """A stance over the cells, at each of N steps from `first` on, or at each of N parts of them.
+
+    Attributes
+    ----------
+    first : int
+        Step of the simulation.
+    parts : int
+        Number of parts that each step is laid out in: more than one where the sole moves far in a step.
+    window : Window
+    coverage : (N, rows, columns) float array
+        Fraction of each cell that is in contact.
+    contact : (N, rows, columns) bool array
+        Cells that count as in contact.
+    rim : (N, rows, columns) float array
+        Shares of the displaced volume.
+    pressing : (N,) bool array
+        Steps at which there is any pressure on the ground.
+    target : (N,) or (N, rows, columns) float array
+        Compression that the stress leads to [m]; of each cell where the pressure or the ground varies.
+    rate : (N,) float array
+        From `deformation.compression_rate`.
+    holds : (N,) or (N, rows, columns) bool array, or None
+        Where an unbroken crust carries the stress.
+    factors : Factors or None
+        How the ground varies over the window.
+    sinkage : (number of steps,) float array
+        How far the ground had given way under the sole's lowest point when each step began [m].
+    """
+
+    first: int
+    parts: int
+    window: Window
+    coverage: NDArray[np.float32]
+    contact: NDArray[np.bool_]
+    rim: Array
+    pressing: NDArray[np.bool_]
+    target: Array
+    rate: Array
+    holds: NDArray[np.bool_] | None
+    factors: Factors | None
+    sinkage: Array
+
+    @property
+    def end(self) -> int:
+        """The step after the last."""
+        return self.first + len(self.pressing) // self.parts

@@ -1,0 +1,186 @@
+"""One stance after the other into one ground: the part of the simulation that works on cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import HeightField, SparseGrid, Surface, Window
+from ..ground.material import GroundMaterial
+from ..ground.soft_ground import SoftGround
+from ..record.footprints import FootprintRecorder, quantised
+from .contact_layout import Stance
+from .deformation import compress
+from .ground_cells import Bed, Imprints, Timing
+from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
+from .rim import displaced_volume
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class Press:
+    """A ground to be pressed, and on what terms.
+
+    Parameters
+    ----------
+    ground : SoftGround
+    state : HeightField
+        What was pressed of it so far; it is worked on.
+    """
+
+    def __init__(self, ground: SoftGround, state: HeightField) -> None:
+        self.state = state
+        self.contact: list[tuple[Window, Mask]] = []
+        """Cells that were in contact in the steps pressed last."""
+        self.bed = Bed(ground, state.cell_size)
+
+    @property
+    def material(self) -> GroundMaterial:
+        """What the ground is made of."""
+        return self.bed.material
+
+    @material.setter
+    def material(self, material: GroundMaterial) -> None:
+        self.bed.ground = replace(self.bed.ground, material=material)
+
+    @property
+    def cell_size(self) -> float:
+        """Side of a cell [m]."""
+        return self.state.cell_size
+
+    def advance(
+        self, stances: Sequence[Stance], start: int, end: int, frame: float, timing: Timing
+    ) -> tuple[Window, ...]:
+        """Press the steps from start to before end; where stances share ground, all of them step by step.
+
+        Returns
+        -------
+        tuple of Window
+            Where the ground may have changed.
+        """
+        parts = []
+        self.contact = []
+        for stance in stances:
+            first, last = max(start, stance.first), min(end, stance.end)
+            if first < last:
+                parts.append((stance, stance.imprints(first, last, self.bed, timing), first, last))
+        windows = [imprints.window for _, imprints, _, _ in parts]
+        spans = [(start, end)]
+        if any(one.intersects(other) for one, other in combinations(windows, 2)):
+            spans = [(step, step + 1) for step in range(start, end)]
+        for begin, stop in spans:
+            for stance, imprints, first, last in parts:
+                if max(first, begin) < min(last, stop):
+                    windows += self._press(stance, imprints, max(first, begin), min(last, stop), frame, timing)
+        return tuple(windows)
+
+    def settle(self, stance: Stance, frame: float) -> tuple[Window, ...]:
+        """Let slide what a stance that has ended left too steep; where the ground may have changed by that."""
+        if not self.material.repose_angle or stance.recorder is None:
+            return ()
+        window, surface = self._around(stance.recorder.window)
+        state = self.state.read(window)
+        before = quantised(state)
+        state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
+        change = quantised(state) - before
+        if not change.any():
+            return ()
+        self.state.write(window, state)
+        stance.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
+        return (window,)
+
+    def _press(
+        self, stance: Stance, imprints: Imprints, start: int, end: int, frame: float, timing: Timing
+    ) -> list[Window]:
+        first, last = ((step - imprints.first) * imprints.parts for step in (start, end))
+        steps = first + np.flatnonzero(imprints.pressing[first:last])
+        if not len(steps):
+            return []
+        material, window, surface = self.material, imprints.window, None
+        if material.repose_angle:
+            window, surface = self._around(imprints.window)
+        whole = self.state.read(window)
+        before = quantised(whole)
+        inside = _inside(window, imprints.window)
+        state = whole[:, inside[0], inside[1]]
+        found = self._found(stance, imprints.window, state) if material.hardening else None
+        heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
+        rim = imprints.rim[steps].reshape(len(steps), -1)
+        for k, step in enumerate(steps):
+            compression = compress(
+                state[0],
+                imprints.coverage[step],
+                imprints.target[step],
+                imprints.rate[step],
+                holds=False if imprints.holds is None else imprints.holds[step],
+                found=found,
+                hardening=material.hardening,
+            )
+            newly = compression - state[0]
+            heights[k] = newly.sum()
+            if imprints.factors is None:
+                displaced[k] = displaced_volume(heights[k], material)
+            else:
+                displaced[k] = displaced_volume(newly, material, imprints.factors.rim).sum()
+            state[0] = compression
+            if surface:
+                state[1] += (displaced[k] * rim[k]).reshape(state[1].shape)
+                fixed = ~surface.bears
+                fixed[inside] |= imprints.contact[step]
+                whole[1] = self._slid(whole, surface, fixed, SWEEPS_PER_STEP)
+        rise = displaced @ rim
+        if not surface:
+            state[1] += rise.reshape(state[1].shape)
+        self.state.write(window, whole)
+        if stance.pressed is not None and found is not None:
+            stance.pressed.write(imprints.window, (state[0] - found)[None])
+        cell_area = self.cell_size**2
+        stance.compressed += float(heights.sum()) * cell_area
+        stance.raised += float(rise.sum()) * cell_area
+        stance.unplaced += float(displaced[~rim.any(axis=1)].sum()) * cell_area
+        if stance.recorder is None:
+            stance.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
+        touched = np.zeros(whole.shape[1:], bool)
+        touched[inside] = imprints.contact[steps].any(axis=0)
+        stance.recorder.add(frame, window, quantised(whole) - before, touched)
+        self.contact.append((window, touched))
+        return [window] if surface else []
+
+    def _found(self, stance: Stance, window: Window, state: Array) -> Array:
+        """Compression of a window that a stance found when it began: all but its own (rows, columns) [m]."""
+        if stance.pressed is None and stance.earlier is not None:
+            stance.pressed = stance.earlier.pressed
+        if stance.pressed is None:
+            stance.pressed = SparseGrid(self.cell_size, channels=1)
+        return np.maximum(state[0] - stance.pressed.read(window)[0], 0.0)
+
+    def _around(self, window: Window) -> tuple[Window, Surface]:
+        """A window with the ground around it that may slide with it."""
+        compression, rim = self.state.read(window)
+        reach = slide_reach(rim, compression, self.material.repose_angle, self.cell_size)
+        wider = window.expanded(reach)
+        return wider, self.bed.surface(wider)
+
+    def _slid(self, state: Array, surface: Surface, fixed: NDArray[np.bool_], sweeps: int) -> Array:
+        """The rim of a window after what is too steep has slid down."""
+        return slid(
+            state[1],
+            state[0],
+            surface.heights,
+            angle=self.material.repose_angle,
+            cell_size=self.cell_size,
+            fixed=fixed,
+            corner=(surface.window.row, surface.window.column),
+            sweeps=sweeps,
+        )
+
+
+def _inside(whole: Window, part: Window) -> tuple[slice, slice]:
+    """Rows and columns of a window that a part of it takes."""
+    row, column = part.row - whole.row, part.column - whole.column
+    return slice(row, row + part.rows), slice(column, column + part.columns)

@@ -1,0 +1,174 @@
+"""The record of footprints as a few flat arrays and back, with a check that what comes back fits together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..ground.heightfield import Window
+from .footprints import Changes, Footprint
+
+_TEXTS = ("character", "sole")
+_NUMBERS = (
+    "start_frame",
+    "end_frame",
+    "heading",
+    "area_m2",
+    "peak_force_n",
+    "compressed_m3",
+    "rim_m3",
+    "unplaced_rim_m3",
+    "cell_size",
+    "frame_step",
+)
+_VECTORS = {"position": (3, np.float64), "window": (4, np.int32)}
+_SERIES = {
+    "load_frames": np.float64,
+    "load_n": np.float64,
+    "contact_cells": np.int32,
+    "contact_start": np.float64,
+    "contact_end": np.float64,
+    **{
+        f"{quantity}.{name}": np.float64 if name == "frames" else np.int32
+        for quantity in ("compression", "rim")
+        for name in ("frames", "first", "cells", "amounts")
+    },
+}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """An array of the record, of which only the part that is looked at takes memory.
+
+    Attributes
+    ----------
+    kind : type
+        Of its values.
+    size : int
+        How many they are.
+    parts : iterable of (N,) arrays
+        To be put together one after the other.
+    """
+
+    kind: type
+    size: int
+    parts: Iterable[NDArray[Any]]
+
+    @classmethod
+    def whole(cls, values: Sequence[object], kind: type) -> Parts:
+        """Those of values that are there already."""
+        flat: NDArray[Any] = np.array(values, kind).ravel()
+        return cls(kind, len(flat), [flat])
+
+
+def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, Parts]]:
+    """The record as texts and a few flat arrays of 64-bit floats and 32-bit integers, to be stored as native data.
+
+    Returns
+    -------
+    names : list of dict
+        Character and sole of each footprint.
+    arrays : dict of str to Parts
+        `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count` saying
+        how many of its values belong to each footprint.
+    """
+    names = [{key: getattr(footprint, key) for key in _TEXTS} for footprint in footprints]
+    numbers = [[getattr(footprint, key) for key in _NUMBERS] for footprint in footprints]
+    arrays = {"numbers": Parts.whole(numbers, np.float64)}
+    for key, (_, kind) in _VECTORS.items():
+        arrays[key] = Parts.whole([getattr(footprint, key) for footprint in footprints], kind)
+    for key, kind in _SERIES.items():
+        counts = [len(attrgetter(key)(footprint)) for footprint in footprints]
+        arrays[key] = Parts(kind, sum(counts), map(attrgetter(key), footprints))
+        arrays[f"{key}.count"] = Parts.whole(counts, np.int32)
+    return names, arrays
+
+
+def from_arrays(names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]) -> list[Footprint]:
+    """The record from what `to_parts` gave, each array put together.
+
+    Raises
+    ------
+    InputError
+        If the record was cut short or edited so that its parts do not fit each other.
+    """
+    try:
+        columns = _columns(len(names), arrays)
+        footprints = [_footprint(name, {k: v[i] for k, v in columns.items()}) for i, name in enumerate(names)]
+        for footprint in footprints:
+            _check(footprint)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
+        ) from None
+    return footprints
+
+
+def _columns(count: int, arrays: Mapping[str, Any]) -> dict[str, list[NDArray[Any]]]:
+    """Values of each footprint by key."""
+    columns = {"numbers": list(_sized(arrays, "numbers", count * len(_NUMBERS), np.float64).reshape(-1, len(_NUMBERS)))}
+    for key, (size, kind) in _VECTORS.items():
+        columns[key] = list(_sized(arrays, key, count * size, kind).reshape(-1, size))
+    for key, kind in _SERIES.items():
+        counts = _sized(arrays, f"{key}.count", count, np.int32)
+        if (counts < 0).any():
+            raise ValueError(f"negative count of {key}")
+        columns[key] = np.split(_sized(arrays, key, int(counts.sum(dtype=np.int64)), kind), np.cumsum(counts)[:-1])
+    return columns
+
+
+def _sized(arrays: Mapping[str, Any], key: str, size: int, kind: type) -> NDArray[Any]:
+    if key not in arrays:
+        raise ValueError(f"it lacks {key}")
+    values = np.ravel(arrays[key])
+    if len(values) != size:
+        raise ValueError(f"{key} has {len(values)} values where {size} are announced")
+    if not np.isfinite(values).all() or (values.astype(kind) != values).any():
+        raise ValueError(f"{key} holds what is no number of its kind")
+    return values.astype(kind)
+
+
+def _footprint(name: Mapping[str, str], values: Mapping[str, NDArray[Any]]) -> Footprint:
+    content: dict[str, Any] = {key: str(name[key]) for key in _TEXTS}
+    content |= zip(_NUMBERS, values["numbers"].tolist(), strict=True)
+    content |= {key: values[key] for key in _SERIES if "." not in key}
+    for quantity in ("compression", "rim"):
+        content[quantity] = Changes(**{field.name: values[f"{quantity}.{field.name}"] for field in fields(Changes)})
+    return Footprint(window=Window(*values["window"].tolist()), position=values["position"], **content)
+
+
+SPARSEST = 1000
+SPARE_CELLS = 2**20
+"""Most cells of a window for each change in it, and on top of that: windows beyond would only fill the memory."""
+
+
+def _check(footprint: Footprint) -> None:
+    """Raise ValueError where the parts of a footprint contradict each other."""
+    cells = footprint.window.cells
+    if footprint.window.columns < 1 or footprint.window.rows < 1 or footprint.cell_size <= 0:
+        raise ValueError("a footprint has no cells")
+    recorded = sum(map(len, (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells)))
+    if cells > SPARSEST * recorded + SPARE_CELLS:
+        raise ValueError("a footprint's window is far larger than what it changed")
+    if len(footprint.load_n) != len(footprint.load_frames):
+        raise ValueError("loads and frames do not match")
+    if not len(footprint.contact_cells) == len(footprint.contact_start) == len(footprint.contact_end):
+        raise ValueError("contacts and frames do not match")
+    for changes in (footprint.compression, footprint.rim):
+        if len(changes.first) != len(changes.frames) + 1 or len(changes.cells) != len(changes.amounts):
+            raise ValueError("changes and frames do not match")
+        if changes.first[0] != 0 or changes.first[-1] != len(changes.cells) or (np.diff(changes.first) < 0).any():
+            raise ValueError("changes do not follow each other")
+        if (np.diff(changes.frames) < 0).any():
+            raise ValueError("frames are out of order")
+        if len(changes.cells) and not 0 <= changes.cells.min() <= changes.cells.max() < cells:
+            raise ValueError("a change lies outside its window")
+    contacts = footprint.contact_cells
+    if len(contacts) and not 0 <= contacts.min() <= contacts.max() < cells:
+        raise ValueError("a contact lies outside its window")

@@ -1,0 +1,1 @@
+"""What the pressed ground does to the character: tilt, sinking feet, legs."""

@@ -1,0 +1,296 @@
+"""Hips and legs that follow the soles: how far the body comes down, and what carries each part of each leg."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion, SoleMotion
+from ..numerics.plane_fit import smoothed, upper_envelope
+from ..numerics.rigid import carried, displacement, rotation, unit
+from .foot_placement import Placement
+from .knee_pace import PacedLeg, relieve
+from .legs import Leg, solve
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ON_THE_ANKLE = 0.4
+"""A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
+RIGID = 0.05
+"""What a thing without a side may move against the ankle and still be worn on the foot, in leg lengths."""
+LOWER_FOOT = 0.02
+"""How much lower one foot must stand for the hips to follow it rather than the other, in leg lengths."""
+HIPS_TIME = 0.10
+"""Standard deviation of the smoothing of the hips' height over time [s], for an adult."""
+LOAD_TIME = 0.05
+"""Standard deviation of the passing of weight from foot to foot [s], for an adult."""
+HEEL_TIME = 0.06
+"""Time before and after in which a heel rises to what the leg can reach [s], for an adult."""
+NEAR_ENOUGH = 0.002
+"""What a leg may be short of without rolling over the toes, in leg lengths."""
+REACH_TIME = 0.15
+"""Time before and after in which the hips come down to what the legs can reach [s], for an adult."""
+HEEL_RISE = np.radians(35.0)
+"""A foot rolls over its toes by at most so much further than in the source before the hips come down [rad]."""
+BEHIND = 0.15
+"""A foot this far behind its hip rolls over its toes as far as it needs, one below or before it not, in leg lengths."""
+COMFORTABLE_REACH = 0.985
+"""A leg may stretch so far, over its length, or as far as in the source where that is more."""
+
+
+@dataclass(frozen=True)
+class LegResponse:
+    """What carries the parts of one leg from the source to where they belong, (F, 4, 4) rigid displacements."""
+
+    thigh: Array
+    shank: Array
+    foot: Array
+
+
+@dataclass(frozen=True)
+class Response:
+    """How a character answers the ground: rigid displacements of its parts in the world, on top of the source.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+        Scene frames.
+    body : (F, 4, 4) float array
+        Of hips, trunk, head and arms.
+    legs : mapping of str to LegResponse
+        By side, "l" and "r".
+    lean : (F, 2) float array
+        Angle that the body leans toward +x and +y [rad].
+    arms : mapping of str to (F, 4, 4) float array
+        By side, what moves the upper arms before `body` does; empty if nothing.
+    """
+
+    frames: Array
+    body: Array
+    legs: Mapping[str, LegResponse]
+    lean: Array
+    arms: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing moves."""
+        parts = [self.body, *(part for leg in self.legs.values() for part in (leg.thigh, leg.shank, leg.foot))]
+        return all(np.allclose(part, np.eye(4), atol=1e-7) for part in (*parts, *self.arms.values()))
+
+
+def leg_soles(motion: CharacterMotion) -> dict[str, int]:
+    """For each side with a whole leg, the sole that it stands on: the lowest of those that go with the foot."""
+    found: dict[str, int] = {}
+    for side in "lr":
+        if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee", "ankle")):
+            continue
+        worn = [index for index, sole in enumerate(motion.soles) if _goes_with(motion, sole, side)]
+        if worn:
+            found[side] = min(worn, key=lambda index: float(motion.soles[index].landmark_positions()[..., 2].mean()))
+    return found
+
+
+def leg_of(motion: CharacterMotion, side: str, sole: int) -> Leg:
+    """The joints of one leg."""
+    joints = motion.joints
+    return Leg(
+        joints[f"hip_{side}"],
+        joints[f"knee_{side}"],
+        joints[f"ankle_{side}"],
+        motion.soles[sole].transforms[:, 0, :3, 0],
+    )
+
+
+def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], touching: Mask) -> Array:
+    """Height that the hips gain (F,) [m]: what the standing soles gain on the whole, less the sinkage of the deeper.
+
+    Smooth over time: weight passes from foot to foot, and hips that would drop into every print anew bounce.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    placements : mapping of int to Placement
+        By sole.
+    touching : (F, S) bool array
+    """
+    if not placements:
+        return np.zeros(len(motion.frames))
+    stands = touching[:, list(placements)]
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
+    sinkage = np.stack([placement.sinkage for placement in placements.values()], axis=1)
+    unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
+    deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
+    width = HIPS_TIME * motion.adult_second
+    return _mean_over_time(unsunk, load, width) - _mean_over_time(sinkage, load * deeper, width)
+
+
+def _mean_over_time(values: Array, weights: Array, width: float) -> Array:
+    """Weighted mean (F,) of values (F, S) under a Gaussian over time, straight where nothing has weight for long."""
+    total = smoothed(weights.sum(axis=1), width)
+    known = np.flatnonzero(total > 1e-3 * max(float(total.max()), 1e-12))
+    if not len(known):
+        return np.zeros(len(values))
+    mean = smoothed((weights * values).sum(axis=1), width)[known] / total[known]
+    return smoothed(np.interp(np.arange(len(values)), known, mean), width / 2)
+
+
+def settle(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    *,
+    crouch: Array | None = None,
+) -> Response:
+    """Bring the hips to where they belong and solve the legs.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    placements : mapping of str to (int, Placement)
+        By side: the leg's sole and where it belongs.
+    touching : (F, S) bool array
+    lean : (F, 2) float array
+        Angle that the body leans toward +x and +y [rad], pivoting about the ground below the hips.
+    crouch : (F,) float array, optional
+        How much deeper the hips go by choice [m].
+    """
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
+    legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
+    ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
+    short = np.zeros(len(motion.frames))
+    for side, leg in legs.items():
+        hip = carried(tilted, leg.hip) + raised
+        short = np.maximum(short, touching[:, placements[side][0]] * _out_of_reach(leg, hip, ankles[side]))
+    reach = round(REACH_TIME * motion.adult_second)
+    raised[:, 2] -= upper_envelope(short, max(1, reach))
+    if legs:
+        relief = relieve(
+            {
+                side: PacedLeg(
+                    leg,
+                    carried(tilted, leg.hip) + raised,
+                    ankles[side],
+                    reach_of(leg),
+                    touching[:, sole],
+                    placement.room,
+                )
+                for (side, leg), (sole, placement) in zip(legs.items(), placements.values(), strict=True)
+            },
+            step=motion.time_step,
+            time_scale=motion.time_scale,
+            leg_length=motion.leg_length,
+        )
+        raised[:, 2] += relief.hips
+    body = tilted.copy()
+    body[:, :3, 3] += raised
+    responses = {}
+    for side, leg in legs.items():
+        hip = carried(body, leg.hip)
+        solved = solve(leg, hip, ankles[side] + relief.feet[side][:, None] * unit(hip - ankles[side]))
+        foot = placements[side][1].carry.copy()
+        foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
+        responses[side] = LegResponse(solved.thigh, solved.shank, foot)
+    return Response(motion.frames, body, responses, lean)
+
+
+def heel_rises(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    *,
+    crouch: Array | None = None,
+) -> dict[str, Array]:
+    """How far each foot that trails rolls over its toes to stay in reach (F,) [rad], by side; see `settle`."""
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
+    trial = np.linspace(0.0, HEEL_RISE, 8)
+    width = round(HEEL_TIME * motion.adult_second)
+    rises = {}
+    for side, (sole, placement) in placements.items():
+        leg = leg_of(motion, side, sole)
+        hip, ankle = carried(tilted, leg.hip) + raised, carried(placement.carry, leg.ankle)
+        foot = placement.carry[:, :3, :3] @ motion.soles[sole].transforms[:, 0, :3, :3]
+        toes = carried(placement.carry, motion.soles[sole].landmark_positions()[:, -1])
+        short = np.stack(
+            [
+                _out_of_reach(leg, hip, carried(displacement(rotation(angle * foot[..., 1]), toes, toes), ankle))
+                for angle in trial
+            ]
+        )
+        enough = short <= NEAR_ENOUGH * motion.leg_length
+        angle = trial[np.where(enough.any(axis=0), enough.argmax(axis=0), short.argmin(axis=0))]
+        level = foot[:, :2, 0] / np.maximum(np.linalg.norm(foot[:, :2, 0], axis=1, keepdims=True), 1e-9)
+        behind = np.sum((hip - ankle)[:, :2] * level, axis=1) / (BEHIND * motion.leg_length)
+        rises[side] = smoothed(upper_envelope(angle * np.clip(behind, 0.0, 1.0), width), width / 2)
+    return rises
+
+
+def _hips_moved(
+    motion: CharacterMotion,
+    placements: Mapping[str, tuple[int, Placement]],
+    touching: Mask,
+    lean: Array,
+    crouch: Array | None,
+) -> tuple[Array, Array]:
+    """The body's tilt about the ground below the hips (F, 4, 4), and how far the hips move after it (F, 3) [m]."""
+    raised = np.zeros((len(motion.frames), 3))
+    raised[:, 2] = hips_follow(motion, dict(placements.values()), touching)
+    if crouch is not None:
+        raised[:, 2] -= crouch
+    turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(len(lean))], axis=-1))
+    pivot = motion.hips - (0.0, 0.0, motion.leg_length)
+    return displacement(turn, pivot, pivot), raised
+
+
+def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:
+    """How far the hip must come down for the ankle to be in reach, (F,) [m]."""
+    reach = reach_of(leg)
+    level = np.linalg.norm((ankle - hip)[:, :2], axis=1)
+    below = hip[:, 2] - ankle[:, 2]
+    return np.asarray(np.where(below > 0, below - np.sqrt(np.maximum(reach**2 - level**2, 0.0)), 0.0).clip(min=0.0))
+
+
+def reach_of(leg: Leg) -> Array:
+    """How far an ankle may be from its hip, (F,) [m]."""
+    return leg.length * np.maximum(leg.extension, COMFORTABLE_REACH)
+
+
+def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
+    """The motion with the response on top of it."""
+    carry_of_joint: dict[str, Array] = {
+        f"{joint}_{side}": part
+        for side, leg in response.legs.items()
+        for joint, part in (
+            ("hip", response.body),
+            ("knee", leg.thigh),
+            ("ankle", leg.shank),
+            ("ball", leg.foot),
+            ("toe", leg.foot),
+        )
+    }
+    for side, arm in response.arms.items():
+        carry_of_joint |= {f"{joint}_{side}": response.body @ arm for joint in ("shoulder", "elbow", "wrist")}
+    joints = {name: carried(carry_of_joint.get(name, response.body), path) for name, path in motion.joints.items()}
+    soles = []
+    for sole in motion.soles:
+        worn_by = next((side for side in response.legs if _goes_with(motion, sole, side)), None)
+        carry = response.legs[worn_by].foot if worn_by else response.body
+        soles.append(SoleMotion(sole.sole, carry[:, None] @ sole.transforms))
+    return dataclasses.replace(motion, joints=joints, soles=tuple(soles))
+
+
+def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
+    """Whether a sole is the foot of a side, or worn on it such as a snowshoe."""
+    if sole.sole.side.lower() not in (side, ""):
+        return False
+    distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
+    if float(distance.mean()) > ON_THE_ANKLE * motion.leg_length:
+        return False
+    return bool(sole.sole.side) or float(np.ptp(distance)) < RIGID * motion.leg_length

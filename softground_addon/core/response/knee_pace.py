@@ -1,0 +1,236 @@
+"""No knee turns faster than knees do: hips and swinging feet give way a little, smoothly, where one would.
+
+A leg that is nearly straight turns its knee by tens of degrees for a centimetre of hip or foot. Where the response
+would ask that of it, the hips and the feet in the air share the least and smoothest correction that keeps the pace: a
+least-squares problem over time, solved by Gauss-Newton steps (Nocedal and Wright 2006, "Numerical Optimization",
+chapters 10 and 17: quadratic penalties that grow, with a line search). Where no knee is too fast and every ankle is
+in reach, nothing is corrected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.banded import solve_banded
+from .legs import Leg
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FRAME = 1 / 30
+"""The time that the pace of a knee is named for [s]."""
+KNEE_PACE = np.radians(13.0) / _FRAME
+"""How fast a knee may turn, or as fast as in the source where that is more [rad/s], for an adult."""
+SOURCE_WINDOW = 0.05
+"""Time around an instant in which the source's own pace counts [s], for an adult."""
+NEARLY_STRAIGHT = np.radians(8.0)
+"""Knees straighter than this count as bent by it when asked what turns them [rad]: the answer has no bound."""
+
+# A correction x(t), in leg lengths, costs cost·(T²·x'')² + MAGNITUDE·x² at each sample; the rest is weighed against it.
+SMOOTHING_TIME = 0.08
+"""T, the time over which a correction comes and goes [s], for an adult."""
+MAGNITUDE = 0.1
+FOOT_FREEDOM = 0.3
+"""The cost of a correction of a foot beside one of the hips."""
+LARGEST = 0.12
+"""Corrections beyond this cost far more, in leg lengths: rather a fast knee than a body that drops."""
+_TOO_LARGE = 30.0
+_UNDERGROUND = 1e3
+"""For a foot that would come lower than the ground."""
+_HELD = 1e6
+"""For a foot that stands."""
+TOO_FAST = 300.0
+"""For a knee that turns too far in `_FRAME` [rad], in the end; the steps before it begin at a hundredth."""
+OUT_OF_REACH = 1e3
+"""What an ankle out of reach costs beside a knee that is too fast, per leg length and radian."""
+STEPS = 14
+_PARTS = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
+"""Parts of a step that are tried until one of them is better: nearly straight knees are far from linear."""
+
+
+@dataclass(frozen=True)
+class PacedLeg:
+    """One leg as the response would have it.
+
+    Attributes
+    ----------
+    source : Leg
+    hip, ankle : (F, 3) float arrays
+        Where they would go [m].
+    reach : (F,) float array
+        How far the ankle may be from the hip [m].
+    stands : (F,) bool array
+        When its foot is on the ground and cannot give way.
+    room : (F,) float array
+        How far its foot is above the ground [m].
+    """
+
+    source: Leg
+    hip: Array
+    ankle: Array
+    reach: Array
+    stands: Mask
+    room: Array
+
+
+@dataclass(frozen=True)
+class Relief:
+    """What keeps the knees' pace.
+
+    Attributes
+    ----------
+    hips : (F,) float array
+        Further height of the hips [m].
+    feet : mapping of str to (F,) float array
+        By side, how far the foot moves toward its hip, 0 while it stands [m].
+    """
+
+    hips: Array
+    feet: Mapping[str, Array]
+
+
+def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Relief:
+    """The least and smoothest correction with which no knee turns too fast.
+
+    Parameters
+    ----------
+    legs : mapping of str to PacedLeg
+        By side; at least one.
+    step : float
+        Time between samples [s].
+    time_scale : float
+        How much slower than an adult's the motion is.
+    leg_length : float [m]
+    """
+    paced = list(legs.values())
+    paces = [_allowed_turn(leg, step, time_scale) for leg in paced]
+    bends = (SMOOTHING_TIME * time_scale / step) ** 2
+    per_frame = _FRAME * time_scale / step
+    change = np.zeros((len(paced[0].stands), 1 + len(paced)))  # of the hips, then of each foot
+
+    def violated(change: Array, weight: float) -> list[_Equations]:
+        found = []
+        for number, (leg, pace) in enumerate(zip(paced, paces, strict=True), start=1):
+            found += _pace_and_reach(change, number, leg, pace, leg_length, weight * per_frame**2)
+        return found
+
+    if any(len(one.wanted) for one in violated(change, 1.0)):
+        for weight in np.geomspace(TOO_FAST / 100.0, TOO_FAST, STEPS):
+            now = violated(change, weight) + _small_and_smooth(change, paced, bends, leg_length)
+            toward = _solution(now, change)
+            for part in _PARTS:
+                there = change + part * toward
+                if _cost(violated(there, weight) + _small_and_smooth(there, paced, bends, leg_length)) < _cost(now):
+                    change = there
+                    break
+    return Relief(change[:, 0], {side: change[:, number] for number, side in enumerate(legs, start=1)})
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Weighted linear equations of a step.
+
+    Attributes
+    ----------
+    unknowns : (T, R) int array
+        What each is about, ascending.
+    gradient : (T, R) float array
+    wanted : (R,) float array
+        What each should still amount to.
+    weight : (R,) float array or float
+    """
+
+    unknowns: NDArray[np.intp]
+    gradient: Array
+    wanted: Array
+    weight: Array | float
+
+
+def _solution(equations: Sequence[_Equations], change: Array) -> Array:
+    """Least-squares step from a correction; no equation is about samples that are more than two apart."""
+    count, width = change.shape
+    band, right = np.zeros((2 * width + 1, count * width)), np.zeros((count * width, 1))
+    for one in equations:
+        for i, column in enumerate(one.unknowns):
+            np.add.at(right[:, 0], column, one.weight * one.gradient[i] * one.wanted)
+            for j in range(i, len(one.unknowns)):
+                np.add.at(band, (one.unknowns[j] - column, column), one.weight * one.gradient[i] * one.gradient[j])
+    return solve_banded(band, right).reshape(change.shape)
+
+
+def _cost(equations: Sequence[_Equations]) -> float:
+    return float(sum(np.sum(one.weight * one.wanted**2) for one in equations))
+
+
+def _allowed_turn(leg: PacedLeg, step: float, time_scale: float) -> Array:
+    """How far a knee may turn from each sample to the next, (F - 1,) [rad]."""
+    source = np.abs(np.diff(leg.source.flexion))
+    reach = max(1, round(SOURCE_WINDOW * time_scale / step))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(source, reach, mode="edge"), 2 * reach + 1).max(axis=1)
+    return np.maximum(KNEE_PACE * step / time_scale, around)
+
+
+def _pace_and_reach(
+    change: Array, number: int, leg: PacedLeg, pace: Array, leg_length: float, weight: float
+) -> list[_Equations]:
+    """What is asked of a leg where its knee turns too fast or its ankle is out of reach."""
+    count, width = change.shape
+    axis = leg.hip + change[:, :1] * (0.0, 0.0, 1.0) - leg.ankle
+    distance = np.linalg.norm(axis, axis=1)
+    span = distance - change[:, number]
+    by_hips, by_foot = axis[:, 2] / np.maximum(distance, 1e-9), np.where(leg.stands, 0.0, -1.0)
+    hips = np.arange(count) * width
+    flexion, slope = leg.source.flexion_at(span, NEARLY_STRAIGHT)
+    turn = np.diff(flexion)
+    fast = np.flatnonzero(np.abs(turn) > pace)
+    then = fast + 1
+    gradient = [
+        -slope[fast] * by_hips[fast],
+        -slope[fast] * by_foot[fast],
+        slope[then] * by_hips[then],
+        slope[then] * by_foot[then],
+    ]
+    far = np.flatnonzero(span > leg.reach)
+    return [
+        _Equations(
+            np.stack([hips[fast], hips[fast] + number, hips[then], hips[then] + number]),
+            np.stack(gradient),
+            np.sign(turn[fast]) * (pace[fast] - np.abs(turn[fast])),
+            weight,
+        ),
+        _Equations(
+            np.stack([hips[far], hips[far] + number]),
+            np.stack([by_hips[far], by_foot[far]]) / leg_length,
+            (leg.reach[far] - span[far]) / leg_length,
+            OUT_OF_REACH * weight,
+        ),
+    ]
+
+
+def _small_and_smooth(change: Array, legs: Sequence[PacedLeg], bends: float, leg_length: float) -> list[_Equations]:
+    """What is asked of the corrections: to be small and smooth, and none of feet that stand or would be underground."""
+    count, width = change.shape
+    found = []
+    for number in range(width):
+        own, cost = np.arange(count) * width + number, FOOT_FREEDOM if number else 1.0
+        size = change[:, number] / leg_length
+        stencil = bends * np.array([1.0, -2.0, 1.0])[:, None] * np.ones(max(count - 2, 0)) / leg_length
+        found.append(_Equations(np.stack([own[:-2], own[1:-1], own[2:]]), stencil, -bends * np.diff(size, 2), cost))
+        found.append(_pulled(own, -size, MAGNITUDE * cost, leg_length))
+        beyond = np.abs(size) > LARGEST
+        found.append(_pulled(own[beyond], np.sign(size[beyond]) * LARGEST - size[beyond], _TOO_LARGE, leg_length))
+        if number:
+            leg = legs[number - 1]
+            found.append(_pulled(own[leg.stands], -size[leg.stands], _HELD, leg_length))
+            low = ~leg.stands & (change[:, number] < -leg.room)
+            found.append(_pulled(own[low], -leg.room[low] / leg_length - size[low], _UNDERGROUND, leg_length))
+    return found
+
+
+def _pulled(unknowns: NDArray[np.intp], wanted: Array, weight: float, leg_length: float) -> _Equations:
+    """Single corrections that should change by so many leg lengths."""
+    return _Equations(unknowns[None], np.full((1, len(unknowns)), 1.0 / leg_length), wanted, weight)

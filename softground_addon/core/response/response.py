@@ -1,0 +1,305 @@
+"""How a character answers the ground it presses: the composer of tilt and grounding (MODEL.md section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import FlatTerrain, Terrain
+from ..loads.contacts import detect_contacts
+from ..motion.motion import CharacterMotion, SoleMotion
+from ..numerics.interpolation import in_stretches
+from ..numerics.plane_fit import fitted_slope, smoothed
+from ..record.footprints import Footprint
+from ..record.ground_history import GroundHistory
+from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
+from .grounding import Response, heel_rises, leg_soles, responding, settle
+from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
+from .tilt import TiltGains, along_heading, lean, ring_around
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HEADING_TIME = 0.25
+"""Standard deviation of the smoothing of the direction in which a body walks [s], for an adult."""
+SUPPORT_TIME = 0.04
+"""Standard deviation of the smoothing of what holds a body over its support [s], for an adult: a foot loads and
+unloads in about a tenth of a second."""
+RING_WEIGHT = 0.15
+"""What a place of the ring around the body counts beside one under a sole that stands."""
+
+
+@dataclass(frozen=True)
+class TiltOptions:
+    """How the body leans.
+
+    Attributes
+    ----------
+    gains : TiltGains
+    strength : float
+        Part of the controller's lean that the body takes on.
+    lateral : float
+        The same of the lean across the direction of walking, 0 to 1 of the strength.
+    """
+
+    gains: TiltGains = field(default_factory=TiltGains)
+    strength: float = 0.5
+    lateral: float = 1.0
+
+
+@dataclass(frozen=True)
+class GroundingOptions:
+    """How the feet find the ground.
+
+    Attributes
+    ----------
+    align : float
+        How much of the ground's slope the feet take on, 0 to 1.
+    lock : float
+        How much of the source's sliding is taken out of contacts, 0 to 1.
+    performance : Performance
+        What is acted on top.
+    """
+
+    align: float = 1.0
+    lock: float = 0.0
+    performance: Performance = field(default_factory=Performance)
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """How far the lowest point of each sole is off the ground while it touches.
+
+    Attributes
+    ----------
+    frames : (K,) float array
+        Scene frames.
+    soles : (K,) int array
+    heights : (K,) float array
+        Positive where the sole floats, negative where it is in the ground [m].
+    """
+
+    frames: Array
+    soles: NDArray[np.intp]
+    heights: Array
+
+
+def respond(
+    motion: CharacterMotion,
+    touching: Mask,
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    *,
+    tilt: TiltOptions | None,
+    grounding: GroundingOptions | None,
+) -> Response:
+    """The response to a ground that has been pressed.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    touching : (F, S) bool array
+        At scene frames.
+    terrain : Terrain
+        The undisturbed ground.
+    footprints : sequence of Footprint
+        All that the ground holds, of all characters.
+    tilt, grounding : options, or None to leave that out
+    """
+    history = GroundHistory(terrain, footprints)
+    undisturbed = GroundHistory(terrain)
+    feet = leg_soles(motion)
+    leaning = np.zeros((len(motion.frames), 2))
+    if tilt is not None:
+        leaning = tilt.strength * _lean(motion, touching, history, tilt)
+    if grounding is None:
+        placements = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
+        return settle(motion, placements, np.ones_like(touching), leaning)  # feet stay where they are, in swings too
+
+    def placed(side: str, heel_rise: Array | None = None, change: Array | None = None) -> tuple[int, Placement]:
+        sole = feet[side]
+        return sole, place_sole(
+            motion,
+            sole,
+            touching[:, sole],
+            history,
+            undisturbed,
+            align=grounding.align,
+            lock=grounding.lock,
+            heel_rise=heel_rise,
+            change=change,
+        )
+
+    placements = {side: placed(side) for side in feet}
+    acted, crouch, arms = _acted(motion, touching, placements, grounding.performance)
+    placements |= {side: placed(side, change=change) for side, change in acted.items()}
+    rises = heel_rises(motion, placements, touching, leaning, crouch=crouch)
+    placements |= {side: placed(side, rise, acted.get(side)) for side, rise in rises.items() if rise.any()}
+    return replace(settle(motion, placements, touching, leaning, crouch=crouch), arms=arms)
+
+
+def _acted(
+    motion: CharacterMotion, touching: Mask, placements: Mapping[str, tuple[int, Placement]], acting: Performance
+) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
+    """What is acted on top: displacement of each foot, how much deeper the hips go, and what raises the arms."""
+    if acting.is_none or not placements:
+        return {}, None, {}
+    depths = {
+        side: sinkage_over_time(placement.sinkage, touching[:, sole]) for side, (sole, placement) in placements.items()
+    }
+    depth = body_depth(depths, DEPTH_TIME * motion.adult_second)
+    feet = {
+        side: swing_change(motion.joints[f"ankle_{side}"], depths[side], touching[:, sole], acting, motion.leg_length)
+        for side, (sole, _) in placements.items()
+        if acting.knee_lift or acting.hold
+    }
+    shoulders = {side: motion.joints[f"shoulder_{side}"] for side in "lr" if f"shoulder_{side}" in motion.joints}
+    arms = raised_arms(shoulders, _heading(motion), depth, acting.arms, motion.leg_length) if acting.arms else {}
+    return feet, acting.crouch * BENT * depth, arms
+
+
+def mean_sinkage(footprints: Sequence[Footprint], character: str) -> float:
+    """Mean depth of a character's prints [m]."""
+    depths = [footprint.max_depth_m for footprint in footprints if footprint.character == character]
+    return float(np.mean(depths)) if depths else 0.0
+
+
+def _unmoved(count: int) -> Placement:
+    return Placement(np.broadcast_to(np.eye(4), (count, 4, 4)), np.zeros(count), np.zeros(count), np.zeros(count))
+
+
+def _lean(motion: CharacterMotion, touching: Mask, history: GroundHistory, tilt: TiltOptions) -> Array:
+    slope = along_heading(seen_slope(motion, touching, history), _heading(motion), tilt.lateral)
+    return lean(slope, frame_rate=motion.frame_rate, gains=tilt.gains, supported=_support(motion, touching))
+
+
+def _support(motion: CharacterMotion, touching: Mask) -> Array:
+    """How far something holds the body (F,), from 0 to 1."""
+    width = SUPPORT_TIME * motion.adult_second
+    return smoothed(touching.any(axis=1).astype(float), width)
+
+
+def seen_slope(motion: CharacterMotion, touching: Mask, history: GroundHistory) -> Array:
+    """Slope of the ground that carries the body (F, 2) [rad], at each frame as it stood one frame before."""
+    ring = ring_around(motion.hips[:, :2], motion.leg_length)
+    soles = [posed_points(sole)[..., :2] for sole in motion.soles]
+    places = np.concatenate([*soles, ring], axis=1)
+    weights = [np.broadcast_to(touching[:, i, None], part.shape[:2]) / part.shape[1] for i, part in enumerate(soles)]
+    weight = np.concatenate([*weights, np.full(ring.shape[:2], RING_WEIGHT)], axis=1)
+    before = motion.frames - motion.time_step * motion.frame_rate
+    heights = history.heights(places[..., 0], places[..., 1], np.broadcast_to(before[:, None], weight.shape))
+    return fitted_slope(np.concatenate([places, heights[..., None]], axis=-1), weight)
+
+
+def _heading(motion: CharacterMotion) -> Array:
+    """Level direction in which the body walks (F, 2), where its feet point while it stands."""
+    width = HEADING_TIME * motion.adult_second
+    path = smoothed(motion.hips[:, :2], width)
+    velocity = np.gradient(path, axis=0) * motion.frame_rate if len(path) > 1 else np.zeros_like(path)
+    feet = np.mean([sole.transforms[:, 0, :2, 0] for sole in motion.soles], axis=0)
+    slow = 0.05 * motion.froude_speed
+    direction = velocity + slow * smoothed(feet, width)
+    return np.asarray(direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9))
+
+
+def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: Sequence[Footprint]) -> Gaps:
+    """Distance of each standing sole's lowest point from the ground as it is at that frame."""
+    history = GroundHistory(terrain, footprints)
+    frames, soles, heights = [], [], []
+    for index, sole in enumerate(motion.soles):
+        stands = np.flatnonzero(touching[:, index])
+        clearance = _clearance(sole, stands, motion.frames[stands], history)
+        known = np.isfinite(clearance)
+        frames.append(motion.frames[stands][known])
+        soles.append(np.full(int(known.sum()), index))
+        heights.append(clearance[known])
+    return Gaps(np.concatenate(frames), np.concatenate(soles), np.concatenate(heights))
+
+
+def _clearance(sole: SoleMotion, samples: NDArray[np.intp], frames: Array, history: GroundHistory) -> Array:
+    """Height of a sole's lowest point above the ground at some of its samples, which are at these frames, (K,) [m]."""
+
+    def during(part: slice) -> Array:
+        points = posed_points(replace(sole, transforms=sole.transforms[samples[part]]))
+        return lowest_clearance(points, history, frames[part])
+
+    return in_stretches(during, len(samples))
+
+
+def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
+    """The motion on the terrain that it will walk on: as it is where it was made for it, else put on it.
+
+    A walk that was made for level ground and is placed on a hill or on bumps touches nothing as it is. Its contacts
+    are those with the level that it was made for; its feet keep the heights above the terrain that they had above the
+    level, and hips and legs follow.
+    """
+    level = _level_of(motion)
+    if level is None or not _fits_better(motion, level, terrain):
+        return motion
+    made_for = detect_contacts(motion, FlatTerrain(level))
+    ground = GroundHistory(terrain)
+    placements = {}
+    for side, sole in leg_soles(motion).items():
+        as_made = np.maximum(made_for.clearance[:, sole], 0.0)
+        placements[side] = (
+            sole,
+            place_sole(
+                motion,
+                sole,
+                made_for.touching[:, sole],
+                ground,
+                ground,
+                clearance=np.where(np.isfinite(as_made), as_made, 0.0),
+            ),
+        )
+    level_body = np.zeros((len(motion.frames), 2))
+    return responding(motion, settle(motion, placements, made_for.touching, level_body))
+
+
+_LEVEL = 0.005
+"""Difference of height up to which ground counts as level, in leg lengths."""
+_SAME_GROUND = 0.015
+"""Spread of the standing soles' clearance up to which a motion was made for a ground, in leg lengths."""
+_SHORTER = 0.8
+"""A motion touches the ground it was made for at least for so much of the time that it touches any level."""
+
+
+def _level_of(motion: CharacterMotion) -> float | None:
+    """Height of the level that the soles stand on [m]; None where they stand at no one height."""
+    lowest = [sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles]
+    low = float(np.median([np.percentile(height, 10.0) for height in lowest]))
+    offset = detect_contacts(motion, FlatTerrain(low)).offset
+    return low + float(np.median(offset)) if np.isfinite(offset).all() else None
+
+
+def _fits_better(motion: CharacterMotion, level: float, terrain: Terrain) -> bool:
+    """Whether the motion was made for one level rather than for the terrain."""
+    paths = np.concatenate([sole.landmark_positions().reshape(-1, 3) for sole in motion.soles])
+    heights = terrain.heights(paths[:, 0], paths[:, 1])
+    heights = heights[np.isfinite(heights)]
+    if not len(heights) or np.ptp(heights) < _LEVEL * motion.leg_length:
+        return False
+    at_level, _ = _standing(motion, FlatTerrain(level))
+    on_terrain, spread = _standing(motion, terrain)
+    return bool(on_terrain < _SHORTER * at_level or spread > _SAME_GROUND * motion.leg_length)
+
+
+def _standing(motion: CharacterMotion, terrain: Terrain) -> tuple[int, float]:
+    """How many samples of soles touch a terrain, and how much their clearance varies [m]."""
+    contacts = detect_contacts(motion, terrain)
+    clearance = contacts.clearance[contacts.touching]
+    return len(clearance), float(np.std(clearance)) if len(clearance) else 0.0
+
+
+def at_scene_frames(touching: Mask, frames: Array, motion: CharacterMotion) -> Mask:
+    """States (N, S) of the simulation's time grid at the scene frames of a motion, (F, S).
+
+    A sole that leaves within the half frame after a scene frame is seen leaving at it.
+    """
+    ahead = np.array([0.0, 0.5 * motion.time_step * motion.frame_rate])
+    index = np.searchsorted(frames, motion.frames[:, None] + ahead - 1e-6)
+    return np.asarray(touching[np.minimum(index, len(frames) - 1)].all(axis=1))

@@ -1,0 +1,1 @@
+"""What prints: undersides, outlines, how a foot lies, the pieces of a sole."""

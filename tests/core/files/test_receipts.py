@@ -1,0 +1,90 @@
+"""A receipt says that a shot is done only while what it read and wrote is on disk, byte for byte."""
+
+import json
+
+import pytest
+
+from softground_addon.core.files import receipts
+
+OPTIONS = ["--preset=snow", "--save=baked.blend"]
+
+
+@pytest.fixture
+def baked(tmp_path):
+    """A shot with a linked rig, its results and their receipt."""
+    for name in ("shot.blend", "rig.blend", "baked.blend", "report.json"):
+        (tmp_path / name).write_text(name)
+    write(tmp_path)
+    return tmp_path
+
+
+def write(folder, **changes):
+    given = {
+        "made_by": "SoftGround 1",
+        "options": OPTIONS,
+        "read": receipts.checksums([folder / "shot.blend", folder / "rig.blend"]),
+        "wrote": receipts.checksums([folder / "baked.blend", folder / "report.json"]),
+        "totals": {"steps": 4},
+    }
+    receipts.write(folder / "receipt.json", **(given | changes))
+
+
+def done(folder, made_by="SoftGround 1", options=OPTIONS, source="shot.blend", outputs=("baked.blend", "report.json")):
+    return receipts.totals_if_done(
+        folder / "receipt.json",
+        made_by=made_by,
+        options=options,
+        source=folder / source,
+        outputs=[folder / name for name in outputs],
+    )
+
+
+def test_a_shot_is_done_when_its_receipt_holds(baked):
+    assert done(baked) == {"steps": 4}
+
+
+@pytest.mark.parametrize("name", ["shot.blend", "rig.blend", "baked.blend", "report.json"])
+def test_a_file_that_has_changed_or_is_gone_undoes_it(baked, name):
+    (baked / name).write_text("changed")
+    assert done(baked) is None
+    (baked / name).unlink()
+    assert done(baked) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"made_by": "SoftGround 2"},
+        {"options": ["--preset=mud"]},
+        {"source": "other.blend"},
+        {"outputs": ("baked.blend",)},
+        {"outputs": ("baked.blend", "report.json", "more.json")},
+    ],
+)
+def test_another_bake_is_not_done(baked, change):
+    assert done(baked, **change) is None
+
+
+def test_a_shot_baked_in_place_is_done_as_what_it_became(baked):
+    shot = baked / "shot.blend"
+    before = receipts.checksums([shot])
+    shot.write_text("baked")
+    write(baked, read=before, wrote=receipts.checksums([shot]))
+    assert done(baked, outputs=["shot.blend"]) == {"steps": 4}
+    shot.write_text("edited again")
+    assert done(baked, outputs=["shot.blend"]) is None
+
+
+def test_a_damaged_receipt_is_none(baked):
+    path = baked / "receipt.json"
+    whole = path.read_bytes()
+    for size in range(0, len(whole) - 2, 7):
+        path.write_bytes(whole[:size])
+        assert done(baked) is None
+    content = json.loads(whole)
+    for key in content:
+        for value in (None, 3, [], [3], "x"):
+            path.write_text(json.dumps(content | {key: value}))
+            assert done(baked) is None or (key, value) == ("totals", [])
+    path.unlink()
+    assert done(baked) is None

@@ -1,0 +1,103 @@
+"""When soles touch: scale-free, with hysteresis, whatever the float, on any terrain."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.numerics.intervals import close_short, hysteresis, runs
+from tests.core.character import Slope, character, flat_sole
+
+RATE = 120.0
+
+
+def hop(rate=RATE, *, scale=1.0, float_height=0.0, gravity=9.81):
+    """A sole that stands 0.5 s, hops for 0.4 s in a parabola, and stands again; times scale as sqrt(scale)."""
+    time = np.arange(int(1.4 * rate)) / rate
+    duration = 0.4
+    flight = (time > 0.5) & (time < 0.5 + duration)
+    height = np.where(flight, 0.5 * 9.81 * (time - 0.5) * (0.5 + duration - time), 0.0)
+    path = np.stack([np.where(flight, time - 0.5, np.where(time < 0.5, 0.0, duration)), 0 * time, height], axis=1)
+    sole = flat_sole(path * scale + (0, 0, float_height))
+    landmarks = sole.sole.landmarks * scale
+    sole = flat_sole(path * scale + (0, 0, float_height), landmarks=landmarks)
+    return character([sole], leg_length=0.9 * scale, rate=rate * np.sqrt(gravity / 9.81 / scale), gravity=gravity)
+
+
+def test_a_hop_is_two_contacts_with_the_flight_between():
+    touching = detect_contacts(hop(), Slope()).touching[:, 0]
+    start, end = runs(touching)
+    assert len(start) == 2
+    assert end[0] / RATE == pytest.approx(0.5, abs=0.03)
+    assert start[1] / RATE == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize("scale", [0.03, 100.0])
+def test_a_mouse_and_a_giant_touch_when_a_human_does(scale):
+    human = detect_contacts(hop(), Slope()).touching
+    assert np.array_equal(detect_contacts(hop(scale=scale), Slope()).touching, human)
+
+
+def test_contacts_on_the_moon_are_those_of_the_same_motion_slowed_down():
+    assert np.array_equal(
+        detect_contacts(hop(gravity=1.62), Slope()).touching, detect_contacts(hop(), Slope()).touching
+    )
+
+
+@pytest.mark.parametrize("height", [-0.06, -0.02, 0.03, 0.08])
+def test_a_constant_float_or_sink_is_removed_and_reported(height):
+    contacts = detect_contacts(hop(float_height=height), Slope())
+    assert contacts.offset[0] == pytest.approx(height, abs=1e-9)
+    assert np.array_equal(contacts.touching, detect_contacts(hop(), Slope()).touching)
+
+
+def test_a_sole_high_in_the_air_touches_nothing():
+    contacts = detect_contacts(hop(float_height=0.5), Slope())
+    assert not contacts.touching.any()
+    assert contacts.offset[0] == 0.0
+
+
+def test_the_terrain_carries_the_sole_at_its_own_height():
+    contacts = detect_contacts(hop(float_height=3.0), Slope(height=3.0))
+    assert np.array_equal(contacts.touching, detect_contacts(hop(), Slope()).touching)
+
+
+def test_a_wall_and_missing_ground_bear_no_sole():
+    still = character([flat_sole(np.zeros((60, 3)))])
+    assert detect_contacts(still, Slope(slope=0.3)).touching.all()
+    assert not detect_contacts(still, Slope(slope=3.0)).touching.any()
+    assert not detect_contacts(still, Slope(edge=-1.0)).touching.any()
+
+
+def test_the_normal_is_that_of_the_slope():
+    contacts = detect_contacts(character([flat_sole(np.zeros((4, 3)))]), Slope(slope=0.75))
+    assert np.allclose(contacts.normal, (-0.6, 0.0, 0.8))
+
+
+def test_a_gap_and_a_blip_shorter_than_a_twentieth_of_a_second_close():
+    path = np.zeros((120, 3))
+    path[40:44, 2] = 0.3  # a tracking glitch of 33 ms while standing
+    path[80:, 2] = 0.3
+    path[100:104, 2] = 0.0  # and one in the air
+    start, end = runs(detect_contacts(character([flat_sole(path)]), Slope()).touching[:, 0])
+    assert start.tolist() == [0]
+    assert end == pytest.approx([80], abs=4)
+
+
+def test_one_frame_and_no_motion_at_all_are_no_errors():
+    assert detect_contacts(character([flat_sole(np.zeros((1, 3)))]), Slope()).touching.tolist() == [[True]]
+
+
+def test_hysteresis_keeps_its_state_between_the_thresholds():
+    start = np.array([0, 1, 0, 0, 0, 0, 1, 0], dtype=bool)
+    stop = np.array([0, 0, 0, 1, 0, 1, 0, 0], dtype=bool)
+    assert hysteresis(start, stop).astype(int).tolist() == [0, 1, 1, 0, 0, 0, 1, 1]
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(1, 6))
+def test_after_closing_no_inner_run_is_short(values, shortest):
+    closed = close_short(np.array(values), shortest)
+    start, end = runs(closed)
+    inner = (start > 0) & (end < len(closed))
+    assert (end - start)[inner].min(initial=shortest) >= shortest

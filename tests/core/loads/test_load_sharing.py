@@ -1,0 +1,58 @@
+"""One load shared by several contacts."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
+
+from softground_addon.core.loads.load_sharing import share_by_moment, solve_non_negative
+
+FEET = np.array([[[0.0, 0.1], [0.6, -0.1]]])
+
+
+def share(points, target):
+    points = np.atleast_3d(np.asarray(points, dtype=float))
+    return share_by_moment(points, np.asarray([target], dtype=float), np.ones(points.shape[:2], dtype=bool))[0]
+
+
+def test_the_share_of_two_feet_is_the_place_of_the_centre_of_mass_between_them():
+    """Eq. 5 corrected: (p_com - p_left)·d/|d|² = (0.15·0.6 + 0.15·0.2)/0.4 = 0.3; printed, it is 1 on the segment."""
+    target = (0.15 + 0.02, 0.1 - 0.05 + 0.06)  # off the segment by (0.02, 0.06), square to it
+    assert share(FEET, target) == pytest.approx([0.75, 0.25], abs=1e-5)
+
+
+@pytest.mark.parametrize(("beyond", "expected"), [((-0.3, 0.2), [1, 0]), ((0.9, -0.2), [0, 1])])
+def test_a_centre_of_mass_beyond_a_foot_rests_on_that_foot(beyond, expected):
+    assert share(FEET, beyond) == pytest.approx(expected, abs=1e-5)
+
+
+def test_feet_at_the_same_place_bear_one_half_each():
+    assert share([[[0.3, 0.2], [0.3, 0.2]]], (5.0, 1.0)) == pytest.approx([0.5, 0.5])
+
+
+def test_a_foot_in_the_air_bears_nothing_and_the_other_everything():
+    touching = np.array([[True, False], [False, False]])
+    assert share_by_moment(np.repeat(FEET, 2, axis=0), np.zeros((2, 2)), touching).tolist() == [[1, 0], [0, 0]]
+
+
+def test_four_legs_under_the_centre_bear_a_quarter_each():
+    corners = [[[0, 0], [1, 0], [0, 1], [1, 1]]]
+    assert share(corners, (0.5, 0.5)) == pytest.approx([0.25] * 4)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=50)
+def test_least_squares_agree_with_scipy(seed):
+    random = np.random.default_rng(seed)
+    count = random.integers(1, 7)
+    rows, right = random.normal(size=(8, count)), random.normal(size=8)
+    solution = solve_non_negative((rows.T @ rows)[None], (rows.T @ right)[None], np.ones((1, count), dtype=bool))
+    assert solution[0] == pytest.approx(nnls(rows, right)[0], abs=1e-9)
+
+
+def test_shares_change_continuously_as_the_centre_of_mass_moves():
+    path = np.stack([np.linspace(-0.5, 1.5, 2000), 0.3 * np.sin(np.linspace(0, 20, 2000))], axis=1)
+    corners = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 0.4], [1.1, 0.5]], (2000, 1, 1))
+    shares = share_by_moment(corners, path, np.ones((2000, 4), dtype=bool))
+    assert np.abs(np.diff(shares, axis=0)).max() < 0.05

@@ -1,0 +1,75 @@
+"""Steps without ground under them are noticed, and only those."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.missed_steps import advice, missed_steps
+from tests.core.character import Slope, character, flat_sole
+from tests.core.walkers import walk
+
+RATE = 120.0
+STEPS = 8
+
+
+def steps_of(touching):
+    return int((np.diff(touching.astype(int), axis=0, prepend=0) > 0).sum())
+
+
+def walked(rise=lambda x: 0 * x):
+    """A walk along x of `STEPS` steps whose ground rises with x."""
+    motion = walk(steps=STEPS).motion
+    soles = []
+    for sole in motion.soles:
+        poses = sole.transforms.copy()
+        poses[..., 2, 3] += rise(poses[:, :1, 0, 3])
+        soles.append(replace(sole, transforms=poses))
+    return replace(motion, soles=tuple(soles))
+
+
+def found(motion, terrain):
+    return missed_steps(motion, detect_contacts(motion, terrain))
+
+
+def test_a_walk_on_its_ground_misses_nothing():
+    assert not found(walked(), FlatTerrain())
+
+
+def test_steps_beyond_the_edge_of_the_ground_are_counted():
+    motion = walked()
+    whole = steps_of(detect_contacts(motion, FlatTerrain()).touching)
+    ground = Slope(edge=3.0)
+    contacts = detect_contacts(motion, ground)
+    missed = missed_steps(motion, contacts)
+    assert len(missed) == whole - steps_of(contacts.touching) > 2
+    assert all(np.isinf(step.clearance) for step in missed)
+
+
+def test_steps_of_a_climb_on_level_ground_are_counted():
+    motion = walked(lambda x: 0.3 * np.maximum(x - 3.0, 0.0))
+    missed = found(motion, FlatTerrain())
+    assert len(missed) >= 2
+    assert max(step.clearance for step in missed) > 0.2
+
+
+def test_jumps_and_raised_feet_are_no_steps():
+    time = np.arange(0, 3, 1 / RATE)
+    jump = np.maximum(0.0, 3.0 * (time - 1.0) - 4.905 * (time - 1.0) ** 2)
+    lifted = np.where((time > 1.0) & (time < 2.5), 0.4, 0.0)
+    both = [flat_sole(np.stack([0 * time, 0 * time + y, jump], -1)) for y in (-0.1, 0.1)]
+    one = [flat_sole(np.stack([0 * time, 0 * time + y, z], -1)) for y, z in ((-0.1, lifted), (0.1, 0 * time))]
+    for soles in (both, one):
+        assert not found(character(soles, rate=RATE), FlatTerrain())
+
+
+def test_the_advice_names_how_many_since_when_and_what_to_do():
+    missed = found(walked(), Slope(edge=3.0))
+    text = advice("Walker", missed, "'Field'")
+    assert f"{len(missed)} steps of 'Walker'" in text
+    assert "'Field'" in text
+    assert f"from frame {missed[0].frame:.0f}" in text
+    assert "extend or move the ground" in text
+    once = "1 step of 'Walker' meets no ground on 'Field' and leaves no print"
+    assert advice("Walker", missed[:1], "'Field'").startswith(once)

@@ -1,0 +1,61 @@
+"""A walk on the spot is told from a walk, and from a ride."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.sliding import treadmill_speed
+from tests.core.walkers import walk
+
+BELT = np.array([-1.1, 0.4, 0.0])
+
+
+def carried(motion, velocity, *, hips=None):
+    """The motion with every sample carried along at a velocity [m/s], the hips at one of their own."""
+    way = motion.times[:, None] * velocity
+    soles = []
+    for sole in motion.soles:
+        poses = sole.transforms.copy()
+        poses[..., :3, 3] += way[:, None]
+        soles.append(replace(sole, transforms=poses))
+    joints = {
+        name: path + (way if hips is None else motion.times[:, None] * hips) for name, path in motion.joints.items()
+    }
+    return replace(motion, soles=tuple(soles), joints=joints)
+
+
+def speed_of(motion):
+    return treadmill_speed(motion, detect_contacts(motion, FlatTerrain()))
+
+
+def on_the_spot(motion):
+    first, last = (np.mean([sole.transforms[place, 0, :3, 3] for sole in motion.soles], axis=0) for place in (0, -1))
+    return carried(motion, (first - last) * (1, 1, 0) / motion.times[-1])
+
+
+def test_a_walk_and_somebody_who_stands_are_on_no_belt():
+    motion = walk(steps=6).motion
+    assert speed_of(motion) == 0.0
+    assert treadmill_speed(motion.first(1), detect_contacts(motion.first(1), FlatTerrain())) == 0.0
+
+
+def test_a_walk_on_the_spot_has_the_speed_of_the_walk():
+    motion = walk(steps=6).motion
+    soles = [np.ptp(sole.transforms[:, 0, 0, 3]) for sole in motion.soles]
+    assert speed_of(on_the_spot(motion)) == pytest.approx(np.mean(soles) / motion.times[-1], rel=0.15)
+
+
+def test_skates_that_take_the_body_along_are_no_belt():
+    motion = walk(steps=1).motion
+    still = replace(
+        motion,
+        soles=tuple(
+            replace(s, transforms=np.repeat(s.transforms[:1], len(motion.frames), axis=0)) for s in motion.soles
+        ),
+        joints={name: np.repeat(path[:1], len(motion.frames), axis=0) for name, path in motion.joints.items()},
+    )
+    assert speed_of(still) == 0.0
+    assert speed_of(carried(still, BELT)) == 0.0
