@@ -148,6 +148,8 @@ def _fitted(
     """Level and slope (N, 3) whose pressure has the `wanted` force and moments (N, 3), by Newton's method.
 
     A step that leads further off is halved until it does not: the pressure's kinks send whole steps to and fro.
+    Moments are those of what the pressure is off the even one. An even pressure has none about the middle of the
+    contact, but about that of a few of its points: where the force is hardly off the middle, they could not bear it.
     """
     scale = np.sqrt(np.einsum("nii->ni", spread))
     damping = np.full(len(field), 1e-3)
@@ -155,9 +157,10 @@ def _fitted(
     for _ in range(MOST_ROUNDS):
         load = _pressure(field, x, y, highest)
         free = (load > 0) & (load < highest.astype(np.float32)[:, None])
+        load -= 1.0
         load *= share
         miss = np.stack([load.sum(axis=1), np.einsum("nq,nq->n", load, x), np.einsum("nq,nq->n", load, y)], axis=1)
-        miss += field * (0.0, blunt, blunt) - wanted
+        miss += field * (0.0, blunt, blunt) + (1.0, 0.0, 0.0) - wanted
         error = np.abs(miss / scale).max(axis=1)
         # A step that led further off is taken back and tried again, shorter.
         better = (error < least)[:, None]

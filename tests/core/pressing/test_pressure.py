@@ -64,6 +64,7 @@ def test_a_force_off_the_middle_presses_like_a_beam_up_to_a_third_at_the_highest
 
 @settings(max_examples=25)
 @example("rectangle", 0.0, 0.00195)  # hardly off the middle
+@example("foot", -0.03125, 0.0)  # less than the points that the fit begins on are
 @given(st.sampled_from(["rectangle", "ellipse", "triangle", "foot"]), st.floats(-1, 1), st.floats(-1, 1))
 def test_within_the_kern_the_force_acts_where_it_should_and_is_kept(shape, u, v):
     x, y, area = points_of(shape)
