@@ -22,24 +22,37 @@ EDGE = 0.06
 
 @dataclass(frozen=True)
 class Score:
-    """Errors of one model on one trial; see `score`."""
+    """Errors of one model on one trial; see `score`.
 
+    Forces are vertical but for the anterior-posterior one, in body weights; `rms_bw_foot` is of both feet together, and
+    `share_rms_bw` what remains of it if the estimated shares are given the measured total. Times are of where the force
+    crosses `LOADED`: mean absolute error, and the mean error as bias, late being positive.
+    """
+
+    rms_bw_foot: float
     rms_bw_left: float
     rms_bw_right: float
     rms_bw_total: float
+    share_rms_bw: float
     peak_ratio: float
     heel_strike_ms: float
+    heel_strike_bias_ms: float
     toe_off_ms: float
+    toe_off_bias_ms: float
     rms_bw_anterior_posterior: float
     mean_cycle_bw: float
     frames_scored: int
 
 
-def plates_saw_everything(measured: Array, touching: Mask, rate: float) -> Mask:
-    """Frames at which every foot that the motion shows on the ground stood on a plate, and no other plate was loaded.
+def plates_saw_everything(measured: Array, touching: Mask, *, weight: float, rate: float) -> Mask:
+    """Frames at which the plates show all that bears the body.
 
-    On a walkway with a few plates most steps miss them: there the measured force is 0 and the true one is not. A
-    foot counts as on the ground where the motion shows it for the whole of ±60 ms, and as off it likewise.
+    Left out is what they do not show, as the motion tells it: whole contacts whose plate stays empty (on a walkway with
+    a few plates most steps miss them); frames at which another plate than the feet's is loaded; frames at which a foot
+    is on the ground but its plate empty; and, where that lasts, all those about them at which the plates do not bear
+    the weight: the body sits.
+
+    A foot counts as on the ground where the motion shows it for the whole of ±60 ms, and as off it likewise.
 
     Parameters
     ----------
@@ -47,16 +60,27 @@ def plates_saw_everything(measured: Array, touching: Mask, rate: float) -> Mask:
         Vertical plate forces [N].
     touching : (F, 2) bool array
         Whether heights and speeds show the foot on the ground; no force has a part in that.
+    weight : float
+        Body weight [N].
     rate : float
         [Hz]
     """
     reach = max(1, round(EDGE * rate))
+    loaded = measured > LOADED
+    missed = np.zeros(measured.shape, dtype=bool)
+    for foot in range(measured.shape[1]):
+        for first, last in zip(*runs(touching[:, foot]), strict=True):
+            contact = slice(max(first - reach, 0), last + reach)
+            begins = last == len(touching) and last - first <= reach
+            missed[contact, foot] |= not (begins or loaded[contact, foot].any())
     window = np.lib.stride_tricks.sliding_window_view
     padded = np.pad(touching, ((reach, reach), (0, 0)), mode="edge")
     surely_on = window(padded, 2 * reach + 1, axis=0).all(axis=-1)
     surely_off = window(~padded, 2 * reach + 1, axis=0).all(axis=-1)
-    loaded = measured > LOADED
-    return ~((surely_on & ~loaded) | (surely_off & loaded)).any(axis=1)
+    hidden = (surely_on & ~loaded & ~missed).any(axis=1)
+    for first, last in zip(*runs(measured.sum(axis=1) < weight), strict=True):
+        hidden[first:last] |= hidden[first:last].sum() > reach
+    return ~(hidden | (missed | surely_off & loaded).any(axis=1))
 
 
 def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rate: float) -> Score:
@@ -75,14 +99,20 @@ def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rat
     """
     error = (estimated - measured) / weight
     strikes, leaves = _timing_errors(estimated[..., 2], measured[..., 2], scored, rate)
-    total = estimated[..., 2].sum(axis=1)
+    vertical, total = measured[scored, :, 2], estimated[..., 2].sum(axis=1)
+    both = np.minimum(vertical.sum(axis=1), total[scored]) > LOADED
+    share = estimated[scored][both, :, 2] / total[scored][both, None]
     return Score(
+        rms_bw_foot=_rms(error[scored, :, 2]),
         rms_bw_left=_rms(error[scored, 0, 2]),
         rms_bw_right=_rms(error[scored, 1, 2]),
         rms_bw_total=_rms(error[scored, :, 2].sum(axis=1)),
-        peak_ratio=float(estimated[scored, :, 2].max() / measured[scored, :, 2].max()),
-        heel_strike_ms=_mean_absolute(strikes) * 1e3,
-        toe_off_ms=_mean_absolute(leaves) * 1e3,
+        share_rms_bw=_rms((share * vertical[both].sum(axis=1, keepdims=True) - vertical[both]) / weight),
+        peak_ratio=float(estimated[scored, :, 2].max() / vertical.max()),
+        heel_strike_ms=_mean(np.abs(strikes)) * 1e3,
+        heel_strike_bias_ms=_mean(strikes) * 1e3,
+        toe_off_ms=_mean(np.abs(leaves)) * 1e3,
+        toe_off_bias_ms=_mean(leaves) * 1e3,
         rms_bw_anterior_posterior=_rms(error[scored, :, 0].sum(axis=1)),
         mean_cycle_bw=_mean_over_cycles(total, measured[..., 2]) / weight,
         frames_scored=int(scored.sum()),
@@ -101,14 +131,15 @@ def crossings(force: Array) -> tuple[Array, Array]:
 
 
 def _timing_errors(estimated: Array, measured: Array, scored: Mask, rate: float) -> tuple[Array, Array]:
-    """Errors of heel strike and toe-off [s]; an event that the estimate misses counts `EVENT_REACH`."""
+    """Errors of heel strike and toe-off [s], later ones positive; an event that is missed counts `EVENT_REACH`."""
     errors: tuple[list[float], list[float]] = ([], [])
     for foot in range(measured.shape[1]):
         events = zip(crossings(measured[:, foot]), crossings(estimated[:, foot]), errors, strict=True)
         for true, found, collected in events:
             for event in true[scored[np.round(true).astype(int)]]:
-                nearest = np.abs(found - event).min(initial=np.inf) / rate
-                collected.append(min(nearest, EVENT_REACH))
+                off = (found - event) / rate
+                nearest = off[np.abs(off).argmin()] if len(off) else EVENT_REACH
+                collected.append(float(np.clip(nearest, -EVENT_REACH, EVENT_REACH)))
     return np.array(errors[0]), np.array(errors[1])
 
 
@@ -122,8 +153,8 @@ def _mean_over_cycles(total: Array, measured: Array) -> float:
 
 
 def _rms(error: Array) -> float:
-    return float(np.sqrt((error**2).mean()))
+    return float(np.sqrt((error**2).mean())) if error.size else 0.0
 
 
-def _mean_absolute(error: Array) -> float:
-    return float(np.abs(error).mean()) if len(error) else 0.0
+def _mean(error: Array) -> float:
+    return float(error.mean()) if len(error) else 0.0

@@ -41,8 +41,9 @@ def forces_at_frames(motion: CharacterMotion) -> np.ndarray:
 
 def scored(trial: Trial, motion: CharacterMotion | None = None) -> Score:
     motion = motion or motion_of_trial(trial)
-    frames = plates_saw_everything(trial.forces[..., 2], detect_contacts(motion, FlatTerrain()).touching, trial.rate)
-    return score(forces_at_frames(motion), trial.forces, frames, weight=trial.mass * 9.81, rate=trial.rate)
+    weight, touching = trial.mass * 9.81, detect_contacts(motion, FlatTerrain()).touching
+    frames = plates_saw_everything(trial.forces[..., 2], touching, weight=weight, rate=trial.rate)
+    return score(forces_at_frames(motion), trial.forces, frames, weight=weight, rate=trial.rate)
 
 
 def with_points(trial: Trial, change) -> Trial:

@@ -17,6 +17,8 @@ SIDES = ("l", "r")
 LANDMARKS = ("heel", "ball", "toe")
 CSV_JOINTS = {"mid_hip": "hips"}
 """Joints that the files call otherwise than `JOINTS`."""
+KINDS = {"walk": "walk", "run": "run", "dj": "drop jump", "jump": "jump", "squat": "squat", "sts": "chair"}
+"""Kinds of motion by a word in a trial's name; where there is none, the name says nothing ("other")."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class Trial:
     Attributes
     ----------
     name : str
+        Of its subject and of what is done, joined by an underscore, in either order.
     mass : float
         Body mass [kg].
     rate : float
@@ -44,6 +47,16 @@ class Trial:
     points: dict[str, Array]
     forces: Array
     bvh: Path
+
+    @property
+    def kind(self) -> str:
+        """What is done: one of `KINDS`, or "other"."""
+        return next((kind for word, kind in KINDS.items() if word in self.name.lower()), "other")
+
+    @property
+    def subject(self) -> str:
+        """Who does it: the part of the name that does not tell the kind."""
+        return "_".join(part for part in self.name.split("_") if not any(word in part.lower() for word in KINDS))
 
 
 def read_trial(csv: Path) -> Trial:

@@ -36,17 +36,24 @@ COLUMNS = {
     "trial": "{:<18}",
     "path": "{:<7}",
     "model": "{:<17}",
+    "rms_bw_foot": "{:>7.3f}",
     "rms_bw_left": "{:>7.3f}",
     "rms_bw_right": "{:>7.3f}",
     "rms_bw_total": "{:>7.3f}",
+    "share_rms_bw": "{:>7.3f}",
     "peak_ratio": "{:>7.2f}",
     "heel_strike_ms": "{:>7.1f}",
+    "heel_strike_bias_ms": "{:>7.1f}",
     "toe_off_ms": "{:>7.1f}",
+    "toe_off_bias_ms": "{:>7.1f}",
     "rms_bw_anterior_posterior": "{:>7.3f}",
     "mean_cycle_bw": "{:>7.3f}",
     "frames_scored": "{:>7d}",
 }
-HEADINGS = ("trial", "path", "model", "left", "right", "total", "peak", "HS ms", "TO ms", "AP", "mean", "frames")
+HEADINGS = (
+    *("trial", "path", "model", "foot", "left", "right", "total", "share", "peak"),
+    *("HS ms", "bias", "TO ms", "bias", "AP", "mean", "frames"),
+)
 
 
 def main() -> None:
@@ -67,11 +74,15 @@ def validate(trial: Trial, output: Path) -> Iterator[dict[str, object]]:
     """Rows of the table for one trial, for each path and model."""
     for path, motion in motions_of(trial):
         touching = detect_contacts(motion, FlatTerrain()).touching
-        scored = plates_saw_everything(trial.forces[..., 2], touching, trial.rate)
+        scored = plates_saw_everything(trial.forces[..., 2], touching, weight=trial.mass * GRAVITY, rate=trial.rate)
+        if not scored.any():
+            print(f"{trial.name}: the plates show none of it whole, nothing to score")
+            continue
         curves = dict(estimates(motion))
         for model, forces in curves.items():
             result = score(forces, trial.forces, scored, weight=trial.mass * GRAVITY, rate=trial.rate)
-            yield {"trial": trial.name, "path": path, "model": model, **dataclasses.asdict(result)}
+            about = {"trial": trial.name, "subject": trial.subject, "kind": trial.kind, "path": path, "model": model}
+            yield about | dataclasses.asdict(result)
         plot_trial(trial, path, curves, scored, output / f"{trial.name}_{path}.png")
 
 
