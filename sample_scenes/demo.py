@@ -162,7 +162,7 @@ def bake_lane(scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cel
     bpy.ops.softground.bake()
     ground = settings.ground
     ground.name = f"{preset} Ground"
-    footprints, _ = record.load(ground_mesh.mesh_of(ground)[ground_mesh.RECORD])
+    footprints = record.load(ground_mesh.mesh_of(ground)[ground_mesh.RECORD]).footprints
     return Lane(preset, walker, ground, tuple(footprints), time.perf_counter() - started)
 
 

@@ -1,12 +1,14 @@
 """The main job, end to end: from a rig to footprints on a ground, and back."""
 
 import gc
+from dataclasses import replace
 from itertools import pairwise
 
 import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender import mesh_arrays
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters.character_setup import set_up_automatically
 from softground_addon.blender.compat import action_curves
@@ -15,7 +17,7 @@ from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.presets import FOLDER
 from softground_addon.core.loads.estimate import CharacterLoads
-from softground_addon.core.record import record
+from softground_addon.core.record import edits, record
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights, plane, rest
 
@@ -52,10 +54,35 @@ def test_no_print_where_no_foot_was(walk):
     bake(walk)
     ground = walk.softground.ground
     moved = np.abs(rest(ground)[:, 2] - heights(ground, DISPLAY_KEY)[:, 2]) > 1e-4
-    steps, _ = record.load(ground.data[ground_mesh.RECORD])
+    steps = record.load(ground.data[ground_mesh.RECORD]).footprints
     place = rest(ground)[moved, :2]
     nearest = np.min([np.linalg.norm(place - step.position[:2], axis=1) for step in steps], axis=0)
     assert nearest.max() < 0.16 + 0.04 + 0.04  # half a shoe, the rim's reach, the blur
+
+
+def test_a_muted_step_stays_out_of_the_ground_when_it_is_baked_again(walk):
+    steps = bake(walk).report["steps"]
+    ground = walk.softground.ground
+    plain = heights(ground, DISPLAY_KEY)
+    stored = record.load(bytes(ground.data[ground_mesh.RECORD]))
+    assert [edits.step_id(step) for step in stored.footprints] == [step["id"] for step in steps]
+    muted = stored.footprints[3]
+    content = record.dump(replace(stored, edits={edits.step_id(muted): edits.StepEdit(mute=True)}))
+    del ground.data[ground_mesh.RECORD]  # an array that is there would keep its length
+    ground.data[ground_mesh.RECORD] = np.frombuffer(content + bytes(-len(content) % 4), np.int32)
+    again = bake(walk)
+    assert record.load(bytes(ground.data[ground_mesh.RECORD])).edits[steps[3]["id"]].mute
+    assert len(again.report["steps"]) == len(baked_ground.load(ground)[0]) + 1 == len(steps)
+    moved = heights(ground, DISPLAY_KEY)[:, 2] - rest(ground)[:, 2]
+    under = np.linalg.norm(rest(ground)[:, :2] - muted.position[:2], axis=1) < 0.08
+    beside = np.linalg.norm(rest(ground)[:, :2] - stored.footprints[2].position[:2], axis=1) < 0.08
+    assert np.abs(plain[under, 2] - rest(ground)[under, 2]).max() > 0.01
+    assert np.abs(moved[under]).max() < 1e-3
+    np.testing.assert_array_equal(heights(ground, DISPLAY_KEY)[beside], plain[beside])
+    walk.frame_set(walk.frame_end)
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    played = mesh_arrays.positions(shown)[:, 2] + ground.location.z
+    np.testing.assert_allclose(played[under], heights(ground, DISPLAY_KEY)[under, 2], atol=3e-4)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

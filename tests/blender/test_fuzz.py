@@ -119,11 +119,11 @@ def test_no_record_makes_a_traceback(count, stored):
 
     def check(content):
         try:
-            footprints, about = record.load(content)
+            loaded = record.load(content)
         except InputError:
             return
-        assert isinstance(about, dict)
-        assert all(footprint.max_depth_m >= 0 for footprint in footprints)
+        assert isinstance(loaded.about, dict)
+        assert all(footprint.max_depth_m >= 0 for footprint in loaded.footprints)
 
     each(mutated(stored) | inside, count, check)
 

@@ -43,7 +43,7 @@ def lanes(demo, scene):
     found = {}
     for preset in PRESETS:
         ground = bpy.data.objects[f"{preset} Ground"]
-        footprints, _ = record.load(ground.data["softground_record"])
+        footprints = record.load(ground.data["softground_record"]).footprints
         walker = bpy.data.objects[footprints[0].character]
         found[preset] = (footprints, np.array(walker.location))
     return found

@@ -185,6 +185,8 @@ def _write(
         "cell_size": cell_size,
         "blur_sigma": blur_sigma,
     }
+    left = record.BakeRecord(footprints, about, baked_ground.edits_of(options.ground) if options.ground else {})
+    footprints = left.edited
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         trail = yield from aside(
@@ -197,7 +199,7 @@ def _write(
         else:
             place, warnings = yield from _given(drafts, scene, shot, shot.surface, trail, sole_length)
         del trail
-        stored = yield from aside("write", 0.5, record.dump, footprints, about)
+        stored = yield from aside("write", 0.5, record.dump, left)
         x, y = place.position[:, 0], place.position[:, 1]
         sample = yield from aside("write", 0.6, partial(sample_at, footprints, x, y, **at_the_end))
         over_time = partial(

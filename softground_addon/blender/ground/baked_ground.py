@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
+from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample, Trail
 from ..jobs import Job, Progress
@@ -163,15 +164,23 @@ def stored_record(ground: bpy.types.Object) -> memoryview:
 
 
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
-    """The record of a ground's bake: its footprints, and what is known about them.
+    """The record of a ground's bake: its footprints as the artist left them, and what is known about them.
 
     Raises
     ------
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    footprints, about = record.load(bytes(stored_record(ground)))
-    return footprints, dict(about)
+    stored = record.load(bytes(stored_record(ground)))
+    return stored.edited, dict(stored.about)
+
+
+def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:
+    """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read."""
+    try:
+        return record.load(bytes(stored_record(ground))).edits
+    except InputError:
+        return {}
 
 
 def baked_with(about: dict[str, Any], value: str) -> float:

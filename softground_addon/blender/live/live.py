@@ -132,7 +132,7 @@ class LiveMode:
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
         inputs = bake_report.inputs_of(scene)
         so_far = inputs | {"frames": [scene.softground.frame_start, int(self._playhead.frame)]}
-        stored = record.dump(footprints, {"inputs": so_far, "input_hash": ""})
+        stored = record.dump(record.BakeRecord(footprints, {"inputs": so_far, "input_hash": ""}))
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
         spans, lines = playback_curves_at(

@@ -92,9 +92,9 @@ class LiveGround:
         self._by_tile: dict[Tile, Indices] | None = None
         self._known: dict[Tile, _TileVertices] = {}
         self._reached: Indices = np.empty(0, np.intp)  # vertices over the known tiles
-        nothing = GroundSample(*np.empty((5, 0)))
+        nothing, no_prints = GroundSample(*np.empty((5, 0))), record.dump(record.BakeRecord([], {}))
         # No shape keys: Blender would evaluate them on the whole mesh at each frame.
-        ground_mesh.write(ground, np.empty(0, np.intp), nothing, record.dump([], {}), unit_scale, shape_keys=False)
+        ground_mesh.write(ground, np.empty(0, np.intp), nothing, no_prints, unit_scale, shape_keys=False)
         self.take_from(ground)
 
     def take_from(self, ground: bpy.types.Object) -> None:

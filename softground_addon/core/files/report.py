@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..record.edits import step_id
 from ..record.footprints import Footprint
 
 SCHEMA_VERSION = 1
@@ -58,6 +59,7 @@ def build(
     """
     steps: list[dict[str, Any]] = [
         {
+            "id": step_id(footprint),
             "contact": footprint.sole,
             "character": footprint.character,
             "frame_start": round(float(footprint.start_frame), 3),

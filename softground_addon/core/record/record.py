@@ -7,17 +7,31 @@ import json
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import edits as step_edits
 from .footprint_arrays import from_arrays, to_parts
 from .footprints import Footprint
 
-FORMAT = 1
-"""Version of the bytes' layout."""
+FORMAT = 2
+"""Version of the bytes' layout. Who raises it adds to `MIGRATIONS` what lifts the version before."""
+
+Layout = tuple[dict[str, Any], dict[str, NDArray[Any]]]
+"""The JSON text and the arrays of a record."""
+
+
+def _with_edits(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Layout:
+    return text | {"edits": step_edits.to_json({})}, arrays
+
+
+MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {1: _with_edits}
+"""What lifts a layout of a version to the next. Version 1 had no edits."""
 
 _TEXT = "record.json"
 _DAMAGE = (
@@ -33,12 +47,42 @@ TAIL = 2048
 _FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
 
 
-def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
-    """The footprints and what is known about them (numbers and texts, for JSON) as bytes."""
-    names, arrays = to_parts(footprints)
+@dataclass(frozen=True)
+class BakeRecord:
+    """What a bake leaves: from it the ground at any frame is made again without simulating.
+
+    Attributes
+    ----------
+    footprints : sequence of Footprint
+        As they were baked.
+    about : mapping
+        What is known about them: numbers and texts, for JSON.
+    edits : mapping of step id to StepEdit
+        What the artist changed of them.
+    """
+
+    footprints: Sequence[Footprint]
+    about: Mapping[str, Any]
+    edits: Mapping[str, step_edits.StepEdit] = field(default_factory=dict)
+
+    @property
+    def edited(self) -> list[Footprint]:
+        """The footprints as the artist left them: those that the ground is made from."""
+        return step_edits.edited(self.footprints, self.edits)
+
+
+def dump(record: BakeRecord) -> bytes:
+    """The record as bytes: equal records give equal bytes."""
+    names, arrays = to_parts(record.footprints)
+    content = {
+        "format": FORMAT,
+        "footprints": names,
+        "about": dict(record.about),
+        "edits": step_edits.to_json(record.edits),
+    }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        text = json.dumps({"format": FORMAT, "footprints": names, "about": dict(about)}, ensure_ascii=False)
+        text = json.dumps(content, ensure_ascii=False)
         archive.writestr(zipfile.ZipInfo(_TEXT, _FIXED_DATE), text, zipfile.ZIP_DEFLATED)
         for key, array in arrays.items():
             kind: np.dtype[Any] = np.dtype(array.kind)
@@ -53,30 +97,35 @@ def dump(footprints: Sequence[Footprint], about: Mapping[str, object]) -> bytes:
     return buffer.getvalue()
 
 
-def load(record: bytes) -> tuple[list[Footprint], dict[str, object]]:
-    """The footprints and what is known about them, from `dump`.
+def load(content: bytes) -> BakeRecord:
+    """The record from what `dump` of this or an earlier version gave.
 
     Raises
     ------
     InputError
-        If the bytes are cut short, damaged, or of another version.
+        If the bytes are cut short, damaged, or of a later version.
     """
     try:
-        with zipfile.ZipFile(io.BytesIO(record)) as archive:
-            content = json.loads(archive.read(_TEXT))
-            if content["format"] != FORMAT:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            text = json.loads(archive.read(_TEXT))
+            version = text["format"]
+            if version != FORMAT and version not in MIGRATIONS:
                 raise InputError(
-                    f"The stored record of the footprints is of version {content['format']}; this SoftGround reads "
-                    f"version {FORMAT}: bake again, or update SoftGround."
+                    f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
+                    f"to {FORMAT}: bake again, or update SoftGround."
                 )
-            names, about = content["footprints"], dict(content["about"])
             arrays = {
                 name.removesuffix(".npy"): np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
                 for name in archive.namelist()
                 if name.endswith(".npy")
             }
+        for older in range(version, FORMAT):
+            text, arrays = MIGRATIONS[older](text, arrays)
+        names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
     except _DAMAGE as error:
         raise InputError(
             f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
         ) from None
-    return from_arrays(names, arrays), about
+    return BakeRecord(
+        from_arrays(names, arrays), about, step_edits.from_json(edits, "The stored record's edits of steps")
+    )

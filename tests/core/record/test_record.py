@@ -1,0 +1,159 @@
+"""Records come back as they went in, those of earlier versions too, and with what the artist changed of the steps."""
+
+import io
+import json
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softground_addon.core.errors import InputError
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit, edit_of, from_json, step_id, to_json
+from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.record import BakeRecord
+from tests.core.walkers import pressed, walk
+
+VERSION_1 = Path(__file__).with_name("version_1.record")
+"""A record of one footprint, as the first version of the format has stored it."""
+
+
+@pytest.fixture(scope="module")
+def footprints():
+    return pressed(walk(steps=4), GroundMaterial(0.3e6, 0.35, 0.15))[1]
+
+
+def with_text(content, **changes):
+    """The record with other values in its text."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(buffer, "w") as target:
+        for name in source.namelist():
+            member = source.read(name)
+            if name == "record.json":
+                member = json.dumps(json.loads(member) | changes)
+            target.writestr(name, member)
+    return buffer.getvalue()
+
+
+def test_a_record_of_version_1_loads_and_is_stored_as_the_newest():
+    old = VERSION_1.read_bytes()
+    loaded = record.load(old + bytes(-len(old) % 4))
+    (footprint,) = loaded.footprints
+    assert (footprint.character, footprint.sole, footprint.start_frame) == ("Wälker", "foot.L", 3.0)
+    assert footprint.load_n.tolist() == [300.0, 700.0, 20.0]
+    compressed, rim = recompose(loaded.footprints).volumes()
+    assert (compressed, rim) == pytest.approx((140_000_000 * 2.0**-30 * 1e-4, 10_000_000 * 2.0**-30 * 1e-4))
+    assert loaded.about == {"inputs": {"material": {"blur_sigma": 0.006}}, "input_hash": "0"}
+    assert loaded.edits == {}
+    again = record.load(record.dump(loaded))
+    assert again.about == loaded.about
+    np.testing.assert_array_equal(again.footprints[0].compression.amounts, footprint.compression.amounts)
+
+
+def test_there_is_a_migration_from_each_earlier_version():
+    assert sorted(record.MIGRATIONS) == list(range(1, record.FORMAT))
+
+
+@pytest.mark.parametrize("version", [0, record.FORMAT + 1, "2", None])
+def test_a_record_of_an_unknown_version_is_refused_with_what_to_do(version):
+    stored = with_text(record.dump(BakeRecord([], {})), format=version)
+    with pytest.raises(InputError, match=f"version {version}.*update SoftGround"):
+        record.load(stored)
+
+
+def test_edits_come_back_beside_the_footprints(footprints):
+    edits = {
+        step_id(footprints[0]): StepEdit(mute=True),
+        step_id(footprints[1]): StepEdit(strength=0.5, move_m=(0.1, -0.2), turn_deg=12.5),
+    }
+    loaded = record.load(record.dump(BakeRecord(footprints, {"cell_size": 0.01}, edits)))
+    assert loaded.edits == edits
+    assert len(loaded.footprints) == len(footprints)
+    assert record.dump(loaded) == record.dump(BakeRecord(footprints, {"cell_size": 0.01}, edits))
+
+
+@pytest.mark.parametrize("edits", [None, [], {"schema_version": 1}, {"schema_version": 1, "steps": {"A/b@1": 3}}])
+def test_a_record_with_forged_edits_is_refused(edits):
+    with pytest.raises(InputError, match="edits of steps"):
+        record.load(with_text(record.dump(BakeRecord([], {})), edits=edits))
+
+
+def test_the_ground_is_made_without_a_muted_step(footprints):
+    left = BakeRecord(footprints, {}, {step_id(footprints[1]): StepEdit(mute=True)})
+    assert left.edited == [footprints[0], *footprints[2:]]
+    before, after, muted = (recompose(prints).volumes() for prints in (footprints, left.edited, footprints[1:2]))
+    np.testing.assert_allclose(after, np.subtract(before, muted), rtol=1e-9)
+
+
+def test_each_step_has_an_id_of_its_own(footprints):
+    assert len({step_id(footprint) for footprint in footprints}) == len(footprints) > 3
+
+
+def moved(footprint, by, longer=0.0):
+    return replace(footprint, start_frame=footprint.start_frame + by, end_frame=footprint.end_frame + by + longer)
+
+
+def test_an_edit_stays_with_its_step_through_a_bake_with_small_changes(footprints):
+    edits = {step_id(footprint): StepEdit(strength=0.1 * n) for n, footprint in enumerate(footprints)}
+    for n, footprint in enumerate(footprints):
+        half = (footprint.end_frame - footprint.start_frame) / 2
+        assert half >= 5.0
+        for changed in (moved(footprint, 4.0), moved(footprint, -4.0), moved(footprint, 0.0, longer=half)):
+            assert edit_of(changed, edits) == StepEdit(strength=0.1 * n)
+    # without the first step all others keep theirs, where numbers in a row would not
+    assert [edit_of(footprint, edits).strength for footprint in footprints[1:]] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_an_edit_belongs_to_no_other_character_sole_or_time(footprints):
+    (footprint,) = footprints[:1]
+    edits = {step_id(footprint): StepEdit(mute=True)}
+    assert edit_of(replace(footprint, character="other"), edits) == StepEdit()
+    assert edit_of(replace(footprint, sole="other"), edits) == StepEdit()
+    assert edit_of(moved(footprint, footprint.end_frame - footprint.start_frame + 1.0), edits) == StepEdit()
+
+
+def test_names_with_the_ids_own_marks_make_no_confusion(footprints):
+    odd = replace(footprints[0], character="A/b@3", sole="c@1/d")
+    edits = from_json(to_json({step_id(odd): StepEdit(mute=True)}), "Edits")
+    assert edit_of(odd, edits).mute
+    assert not edit_of(replace(footprints[0], character="A", sole="b"), edits).mute
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        ({"muted": True}, "unknown field 'muted'. Known are: mute, strength, move_m, turn_deg"),
+        ({"mute": 1}, "'mute' is 1"),
+        ({"strength": -0.1}, "'strength' is -0.1"),
+        ({"strength": float("nan")}, "'strength' is nan"),
+        ({"strength": True}, "'strength' is True"),
+        ({"move_m": [1.0]}, "'move_m' is"),
+        ({"move_m": [1.0, 1e9]}, "'move_m' is"),
+        ({"turn_deg": "90"}, "'turn_deg' is '90'"),
+        ([], "must be a table"),
+    ],
+)
+def test_an_edit_that_cannot_be_meant_is_named(step, said):
+    with pytest.raises(InputError) as refused:
+        from_json({"schema_version": 1, "steps": {"Walker/foot.L@7.0": step}}, "edits.json")
+    assert "edits.json, step 'Walker/foot.L@7.0'" in str(refused.value)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ([], "must be a table"),
+        ({"steps": {}}, "version None"),
+        ({"schema_version": 2, "steps": {}}, "version 2"),
+        ({"schema_version": 1, "steps": {}, "more": 1}, "unknown field 'more'"),
+        ({"schema_version": 1, "steps": {"Walker": {}}}, "no step's id"),
+        ({"schema_version": 1, "steps": {"Walker/foot.L@nan": {}}}, "no step's id"),
+    ],
+)
+def test_edits_that_are_none_are_refused(content, said):
+    with pytest.raises(InputError, match=said):
+        from_json(content, "edits.json")
