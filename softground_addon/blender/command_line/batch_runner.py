@@ -9,13 +9,12 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import queue
 import shlex
 import subprocess
-import threading
+import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -42,8 +41,8 @@ ALGEBRA_THREADS = "OPENBLAS_NUM_THREADS"
 """What tells numpy's linear algebra how many threads to use. One in each worker is as fast, leaves the other processors
 to other shots, and gives the same bits however many jobs there are."""
 
-POLL = 0.25
-"""Longest time between two looks at signals and deadlines [s]."""
+POLL = 0.05
+"""Time between two looks at the workers [s]."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +130,8 @@ class _Worker:
     attempt: int
     spent: float
     lock: IO[bytes]
+    printed: IO[bytes]
+    log: IO[bytes]
     started: float
     totals: dict[str, Any] = field(default_factory=dict)
     message: str = ""
@@ -139,6 +140,25 @@ class _Worker:
     @property
     def seconds(self) -> float:
         return self.spent + time.monotonic() - self.started
+
+    def lines(self) -> Iterator[bytes]:
+        """What it has printed since the last time, in whole lines unless it has ended; all but progress is logged."""
+        has_ended = self.process.poll() is not None
+        while line := self.printed.readline():
+            if not (line.endswith(b"\n") or has_ended):
+                self.printed.seek(-len(line), os.SEEK_CUR)
+                return
+            with contextlib.suppress(OSError):  # a full disk must not stop the batch
+                if not line.startswith(b"{"):
+                    self.log.write(line)
+            yield line
+
+    def close(self) -> None:
+        """Log what it has printed last, and leave the files to others."""
+        deque(self.lines(), maxlen=0)
+        for file in (self.printed, self.log):
+            with contextlib.suppress(OSError):
+                file.close()
 
 
 def run(
@@ -176,20 +196,23 @@ class _Batch:
         self._show = show
         self._running: dict[str, _Worker] = {}
         self._outcomes: dict[str, Outcome] = {}
-        self._lines: queue.Queue[tuple[_Worker, bytes | None]] = queue.Queue()
 
     def run(self, shots: Sequence[BatchShot]) -> list[Outcome]:
         waiting = deque(shots)
-        try:
-            while waiting or self._running:
-                while waiting and len(self._running) < self._jobs:
-                    self._begin(waiting.popleft())
-                self._follow()
-        except KeyboardInterrupt:
-            for worker in list(self._running.values()):
-                self._end(Outcome(worker.shot, "interrupted", worker.attempt, worker.seconds))
-        finally:
-            self._stop_workers()
+        with tempfile.TemporaryDirectory(prefix="softground-") as folder:
+            self._printed = Path(folder)
+            try:
+                while waiting or self._running:
+                    while waiting and len(self._running) < self._jobs:
+                        self._begin(waiting.popleft())
+                    for worker in list(self._running.values()):
+                        self._follow(worker)
+                    time.sleep(POLL)
+            except KeyboardInterrupt:
+                for worker in list(self._running.values()):
+                    self._end(Outcome(worker.shot, "interrupted", worker.attempt, worker.seconds))
+            finally:
+                self._stop_workers()
         return [self._outcomes.get(shot.name, Outcome(shot, "interrupted")) for shot in shots]
 
     def _begin(self, shot: BatchShot, attempt: int = 1, spent: float = 0.0, lock: IO[bytes] | None = None) -> None:
@@ -209,15 +232,16 @@ class _Batch:
                 shot.file,
                 [*shot.options, "--progress=json", f"--receipt={place.receipt(shot)}", f"--parent={os.getpid()}"],
             )
-            log = place.log(shot).open("ab" if attempt > 1 else "wb")
+            log = place.log(shot).open("ab" if attempt > 1 else "wb", buffering=0)
             log.write(f"$ {shlex.join(command)}\n".encode())
-            log.flush()
+            output = (self._printed / shot.name).open("wb")  # no pipe: it would have to be emptied all the time
+            printed = (self._printed / shot.name).open("rb")
             inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # who outlives us keeps the lock
             started = time.monotonic()
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
+                stdout=output,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C comes to us alone, and we pass it on
                 env={ALGEBRA_THREADS: "1", **os.environ},
@@ -228,9 +252,8 @@ class _Batch:
                 lock.close()
             self._end(Outcome(shot, "refused", attempt - 1, spent, message=f"{error.filename}: {error.strerror}"))
             return
-        worker = _Worker(shot, process, attempt, spent, lock, started)
-        self._running[shot.name] = worker
-        threading.Thread(target=self._read, args=(worker, log), daemon=True).start()
+        output.close()
+        self._running[shot.name] = _Worker(shot, process, attempt, spent, lock, printed, log, started)
 
     def _totals_if_done(self, shot: BatchShot) -> dict[str, Any] | None:
         place = self._workplace
@@ -238,30 +261,19 @@ class _Batch:
             place.receipt(shot), made_by=place.made_by, options=shot.options, source=shot.file, outputs=shot.outputs
         )
 
-    def _read(self, worker: _Worker, log: IO[bytes]) -> None:
-        assert worker.process.stdout is not None
-        with log, worker.process.stdout as lines:
-            for line in lines:
-                with contextlib.suppress(OSError):  # a full disk must not stop the worker at a full pipe
-                    if not line.startswith(b"{"):
-                        log.write(line)
-                        log.flush()
-                self._lines.put((worker, line))
-        self._lines.put((worker, None))
-
-    def _follow(self) -> None:
-        """Take one line of a worker, or notice that it has ended or takes too long."""
-        self._end_the_late()
-        try:
-            worker, line = self._lines.get(timeout=POLL)
-        except queue.Empty:
-            return
-        if line is None:
+    def _follow(self, worker: _Worker) -> None:
+        """Take what a worker has printed, and notice that it has ended or takes too long."""
+        if self._timeout and time.monotonic() - worker.started > self._timeout:
+            worker.timed_out = True
+            worker.process.kill()
+        has_ended = worker.process.poll() is not None
+        for line in worker.lines():
+            if line.startswith(b"{"):
+                self._progress(worker, line)
+            elif line.startswith(b"softground: "):
+                worker.message = line.decode(errors="replace").strip().removeprefix("softground: ")
+        if has_ended:
             self._ended(worker)
-        elif line.startswith(b"{"):
-            self._progress(worker, line)
-        elif line.startswith(b"softground: "):
-            worker.message = line.decode(errors="replace").strip().removeprefix("softground: ")
 
     def _progress(self, worker: _Worker, line: bytes) -> None:
         try:
@@ -274,14 +286,9 @@ class _Batch:
         left = passed * (1.0 - fraction) / max(fraction, 0.01)
         self._show(Step(worker.shot, stage, fraction, left))
 
-    def _end_the_late(self) -> None:
-        for worker in self._running.values():
-            if self._timeout and time.monotonic() - worker.started > self._timeout:
-                worker.timed_out = True
-                worker.process.kill()
-
     def _ended(self, worker: _Worker) -> None:
         code = worker.process.wait()
+        worker.close()
         del self._running[worker.shot.name]
         status = EXIT_MEANINGS.get(code, "crashed")
         if status == "crashed" and worker.attempt < ATTEMPTS:
@@ -310,6 +317,7 @@ class _Batch:
             except subprocess.TimeoutExpired:
                 worker.process.kill()
                 worker.process.wait()
+            worker.close()
             worker.lock.close()
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import _thread
 import argparse
 import contextlib
 import json
 import os
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +26,6 @@ from ..settings import user_folder
 from . import batch, cli_arguments
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
-
-PARENT_POLL = 0.5
-"""Time between two looks at whether the parent process is there [s]."""
 
 _INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -54,8 +49,7 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
         if options.command == "export":
             _export(options)
         else:
-            with _ending_with(options.parent):
-                _bake(options)
+            _bake(options)
     except SystemExit as leaving:  # argparse has printed its message
         return leaving.code if isinstance(leaving.code, int) else EXIT_BAD_INPUT
     except BakeError as error:
@@ -109,7 +103,7 @@ def _bake(options: argparse.Namespace) -> None:
         settings.assign(scene.softground, "cell_size", str(options.cell_size))
     for path, value in options.overrides:
         settings.assign(scene.softground, path, value)
-    show = _PROGRESS[options.progress]
+    show = _ending_with(options.parent, _PROGRESS[options.progress])
     result = jobs.run(bake_job.bake(scene, write=not options.dry_run), show)
     _write_results(options, target, result.report, read)
     if options.progress == "json":
@@ -140,26 +134,15 @@ def _export(options: argparse.Namespace) -> None:
         print(written, flush=True)
 
 
-@contextlib.contextmanager
-def _ending_with(parent: int) -> Iterator[None]:
-    """Interrupt the block when the parent process of that id has ended; 0 is none. Does nothing on Windows."""
-    over = threading.Event()
+def _ending_with(parent: int, show: Callable[[jobs.Progress], None]) -> Callable[[jobs.Progress], None]:
+    """Show progress while the parent process of that id lives, and end with it; 0 is none. Only shows on Windows."""
 
-    def watch() -> None:
-        while not over.wait(PARENT_POLL):
-            if os.getppid() != parent:
-                _thread.interrupt_main()
-                return
+    def shown(progress: jobs.Progress) -> None:
+        if parent and os.name == "posix" and os.getppid() != parent:
+            _interrupt(0, None)
+        show(progress)
 
-    watcher = threading.Thread(target=watch)
-    if parent and os.name == "posix":
-        watcher.start()
-    try:
-        yield
-    finally:
-        over.set()  # a thread that is left behind would hang Blender's exit
-        if watcher.ident:
-            watcher.join()
+    return shown
 
 
 def _files_read(options: argparse.Namespace) -> list[Path]:
