@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
-from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+from ..core.numerics.slices import Slices
 
 Result = TypeVar("Result")
 State = TypeVar("State")
 
 STAGES = {"sample": 6, "simulate": 3, "write": 1}
 """Stages in their order, and the share of the whole time that each takes about, in tenths."""
-
-PATIENCE = 0.005
-"""Longest wait for a computation that runs aside before its driver gets to do something else [s]."""
-
-SWITCH = 5e-4
-"""Longest wait of Blender's own thread for Python while a computation runs aside [s]: it needs it for each panel that
-it draws."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +41,6 @@ class Progress:
 
 Job = Generator[Progress, None, Result]
 
-_waited_for: ContextVar[bool] = ContextVar("waited_for", default=False)
-"""Whether jobs are driven by someone who has nothing else to do before their end."""
-
 
 class _Watched(Generic[State, Result]):
     """A generator that a loop can go through and that tells its result afterwards."""
@@ -66,15 +55,12 @@ class _Watched(Generic[State, Result]):
 
 
 def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Result:
-    """Drive a job to its end, in this thread alone."""
-    watched = _Watched(job)
-    before = _waited_for.set(True)
-    try:
-        for progress in watched:
-            if show:
-                show(progress)
-    finally:
-        _waited_for.reset(before)
+    """Drive a job to its end, and show each progress that it makes."""
+    watched, shown = _Watched(job), None
+    for progress in watched:
+        if show and progress != shown:
+            show(progress)
+            shown = progress
     return watched.result
 
 
@@ -101,26 +87,12 @@ def counted(
     return watched.result
 
 
-def aside(stage: str, fraction: float, function: Callable[..., Result], *arguments: object) -> Job[Result]:
-    """Compute something that knows nothing of Blender in a thread of its own, so that Blender goes on answering.
-
-    Where the driver is `run`, nobody waits for an answer: it is computed in place.
-    """
-    return (yield from meanwhile(Progress(stage, fraction), function, *arguments))
-
-
-def meanwhile(state: State, function: Callable[..., Result], *arguments: object) -> Generator[State, None, Result]:
-    """What `aside` does, for generators that yield something else than their progress: the same over and over."""
-    if _waited_for.get():  # memory that one thread frees is of little use to another
+def meanwhile(state: State, slices: Slices[Result]) -> Generator[State, None, Result]:
+    """A computation that knows nothing of Blender, in slices; before each, the driver is told the same state."""
+    while True:
         yield state
-        return function(*arguments)
-    patience = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH)
-    try:
-        with ThreadPoolExecutor(1) as thread:
-            outcome = thread.submit(function, *arguments)
-            while not wait([outcome], timeout=PATIENCE).done:
-                yield state
-        return outcome.result()
-    finally:
-        sys.setswitchinterval(patience)
+        try:
+            next(slices)
+        except StopIteration as end:
+            result: Result = end.value
+            return result

@@ -14,6 +14,7 @@ from .loads.missed_steps import advice, missed_steps
 from .motion.motion import CharacterMotion, SoleMotion
 from .motion.props import posed
 from .numerics.cell_keys import Keys, cells_at, cells_of, keys_of
+from .numerics.slices import Slices, sliced
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -102,7 +103,8 @@ class GroundPlan:
         return cells_of(np.unique(cells_at(self.footfalls, side)[:, None] + disc)), level
 
 
-def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
+@sliced
+def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
     """The plane under the lowest positions of the soles, with a margin around all of their paths.
 
     It is level, unless the soles stand on a slope.
@@ -114,7 +116,10 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
     lengths = [sole.sole.length for _, sole in soles]
     slope = _slope([motion for motion in motions if motion.centre is None])
     low = float(np.median([_standing_height(motion, sole, slope) for motion in motions for sole in _feet(motion)]))
-    contacts = [detect_contacts(motion, _terrain(low, slope)) for motion in motions]
+    contacts = []
+    for motion in motions:
+        yield
+        contacts.append(detect_contacts(motion, _terrain(low, slope)))
     floats = [
         offset
         for motion, found in zip(motions, contacts, strict=True)
@@ -123,13 +128,15 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> GroundPlan:
     ]
     height = low + (float(np.median(floats)) if floats else 0.0)
     raster = min(lengths) / POINTS_ALONG_SOLE
-    footfalls = [
-        _places_under_prop(sole, _terrain(height, slope), raster)
-        if sole.sole.prop
-        else _places_under(sole, touching, _terrain(low + offset, slope), raster)
-        for motion, found in zip(motions, contacts, strict=True)
-        for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True)
-    ]
+    footfalls = []
+    for motion, found in zip(motions, contacts, strict=True):
+        for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True):
+            yield
+            if sole.sole.prop:
+                footfalls.append(_places_under_prop(sole, _terrain(height, slope), raster))
+            else:
+                footfalls.append(_places_under(sole, touching, _terrain(low + offset, slope), raster))
+    yield
     missed = [(motion.name, missed_steps(motion, found)) for motion, found in zip(motions, contacts, strict=True)]
     margin = MARGIN * max(lengths)
     return GroundPlan(

@@ -94,7 +94,7 @@ def test_vertices_move_along_world_z_whatever_the_objects_transform(scene, trans
         expected = before.copy()
         expected[index, 2] += change
         assert np.allclose(world(ground, key), expected, atol=1e-5)
-    height = ground_mesh.undisturbed_surface(ground, 1.0).terrain().heights(before[:, 0], before[:, 1])
+    height = ground_mesh.terrain_of(ground_mesh.undisturbed_surface(ground, 1.0)).heights(before[:, 0], before[:, 1])
     inside = np.isfinite(height)
     assert inside.mean() > 0.9
     assert np.allclose(height[inside], before[inside, 2], atol=1e-5)

@@ -1,50 +1,105 @@
-"""Jobs compute aside where Blender has to answer meanwhile, and in place where it does not."""
+"""Jobs compute in slices, so that Blender answers between them."""
 
-import threading
+import ast
+import time
+from pathlib import Path
 
+import bpy
 import pytest
 
-from softground_addon.blender.jobs import Progress, aside, run
+from softground_addon.blender.baking import bake_job
+from softground_addon.blender.jobs import Progress, meanwhile, run
+from softground_addon.core.numerics.slices import sliced
+from tests.blender.shots import walker
+
+ADDON = Path(__file__).parents[2] / "softground_addon"
+
+LONGEST_STEP = 0.1
+"""Longest time that a step of a bake may take of the processor [s]."""
+
+NOW = Progress("write", 0.5)
 
 
-def job():
-    return (yield from aside("write", 0.5, threading.get_ident))
+@sliced
+def halved(number):
+    while number > 1:
+        yield
+        number /= 2
+    return number
 
 
-def stepped(work):
-    """The result of a job that is driven step by step, between other things."""
-    try:
-        while True:
-            next(work)
-    except StopIteration as end:
-        return end.value
+def test_a_job_comes_back_before_each_slice_and_ends_with_the_result():
+    assert list(meanwhile(NOW, halved.slices(8))) == [NOW] * 4
+    assert run(meanwhile(NOW, halved.slices(8))) == halved(8) == 1
 
 
-def test_a_job_that_is_waited_for_computes_in_place():
+def test_whoever_waits_is_shown_each_progress_once():
+    def job():
+        yield Progress("sample", 1.0)
+        return (yield from meanwhile(NOW, halved.slices(8)))
+
     shown = []
-    assert run(job(), shown.append) == threading.get_ident()
-    assert shown == [Progress("write", 0.5)]
+    run(job(), shown.append)
+    assert shown == [Progress("sample", 1.0), NOW]
 
 
-def test_a_job_that_is_driven_between_other_things_computes_in_a_thread_of_its_own():
-    assert stepped(job()) != threading.get_ident()
+def test_what_goes_wrong_in_a_slice_is_told():
+    @sliced
+    def failing():
+        yield
+        return 1 / 0
 
-
-def test_a_job_that_is_waited_for_within_another_leaves_that_as_it_is():
-    def outer():
-        within = run(job())
-        return within, (yield from job())
-
-    within, after = stepped(outer())
-    assert within == threading.get_ident() != after
-
-
-def failing():
-    yield from aside("write", 0.5, lambda: 1 / 0)
-
-
-@pytest.mark.parametrize("drive", [run, stepped])
-def test_what_goes_wrong_in_a_computation_is_told(drive):
     with pytest.raises(ZeroDivisionError):
-        drive(failing())
-    assert stepped(job()) != threading.get_ident()
+        run(meanwhile(NOW, failing.slices()))
+    with pytest.raises(ZeroDivisionError):
+        failing()
+
+
+def imports(path):
+    """Names of the modules that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module
+
+
+def test_nothing_starts_a_thread():
+    """Blender does not support threads in extensions ("Python Threads are Not Supported" in its reference)."""
+    starts_threads = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
+    modules = [path for path in ADDON.rglob("*.py") if starts_threads & {name.split(".")[0] for name in imports(path)}]
+    assert modules == []
+
+
+def steps_of(job):
+    """What each step of a job takes of the processor [s], the longest first, each with how far it came."""
+    steps, progress, began = [], None, time.thread_time()
+    for progress in job:
+        steps.append((time.thread_time() - began, progress))
+        began = time.thread_time()
+    return sorted([*steps, (time.thread_time() - began, progress)], key=lambda step: -step[0])
+
+
+def create_plane():
+    bpy.ops.mesh.primitive_plane_add(size=40.0)
+
+
+def create_grid():
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=250, size=1.0, location=(9.0, 0.0, 0.0))
+    bpy.context.object.scale = (24.0, 4.0, 1.0)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("create", [None, create_plane, create_grid])
+def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
+    walker(scene, frames=250, coarseness=1.0)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    if create:
+        create()
+        options.ground = bpy.context.object
+        options.tilt.use = options.grounding.use = True
+        bpy.context.view_layer.update()
+    steps = steps_of(bake_job.bake(scene))
+    assert options.frame_end == 250
+    assert steps[0][0] < LONGEST_STEP, steps[:5]

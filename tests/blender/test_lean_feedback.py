@@ -16,11 +16,11 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
     leaning, responses_of = response_job.leaning, response_job.responses_of
 
     def watched(*arguments):
-        leans.append(leaning(*arguments))
+        leans.append((yield from leaning(*arguments)))
         return leans[-1]
 
     def kept(*arguments):
-        answers.extend(responses_of(*arguments))
+        answers.extend((yield from responses_of(*arguments)))
         return answers
 
     monkeypatch.setattr(response_job, "leaning", watched)

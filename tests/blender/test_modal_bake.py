@@ -56,8 +56,7 @@ def states_left(scene):
 
 
 @pytest.mark.parametrize(("ground", "again"), [("created", False), ("coarse", False), ("coarse", True), ("fine", True)])
-def test_a_bake_left_in_any_state_leaves_the_file_as_it_was(scene, ground, again, monkeypatch):
-    monkeypatch.setattr(jobs, "PATIENCE", 0.0)  # be told of what is computed aside however fast it is
+def test_a_bake_left_in_any_state_leaves_the_file_as_it_was(scene, ground, again):
     prepare(scene, ground)
     if again:
         jobs.run(bake_job.bake(scene))

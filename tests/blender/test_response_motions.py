@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground.ground_mesh import undisturbed_surface
+from softground_addon.blender.ground.ground_mesh import terrain_of, undisturbed_surface
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
@@ -86,7 +86,7 @@ def test_standing_soles_lie_on_the_ground_legs_reach_and_knees_do_not_flip(scene
     before = responders.legs(scene)
     result = responders.bake(scene, output="BOTH" if shape is None else "RESPONSE")
     ground = scene.softground.ground
-    terrain = undisturbed_surface(ground, 1.0).terrain() if shape else FlatTerrain(ground.matrix_world.translation.z)
+    terrain = terrain_of(undisturbed_surface(ground, 1.0)) if shape else FlatTerrain(ground.matrix_world.translation.z)
     gaps = np.abs(responders.gaps_on_the_rig(scene, result, terrain)) * 1e3
     after = responders.legs(scene)
     rate = scene.render.fps / scene.render.fps_base

@@ -13,7 +13,9 @@ from ...core.errors import BakeError, InputError
 from ...core.ground.material import GroundMaterial
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
+from ...core.numerics.slices import Slices, sliced
 from ...core.record.footprints import QUANTUM, Footprint
+from ..ground import ground_mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -58,7 +60,8 @@ class Coverage:
         return self.spacing > DETAIL_FROM * cell_size or self.missed > MOST_MISSED
 
 
-def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: float) -> Coverage:
+@sliced
+def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: float) -> Slices[Coverage]:
     """How densely vertices (V, 3), of which those in `index` are moved, lie where the ground is, or will be, printed.
 
     `printed` are the `cell_keys` of those cells, ascending, `cell_size` is in [m].
@@ -69,7 +72,14 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
     first = keys_at(vertices[index, :2] - cell_size / 2, cell_size)  # of the four whose centres are around a vertex
     vertices_in_cells = among(printed, first[:, None] + (0, 1, ROW, ROW + 1)).any(axis=1).sum()
     spacing = float(np.sqrt(len(cells) * cell_size**2 / max(1e-9, float(vertices_in_cells))))
-    blocks, crowd = np.unique(keys_at(vertices[:, :2], DETAIL_FROM * cell_size), return_counts=True)
+    counted = []
+    for part in ground_mesh.parts_of(vertices):
+        yield
+        counted.append(np.unique(keys_at(part[:, :2], DETAIL_FROM * cell_size), return_counts=True))
+    yield
+    some_blocks, some_crowds = map(np.concatenate, zip(*counted, strict=True))
+    blocks, which = np.unique(some_blocks, return_inverse=True)
+    crowd = np.bincount(which, some_crowds)
     under, share = np.unique(keys_of(cells // DETAIL_FROM), return_counts=True)
     around = under[:, None] + AROUND
     place = np.minimum(np.searchsorted(blocks, around), len(blocks) - 1)

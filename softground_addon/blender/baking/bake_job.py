@@ -34,7 +34,7 @@ from ..characters.character_setup import characters_of
 from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_warning
-from ..jobs import Job, Progress, aside
+from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
 from ..response import response_job
@@ -88,7 +88,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     movers = staleness.of_movers(scene)
     surface = shot.surface
     vertices = surface.vertices if surface else None
-    shot_hash = yield from aside("sample", 1.0, report.hash_inputs, shot.motions, vertices)
+    shot_hash = yield from meanwhile(Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, vertices))
     sampled = time.perf_counter()
 
     loads, footprints, forces, answers = yield from _press(scene, shot)
@@ -96,7 +96,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
 
     gaps = response_job.gap_table(answers)
     if gaps is None:
-        gaps = yield from aside("write", 0.0, response_job.gaps_left, loads, shot.motions, shot.terrain, footprints)
+        gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, footprints)
     layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
     inputs = bake_report.inputs_of(scene)
     if surface and surface.factors is not None:
@@ -189,9 +189,10 @@ def _write(
     footprints = left.edited
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        trail = yield from aside(
-            "write", 0.1, lambda: PressedGround.at(footprints, **at_the_end).trail(trail_detail.FLOOR)
-        )
+        pressed = yield from meanwhile(Progress("write", 0.1), PressedGround.at.slices(footprints, **at_the_end))
+        yield Progress("write", 0.1)
+        trail = pressed.trail(trail_detail.FLOOR)
+        del pressed
         warnings: list[str] = []
         if shot.surface is None:
             place = yield from _created(drafts, scene, shot, trail)
@@ -199,11 +200,10 @@ def _write(
         else:
             place, warnings = yield from _given(drafts, scene, shot, shot.surface, trail, sole_length)
         del trail
-        stored = yield from aside("write", 0.5, record.dump, left)
+        stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
         x, y = place.position[:, 0], place.position[:, 1]
-        sample = yield from aside("write", 0.6, partial(sample_at, footprints, x, y, **at_the_end))
-        over_time = partial(
-            playback_curves_at,
+        sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **at_the_end))
+        over_time = playback_curves_at.slices(
             footprints,
             x,
             y,
@@ -211,10 +211,11 @@ def _write(
             frame_rate=frame_rate,
             time_stretch=settings.time_stretch_of(scene),  # nodes count the animation's frames
         )
-        spans, lines = yield from aside("write", 0.7, over_time)
+        spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
         table = drafts.enter_context(playback.keyframe_tables(lines))
         del lines  # they are large, and all is in the table
-        marks = yield from aside("write", 0.8, _tread, footprints, place.position, options.tread)
+        yield Progress("write", 0.8)
+        marks = _tread(footprints, place.position, options.tread)
         yield Progress("write", 0.9)
         carrier = yield from baked_ground.write(
             place,
@@ -237,8 +238,10 @@ def _write(
 def _created(drafts: ExitStack, scene: bpy.types.Scene, shot: Shot, trail: Trail) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
     options, cell_size = scene.softground, settings.cell_size_of(scene)
-    lay_out = partial(created_ground.lay_out, reach=created_ground.reach_for(scene))
-    layout = yield from aside("write", 0.2, lay_out, shot.plan, cell_size, scene.unit_settings.scale_length)
+    reach = created_ground.reach_for(scene)
+    yield Progress("write", 0.2)
+    layout = created_ground.lay_out(shot.plan, cell_size, scene.unit_settings.scale_length, reach=reach)
+    yield Progress("write", 0.3)
     drafts.enter_context(drafted(options.material.surface))
     yield Progress("write", 0.3)
     ground = drafts.enter_context(created_ground.draft(layout))
@@ -257,8 +260,10 @@ def _given(
     """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; warnings."""
     options, cell_size = scene.softground, settings.cell_size_of(scene)
     ground, vertices = options.ground, surface.vertices
-    index = yield from aside("write", 0.2, ground_mesh.pressed_vertices, vertices, trail, shot.terrain)
-    cover = yield from aside("write", 0.2, coverage, vertices, index, trail.printed, cell_size)
+    index = yield from meanwhile(
+        Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
+    )
+    cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
     warnings = coverage_warnings(ground, cover, options.detail, cell_size)
     if not wants_detail(ground, cover, options.detail, cell_size, sole_length):
         unit_scale = scene.unit_settings.scale_length
@@ -266,12 +271,16 @@ def _given(
             return baked_ground.on_itself(ground, index, vertices), warnings
         warnings = [*warnings, undone_warning(ground)]
     coarse = trail_detail.surface_of(ground, scene.unit_settings.scale_length)
-    refinement = yield from aside("write", 0.3, refine, coarse, Region(trail.moved, cell_size), cell_size)
+    refinement = yield from meanwhile(
+        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), cell_size)
+    )
     draft = drafts.enter_context(trail_detail.draft(ground, coarse, refinement))
     yield Progress("write", 0.4)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
-    index = yield from aside("write", 0.4, ground_mesh.pressed_vertices, vertices, trail, shot.terrain)
+    index = yield from meanwhile(
+        Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
+    )
     return baked_ground.on_detail(ground, draft, index, vertices), [*warnings, *copy_warnings(ground)]
 
 
@@ -295,19 +304,20 @@ def _press(
     asked = response_job.options_of(scene)
     if asked:
         response_job.check_characters(characters)
-    standing = response_job.standing_on(shot.motions, shot.terrain, asked)
+    standing = yield from response_job.standing_on(shot.motions, shot.terrain, asked)
     loads = yield from estimate_shot(scene, replace(shot, motions=standing))
     footprints, forces = yield from _simulate(scene, shot, loads)
     leaning = None
     for _ in range(response_job.LEAN_PASSES):
         before = leaning
-        leaning = response_job.leaning(loads, standing, shot.terrain, footprints, asked)
+        leaning = yield from response_job.leaning(loads, standing, shot.terrain, footprints, asked)
         if not response_job.leans_anew(leaning, before):
             break
         loads = yield from estimate_shot(scene, replace(shot, motions=leaning.motions))
         footprints, forces = yield from _simulate(scene, shot, loads)
     check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
-    return loads, footprints, forces, response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
+    answers = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
+    return loads, footprints, forces, answers
 
 
 def _simulate(

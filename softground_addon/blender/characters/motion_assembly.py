@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import bpy
 import numpy as np
@@ -25,7 +24,6 @@ from ...core.soles.foot_attitude import (
     standing_up,
 )
 from ...core.soles.soles import PlacedSole, prop_sole
-from ..jobs import meanwhile
 from ..settings import frame_rate_of, gravity_of
 from .rig_at_rest import RestPose
 from .rig_mapping import RigMapping, SoleSource
@@ -131,11 +129,10 @@ def assemble_motion(
     sizes = _evened(sizes, feet, planted)
     motions: dict[str, SoleMotion] = {}
     for foot, flat, size in zip(feet, flats, sizes, strict=True):
-        shape = partial(foot_sole, has_toes=foot.ball is not None, mirrored=rest.is_mirrored)
-        mesh = meshes.get(foot.source.name)
-        placed = yield from meanwhile(len(recording.frames), shape, foot.source, flat, size, mesh)
+        has_toes, mesh = foot.ball is not None, meshes.get(foot.source.name)
+        placed = foot_sole(foot.source, flat, size, mesh, has_toes=has_toes, mirrored=rest.is_mirrored)
         motions[foot.source.name] = foot.motion_of(placed, flat)
-    yield len(recording.frames)
+        yield len(recording.frames)
     motions.update(_limb_motions(scene, mapping, recording, rest))
     motions.update(carried)
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
+from ...core.numerics.slices import Slices, sliced
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
@@ -72,17 +73,33 @@ class GroundSurface:
     triangles: Indices
     factors: Array | None = None
 
-    def terrain(self, bounds: Array | None = None) -> MeshTerrain:
-        """The surface as a function of place, within bounds in the plane [m]."""
-        name = f"Ground '{self.name}'"
-        return MeshTerrain.from_mesh(self.surface_vertices, self.triangles, bounds, self.factors, name=name)
+
+@sliced
+def terrain_of(surface: GroundSurface, bounds: Array | None = None) -> Slices[MeshTerrain]:
+    """A ground's surface as a function of place, within bounds in the plane [m]."""
+    mesh, name = (surface.surface_vertices, surface.triangles), f"Ground '{surface.name}'"
+    return (yield from MeshTerrain.from_mesh.slices(*mesh, bounds, surface.factors, name=name))
 
 
-def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Indices:
+AT_ONCE = 1 << 17
+"""Vertices that are looked at together: of a large ground in a hundredth of a second."""
+
+
+def parts_of(vertices: Array) -> list[Array]:
+    """Vertices (V, 3) in parts that are looked at together; at least one."""
+    return np.split(vertices, range(AT_ONCE, len(vertices), AT_ONCE))
+
+
+@sliced
+def pressed_vertices(vertices: Array, trail: Trail, terrain: Terrain) -> Slices[Indices]:
     """Which of the vertices (V, 3) lie on top of the surface where the ground may have changed, (K,)."""
-    near = np.flatnonzero(trail.covers(vertices[:, 0], vertices[:, 1]))
-    x, y, z = vertices[near].T
-    return near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE]
+    pressed = []
+    for number, part in enumerate(parts_of(vertices)):
+        near = np.flatnonzero(trail.covers(part[:, 0], part[:, 1]))
+        yield
+        x, y, z = part[near].T
+        pressed.append(number * AT_ONCE + near[np.abs(z - terrain.heights(x, y)) < ON_SURFACE])
+    return np.concatenate(pressed)
 
 
 def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:

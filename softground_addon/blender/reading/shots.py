@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import bpy
 import numpy as np
@@ -24,7 +23,7 @@ from ..characters.prop_extraction import check_things
 from ..characters.rig_sampling import sample_character, sample_thing
 from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
-from ..jobs import Job, Progress, aside, counted
+from ..jobs import Job, Progress, counted, meanwhile
 from ..properties import SoftGroundCharacter
 
 Array = NDArray[np.float64]
@@ -70,13 +69,14 @@ def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
     characters = characters_of(scene)
     check_settings(scene, characters)
     motions = yield from sample_characters(scene, characters)
-    plan = yield from aside("sample", 1.0, plan_ground, motions)
+    plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
     if options.ground is None:
         return Shot(tuple(motions), plan, None, plan.terrain)
     painted = painted_ground.names_of(scene)
     surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
     yield Progress("sample", 1.0)
-    terrain = yield from aside("sample", 1.0, surface.terrain, np.stack([plan.lower, plan.upper]))
+    work = ground_mesh.terrain_of.slices(surface, np.stack([plan.lower, plan.upper]))
+    terrain = yield from meanwhile(Progress("sample", 1.0), work)
     return Shot(tuple(motions), plan, surface, terrain)
 
 
@@ -98,10 +98,11 @@ def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads
     loads = []
     for motion, character in zip(shot.motions, characters, strict=True):
         moved = replace(motion, mass=settings.typed(character.mass))
-        estimate = partial(estimate_loads, force_model=character.force_model, material=material)
-        loads.append((yield from aside("sample", 1.0, estimate, moved, shot.terrain)))
+        work = estimate_loads.slices(moved, shot.terrain, force_model=character.force_model, material=material)
+        loads.append((yield from meanwhile(Progress("sample", 1.0), work)))
     ground = scene.softground.ground
-    yield from aside("sample", 1.0, check_contacts, loads, shot.terrain, ground and ground.name)
+    yield Progress("sample", 1.0)
+    check_contacts(loads, shot.terrain, ground and ground.name)
     return loads
 
 
@@ -147,7 +148,7 @@ def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
     characters = characters_of(scene)
     check_settings(scene, characters)
     motions = yield from sample_characters(scene, characters)
-    return (yield from aside("sample", 1.0, plan_ground, motions))
+    return (yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions)))
 
 
 def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:

@@ -31,7 +31,7 @@ from ...core.response.tilt import TiltGains
 from .. import settings
 from ..animation_layer import nla_layer
 from ..characters.character_setup import mapping_of
-from ..jobs import Job, counted
+from ..jobs import Job, Progress, counted, meanwhile
 from ..properties import SoftGroundCharacter
 from .character_keys import controls_of, response_curves
 
@@ -116,11 +116,16 @@ def check_characters(characters: Iterable[SoftGroundCharacter]) -> None:
 
 def standing_on(
     motions: Sequence[CharacterMotion], terrain: Terrain, options: ResponseOptions | None
-) -> tuple[CharacterMotion, ...]:
+) -> Job[tuple[CharacterMotion, ...]]:
     """The motions as they will walk on the terrain, which is where they press it."""
     if options is None or options.grounding is None:
         return tuple(motions)
-    return tuple(motion if motion.centre is not None else stood_on(motion, terrain) for motion in motions)
+    standing = []
+    for motion in motions:
+        as_it_is = motion.centre is not None
+        work = stood_on.slices(motion, terrain)
+        standing.append(motion if as_it_is else (yield from meanwhile(Progress("sample", 1.0), work)))
+    return tuple(standing)
 
 
 @dataclass(frozen=True)
@@ -137,13 +142,14 @@ def leaning(
     terrain: Terrain,
     footprints: Sequence[Footprint],
     options: ResponseOptions | None,
-) -> Leaning:
+) -> Job[Leaning]:
     """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
     moved, leans = [], []
     if options is not None and options.tilt is not None:
         for of_character, motion in zip(loads, motions, strict=True):
             touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-            response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
+            work = respond.slices(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
+            response = yield from meanwhile(Progress("simulate", 1.0), work)
             moved.append(responding(motion, response))
             leans.append(response.lean)
     return Leaning(tuple(moved), tuple(leans))
@@ -161,18 +167,21 @@ def responses_of(
     terrain: Terrain,
     footprints: Sequence[Footprint],
     options: ResponseOptions | None,
-) -> list[CharacterResponse]:
+) -> Job[list[CharacterResponse]]:
     """Each rigged character's response to the pressed ground, on top of its source."""
     answers: list[CharacterResponse] = []
+    now = Progress("simulate", 1.0)
     if options is None:
         return answers
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        response = respond(motion, touching, terrain, footprints, tilt=options.tilt, grounding=options.grounding)
-        before = gaps(motion, touching, terrain, footprints)
-        after = gaps(responding(motion, response), touching, terrain, footprints)
+        pressed = touching, terrain, footprints
+        work = respond.slices(motion, *pressed, tilt=options.tilt, grounding=options.grounding)
+        response = yield from meanwhile(now, work)
+        before = yield from meanwhile(now, gaps.slices(motion, *pressed))
+        after = yield from meanwhile(now, gaps.slices(responding(motion, response), *pressed))
         answers.append(CharacterResponse(motion, response, before, after, mean_sinkage(footprints, motion.name)))
     return answers
 
@@ -259,12 +268,13 @@ def gaps_left(
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
     footprints: Sequence[Footprint],
-) -> dict[str, object]:
+) -> Job[dict[str, object]]:
     """Penetration and float of the standing soles of characters that do not answer [mm], for the report."""
     table = {}
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        table[motion.name] = _statistics(gaps(motion, touching, terrain, footprints))
+        left = yield from meanwhile(Progress("write", 0.0), gaps.slices(motion, touching, terrain, footprints))
+        table[motion.name] = _statistics(left)
     return {"before": table, "after": table}
 
 

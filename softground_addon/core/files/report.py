@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
 
@@ -116,26 +117,28 @@ def dump(report: Mapping[str, object]) -> str:
     return json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def hash_inputs(*inputs: object) -> str:
+@sliced
+def hash_inputs(*inputs: object) -> Slices[str]:
     """A SHA-256 over nested dataclasses, mappings, sequences, arrays, numbers and texts, by value."""
     digest = hashlib.sha256()
-    _feed(digest, inputs)
+    yield from _feed(digest, inputs)
     return digest.hexdigest()
 
 
-def _feed(digest: hashlib._Hash, value: object) -> None:
+def _feed(digest: hashlib._Hash, value: object) -> Slices[None]:
     if isinstance(value, np.ndarray):
         digest.update(f"{value.dtype.str}{value.shape}".encode())
         digest.update(np.ascontiguousarray(value).tobytes())
+        yield
     elif is_dataclass(value):
         for field in fields(value):
-            _feed(digest, (field.name, getattr(value, field.name)))
+            yield from _feed(digest, (field.name, getattr(value, field.name)))
     elif isinstance(value, Mapping):
         for key in sorted(value):
-            _feed(digest, (key, value[key]))
+            yield from _feed(digest, (key, value[key]))
     elif isinstance(value, list | tuple):
         digest.update(f"({len(value)}".encode())
         for item in value:
-            _feed(digest, item)
+            yield from _feed(digest, item)
     else:
         digest.update(f"{type(value).__name__}:{value!r};".encode())

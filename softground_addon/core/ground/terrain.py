@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.slices import Slices, sliced
 from ..numerics.triangles import barycentric, enumerated
 
 Array = NDArray[np.float64]
@@ -61,16 +62,16 @@ class MeshTerrain:
     members: Indices
     values: Array
 
-    @classmethod
+    @staticmethod
+    @sliced
     def from_mesh(
-        cls,
         vertices: Array,
         triangles: Indices,
         bounds: Array | None = None,
         values: Array | None = None,
         *,
         name: str = "The ground",
-    ) -> MeshTerrain:
+    ) -> Slices[MeshTerrain]:
         """Bin the triangles of a mesh.
 
         Parameters
@@ -96,7 +97,9 @@ class MeshTerrain:
             place = vertices[:, :2]
             beyond = np.stack([place < bounds[0], place > bounds[1]], axis=-1)
             triangles = triangles[~beyond[triangles].all(axis=1).any(axis=(1, 2))]
+            yield
         corners = vertices[triangles].astype(np.float64)
+        yield
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
         steep = UPWARD * np.maximum(length, 1e-300)
@@ -104,14 +107,15 @@ class MeshTerrain:
         if not upward.any():
             upward = normal[:, 2] < -steep
             corners, triangles = corners[:, ::-1], triangles[:, ::-1]
+        yield
         corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
             raise InputError(
                 f"{name} has no face under the character's path that could be stood on: move it under the feet."
             )
-        bins = _bins(corners[..., :2])
+        bins = yield from _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
-        return cls(corners, *bins, of_corners)
+        return MeshTerrain(corners, *bins, of_corners)
 
     def heights(self, x: Array, y: Array) -> Array:
         """Height of the highest upward-facing surface at each place [m]; NaN where there is none."""
@@ -161,7 +165,7 @@ class MeshTerrain:
         return _Hits(point[hit], triangle[hit], u[hit], v[hit], (a + u * (b - a) + v * (c - a))[hit])
 
 
-def _bins(corners: Array) -> tuple[Array, Array, Indices, Indices, Indices]:
+def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indices]]:
     """Bins over the triangles (T, 3, 2): origin, size, shape, first and members, as in `MeshTerrain`."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     origin = low.min(axis=0)
@@ -169,6 +173,7 @@ def _bins(corners: Array) -> tuple[Array, Array, Indices, Indices, Indices]:
     bins_along = max(1.0, np.sqrt(len(corners) / 2))
     size = np.maximum(np.maximum(extent / bins_along, (high - low).mean(axis=0)), 1e-9)
     while True:
+        yield
         shape = np.floor(extent / size).astype(np.intp) + 1
         from_bin = np.floor((low - origin) / size).astype(np.intp)
         span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
@@ -179,8 +184,10 @@ def _bins(corners: Array) -> tuple[Array, Array, Indices, Indices, Indices]:
     triangle, within = enumerated(span.prod(axis=1))
     bin_x = from_bin[triangle, 0] + within % span[triangle, 0]
     bin_y = from_bin[triangle, 1] + within // span[triangle, 0]
+    yield
     bin_index = bin_y * shape[0] + bin_x
     order = np.argsort(bin_index, kind="stable")
+    yield
     first = np.searchsorted(bin_index[order], np.arange(shape.prod() + 1))
     return origin, size, shape, first, triangle[order]
 

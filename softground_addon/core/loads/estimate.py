@@ -8,6 +8,7 @@ from typing import Literal
 from ..ground.heightfield import Terrain
 from ..ground.material import GroundMaterial
 from ..motion.motion import CharacterMotion, steps_per_frame
+from ..numerics.slices import Slices, sliced
 from .body_dynamics import body_dynamics
 from .contact_timing import refine_contacts
 from .contacts import Contacts, detect_contacts
@@ -27,6 +28,7 @@ class CharacterLoads:
     forces: ContactForces
 
 
+@sliced
 def estimate_loads(
     motion: CharacterMotion,
     terrain: Terrain,
@@ -34,7 +36,7 @@ def estimate_loads(
     force_model: ForceModel,
     material: GroundMaterial,
     crisp_landings: bool = False,
-) -> CharacterLoads:
+) -> Slices[CharacterLoads]:
     """Resample the motion to the simulation's time grid, find its contacts and estimate its forces.
 
     Parameters
@@ -58,12 +60,16 @@ def estimate_loads(
         )
     source, given = continued(without_holds(motion))
     source = source.resampled(steps)
+    yield
     contacts = detect_contacts(source, terrain)
+    yield
     if force_model == "IMPULSE":
         forces = impulse_forces(source, contacts, material.characteristic_time)
     else:
         body = body_dynamics(source, ~contacts.touching.any(axis=1))
+        yield
         contacts = refine_contacts(source, contacts, body)
+        yield
         forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
     shown = slice(given.start * steps, (given.stop - 1) * steps + 1)
     return CharacterLoads(motion.resampled(steps), contacts.during(shown), forces.during(shown))

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.slices import Slices
 from .equal_parts import equal_parts
 from .region import Region
 
@@ -125,8 +126,8 @@ class Bisection:
         self.half[: len(self.roots)] = pieces_from  # whichever: no triangle has a whole edge any more
         self.edge = np.int32(len(self.roots)) + edge
 
-    def run(self, region: Region, leg: float) -> None:
-        """Cut until no triangle with a longer leg reaches into the region."""
+    def run(self, region: Region, leg: float) -> Slices[None]:
+        """Cut until no triangle with a longer leg reaches into the region, round by round."""
         fresh = _counted(len(self.corner))
         while True:
             parts = [fresh[first : first + AT_ONCE] for first in range(0, len(fresh), AT_ONCE)]
@@ -138,6 +139,7 @@ class Bisection:
             self._close(marked)
             self._cut_edges(np.flatnonzero(marked))
             fresh = self._cut_triangles()
+            yield
 
     def _wanted(self, triangles: Numbers, region: Region, leg: float) -> Numbers:
         """Those triangles that are too large and reach into the region."""

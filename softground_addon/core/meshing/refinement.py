@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.slices import Slices, sliced
 from ..numerics.triangles import enumerated
 from ..numerics.z_order import along_curve
 from .bisection import Bisection, longest_sides
@@ -147,7 +148,8 @@ def _continued(
     return whole
 
 
-def refine(surface: Surface, region: Region, spacing: float) -> Refinement:
+@sliced
+def refine(surface: Surface, region: Region, spacing: float) -> Slices[Refinement]:
     """Cut the faces of a surface until their corners are about `spacing` apart where the region is.
 
     Parameters
@@ -169,12 +171,14 @@ def refine(surface: Surface, region: Region, spacing: float) -> Refinement:
     if parts > 1:
         at_work[:] = True
     while True:
+        yield
         chosen = np.flatnonzero(at_work[surface.triangle_face])
         mesh = Bisection(surface.vertices, triangle_vertices[chosen], parts, grain)
-        mesh.run(region, COARSEST_LEG * spacing)
+        yield
+        yield from mesh.run(region, COARSEST_LEG * spacing)
         reached = _faces_with_edges(surface, mesh.cut_edges()) & ~at_work
         if not reached.any():
-            return _result(surface, chosen, mesh)
+            return (yield from _result(surface, chosen, mesh))
         at_work |= reached
 
 
@@ -221,13 +225,14 @@ def _faces_with_edges(surface: Surface, edges: Indices) -> Mask:
     return faces
 
 
-def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
+def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Slices[Refinement]:
     """The refinement by a mesh that was made from the chosen triangles of a surface; it is of no use afterwards."""
     leaves = mesh.leaves_of_roots()
     leaf_ends, leaf_roots = mesh.ends[leaves], mesh.roots[mesh.root[leaves]]
     del mesh.ends, mesh.root, mesh.half
     pairs = mesh.pairs()
     del mesh.edge
+    yield
     given = len(mesh.vertex)
     face = surface.triangle_face[chosen]
     parts = np.bincount(mesh.source, minlength=len(chosen))
@@ -237,11 +242,14 @@ def _result(surface: Surface, chosen: Indices, mesh: Bisection) -> Refinement:
     single[pairs] = False
     place = along_curve(mesh.points[:, :2])
     corner = mesh.corner.ravel()
+    yield
     of_mesh, face_start = _faces(pairs, np.flatnonzero(single).astype(np.int32), place, corner)
     del pairs, single
+    yield
     by_place = given + np.argsort(place[given:], kind="stable")
     point = corner[of_mesh]
     del place, corner, mesh.corner
+    yield
     vertex = np.empty(len(mesh.points), dtype=np.int32)
     vertex[:given] = mesh.vertex
     vertex[by_place] = np.arange(len(surface.vertices), len(surface.vertices) + len(by_place))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import SparseGrid
 from ..numerics.packed import PackedArray
+from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from .keyframe_tables import NO_VISIT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
@@ -102,6 +103,7 @@ class Spans:
     error: float
 
 
+@sliced
 def playback_curves_at(
     footprints: Sequence[Footprint],
     x: Array,
@@ -111,7 +113,7 @@ def playback_curves_at(
     frame_rate: float,
     time_stretch: float = 1.0,
     tolerance: float = TOLERANCE,
-) -> tuple[Spans, PlaybackCurves]:
+) -> Slices[tuple[Spans, PlaybackCurves]]:
     """The record as curves at given places.
 
     Parameters
@@ -133,7 +135,9 @@ def playback_curves_at(
     }
     position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
     for places in _parts(footprints, x, y):
+        yield
         over_time = vertex_histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance)
+        yield
         spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)
         part = replace(spans, point=places[spans.point], curve=spans.curve + np.int32(count))
         for name, packed in whole.items():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..ground.display_blur import blurred, gaussian_kernel
 from ..ground.heightfield import PLACES_AT_ONCE, TILE, HeightField, SparseGrid, Window
 from ..numerics.cell_keys import ROW, Keys, among, cells_of, keys_at, keys_of
+from ..numerics.slices import Slices, sliced
 from .footprints import NEVER, Footprint, last_contact, recompose
 
 Array = NDArray[np.float64]
@@ -107,14 +108,17 @@ class PressedGround:
     frame: float
     frame_rate: float
 
-    @classmethod
+    @staticmethod
+    @sliced
     def at(
-        cls, footprints: Sequence[Footprint], *, frame: float, frame_rate: float, cell_size: float, blur_sigma: float
-    ) -> PressedGround:
+        footprints: Sequence[Footprint], *, frame: float, frame_rate: float, cell_size: float, blur_sigma: float
+    ) -> Slices[PressedGround]:
         """The ground at a frame, recomposed from the record."""
         raw = recompose(footprints, frame, cell_size=cell_size)
+        yield
         contact = last_contact(footprints, frame, cell_size)
-        return cls(raw, blurred(raw, blur_sigma), contact, frame, frame_rate)
+        yield
+        return PressedGround(raw, blurred(raw, blur_sigma), contact, frame, frame_rate)
 
     def trail(self, floor: float) -> Trail:
         """Where the ground has changed, and where its displayed height did by more than a floor [m]."""
@@ -143,6 +147,7 @@ class PressedGround:
         return GroundSample(rim - compression, smooth_rim - smooth_compression, smooth_compression, smooth_rim, age)
 
 
+@sliced
 def sample_at(
     footprints: Sequence[Footprint],
     x: Array,
@@ -152,7 +157,7 @@ def sample_at(
     frame_rate: float,
     cell_size: float,
     blur_sigma: float,
-) -> GroundSample:
+) -> Slices[GroundSample]:
     """The ground at a frame, looked up at places (K,): made part by part, as all of it takes more than its mesh."""
     values = np.empty((5, len(x)))
     order = np.lexsort((np.floor(x / SQUARE), np.floor(y / SQUARE)))
@@ -162,7 +167,10 @@ def sample_at(
         place = np.stack([x[part], y[part]])
         window = Window.around(place.min(axis=1), place.max(axis=1), cell_size).expanded(margin)
         near = [footprint for footprint in footprints if footprint.window.intersects(window)]
-        ground = PressedGround.at(near, frame=frame, frame_rate=frame_rate, cell_size=cell_size, blur_sigma=blur_sigma)
+        ground = yield from PressedGround.at.slices(
+            near, frame=frame, frame_rate=frame_rate, cell_size=cell_size, blur_sigma=blur_sigma
+        )
+        yield
         values[:, part] = astuple(ground.sample(*place))
     return GroundSample(*values)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics.slices import Slices, sliced
 from . import edits as step_edits
 from .footprint_arrays import from_arrays, to_parts
 from .footprints import Footprint
@@ -71,7 +72,8 @@ class BakeRecord:
         return step_edits.edited(self.footprints, self.edits)
 
 
-def dump(record: BakeRecord) -> bytes:
+@sliced
+def dump(record: BakeRecord) -> Slices[bytes]:
     """The record as bytes: equal records give equal bytes."""
     names, arrays = to_parts(record.footprints)
     content = {
@@ -94,6 +96,7 @@ def dump(record: BakeRecord) -> bytes:
                 np.lib.format.write_array_header_1_0(member, header)
                 for part in array.parts:
                     member.write(part.astype(kind, copy=False).tobytes())
+                    yield
     return buffer.getvalue()
 
 

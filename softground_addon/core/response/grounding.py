@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.plane_fit import smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation, unit
+from ..numerics.slices import Slices, sliced
 from .foot_placement import Placement
 from .knee_pace import PacedLeg, relieve
 from .legs import Leg, solve
@@ -139,6 +140,7 @@ def _mean_over_time(values: Array, weights: Array, width: float) -> Array:
     return smoothed(np.interp(np.arange(len(values)), known, mean), width / 2)
 
 
+@sliced
 def settle(
     motion: CharacterMotion,
     placements: Mapping[str, tuple[int, Placement]],
@@ -146,7 +148,7 @@ def settle(
     lean: Array,
     *,
     crouch: Array | None = None,
-) -> Response:
+) -> Slices[Response]:
     """Bring the hips to where they belong and solve the legs.
 
     Parameters
@@ -171,7 +173,7 @@ def settle(
     reach = round(REACH_TIME * motion.adult_second)
     raised[:, 2] -= upper_envelope(short, max(1, reach))
     if legs:
-        relief = relieve(
+        relief = yield from relieve.slices(
             {
                 side: PacedLeg(
                     leg,

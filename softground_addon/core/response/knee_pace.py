@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.banded import solve_banded
+from ..numerics.slices import Slices, sliced
 from .legs import Leg
 
 Array = NDArray[np.float64]
@@ -93,7 +94,8 @@ class Relief:
     feet: Mapping[str, Array]
 
 
-def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Relief:
+@sliced
+def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Slices[Relief]:
     """The least and smoothest correction with which no knee turns too fast.
 
     Parameters
@@ -120,6 +122,7 @@ def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg
 
     if any(len(one.wanted) for one in violated(change, 1.0)):
         for weight in np.geomspace(TOO_FAST / 100.0, TOO_FAST, STEPS):
+            yield
             now = violated(change, weight) + _small_and_smooth(change, paced, bends, leg_length)
             toward = _solution(now, change)
             for part in _PARTS:

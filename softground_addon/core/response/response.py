@@ -13,6 +13,7 @@ from ..loads.contacts import detect_contacts
 from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
+from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
@@ -87,6 +88,7 @@ class Gaps:
     heights: Array
 
 
+@sliced
 def respond(
     motion: CharacterMotion,
     touching: Mask,
@@ -95,7 +97,7 @@ def respond(
     *,
     tilt: TiltOptions | None,
     grounding: GroundingOptions | None,
-) -> Response:
+) -> Slices[Response]:
     """The response to a ground that has been pressed.
 
     Parameters
@@ -116,30 +118,42 @@ def respond(
     leaning = np.zeros((len(motion.frames), 2))
     if tilt is not None:
         leaning = tilt.strength * _lean(motion, touching, history, tilt)
+        yield
     if grounding is None:
-        placements = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
-        return settle(motion, placements, np.ones_like(touching), leaning)  # feet stay where they are, in swings too
+        unmoved = {side: (sole, _unmoved(len(motion.frames))) for side, sole in feet.items()}
+        in_place = np.ones_like(touching)  # feet stay where they are, in swings too
+        return (yield from settle.slices(motion, unmoved, in_place, leaning))
 
-    def placed(side: str, heel_rise: Array | None = None, change: Array | None = None) -> tuple[int, Placement]:
+    def place(side: str, heel_rise: Array | None = None, change: Array | None = None) -> Slices[None]:
+        yield
         sole = feet[side]
-        return sole, place_sole(
-            motion,
+        placements[side] = (
             sole,
-            touching[:, sole],
-            history,
-            undisturbed,
-            align=grounding.align,
-            lock=grounding.lock,
-            heel_rise=heel_rise,
-            change=change,
+            place_sole(
+                motion,
+                sole,
+                touching[:, sole],
+                history,
+                undisturbed,
+                align=grounding.align,
+                lock=grounding.lock,
+                heel_rise=heel_rise,
+                change=change,
+            ),
         )
 
-    placements = {side: placed(side) for side in feet}
+    placements: dict[str, tuple[int, Placement]] = {}
+    for side in feet:
+        yield from place(side)
     acted, crouch, arms = _acted(motion, touching, placements, grounding.performance)
-    placements |= {side: placed(side, change=change) for side, change in acted.items()}
+    for side, change in acted.items():
+        yield from place(side, change=change)
     rises = heel_rises(motion, placements, touching, leaning, crouch=crouch)
-    placements |= {side: placed(side, rise, acted.get(side)) for side, rise in rises.items() if rise.any()}
-    return replace(settle(motion, placements, touching, leaning, crouch=crouch), arms=arms)
+    for side, rise in rises.items():
+        if rise.any():
+            yield from place(side, rise, acted.get(side))
+    settled = yield from settle.slices(motion, placements, touching, leaning, crouch=crouch)
+    return replace(settled, arms=arms)
 
 
 def _acted(
@@ -206,11 +220,13 @@ def _heading(motion: CharacterMotion) -> Array:
     return np.asarray(direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9))
 
 
-def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: Sequence[Footprint]) -> Gaps:
+@sliced
+def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: Sequence[Footprint]) -> Slices[Gaps]:
     """Distance of each standing sole's lowest point from the ground as it is at that frame."""
     history = GroundHistory(terrain, footprints)
     frames, soles, heights = [], [], []
     for index, sole in enumerate(motion.soles):
+        yield
         stands = np.flatnonzero(touching[:, index])
         clearance = _clearance(sole, stands, motion.frames[stands], history)
         known = np.isfinite(clearance)
@@ -230,7 +246,8 @@ def _clearance(sole: SoleMotion, samples: NDArray[np.intp], frames: Array, histo
     return in_stretches(during, len(samples))
 
 
-def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
+@sliced
+def stood_on(motion: CharacterMotion, terrain: Terrain) -> Slices[CharacterMotion]:
     """The motion on the terrain that it will walk on: as it is where it was made for it, else put on it.
 
     A walk that was made for level ground and is placed on a hill or on bumps touches nothing as it is. Its contacts
@@ -238,12 +255,14 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
     level, and hips and legs follow.
     """
     level = _level_of(motion)
+    yield
     if level is None or not _fits_better(motion, level, terrain):
         return motion
     made_for = detect_contacts(motion, FlatTerrain(level))
     ground = GroundHistory(terrain)
     placements = {}
     for side, sole in leg_soles(motion).items():
+        yield
         as_made = np.maximum(made_for.clearance[:, sole], 0.0)
         placements[side] = (
             sole,
@@ -257,7 +276,7 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> CharacterMotion:
             ),
         )
     level_body = np.zeros((len(motion.frames), 2))
-    return responding(motion, settle(motion, placements, made_for.touching, level_body))
+    return responding(motion, (yield from settle.slices(motion, placements, made_for.touching, level_body)))
 
 
 _LEVEL = 0.005

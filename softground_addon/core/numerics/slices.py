@@ -1,0 +1,57 @@
+"""Long computations in slices: generators that yield wherever they can pause, and return their result.
+
+Whoever has nothing else to do calls them like any other function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from functools import wraps
+from typing import ParamSpec, Protocol, TypeVar, cast
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+Result_co = TypeVar("Result_co", covariant=True)
+
+Slices = Generator[None, None, Result]
+"""What is left of a computation; it says nothing between two slices, and returns the result."""
+
+
+class Sliced(Protocol[Parameters, Result_co]):
+    """A function that gives its result at once, and whose `slices` gives it slice by slice."""
+
+    def __call__(self, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result_co: ...
+
+    def slices(self, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Generator[None, None, Result_co]:
+        """The computation, to be gone through slice by slice."""
+
+
+def sliced(slices: Callable[Parameters, Slices[Result]]) -> Sliced[Parameters, Result]:
+    """Make a function of a computation in slices.
+
+    Examples
+    --------
+    >>> @sliced
+    ... def total(values):
+    ...     so_far = 0
+    ...     for value in values:
+    ...         so_far += value
+    ...         yield
+    ...     return so_far
+    >>> total([1, 2, 3]), len(list(total.slices([1, 2, 3])))
+    (6, 3)
+    """
+
+    @wraps(slices)
+    def whole(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        work = slices(*args, **kwargs)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                result: Result = end.value
+                return result
+
+    function = cast("Sliced[Parameters, Result]", whole)
+    function.slices = slices  # type: ignore[method-assign]
+    return function
