@@ -11,6 +11,10 @@ import bpy
 from ..core.errors import InputError
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
+from ..core.response.performance import Performance
+from ..core.response.response import GroundingOptions, TiltOptions
+from ..core.response.tilt import TiltGains
+from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SoleSource
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
@@ -40,11 +44,6 @@ def forget_deleted_ground(scene: bpy.types.Scene) -> None:
 def typed(value: float) -> float:
     """The number that the user typed, from the single precision that Blender keeps it in: 0.01, not 0.00999999978."""
     return float(f"{value:.7g}")
-
-
-def cell_size_of(scene: bpy.types.Scene) -> float:
-    """Side of the ground's cells [m]."""
-    return typed(scene.softground.cell_size)
 
 
 def material_of(scene: bpy.types.Scene) -> GroundMaterial:
@@ -93,6 +92,118 @@ def slow_down(scene: bpy.types.Scene, speed: float) -> None:
 def gravity_of(scene: bpy.types.Scene) -> float:
     """Magnitude of gravity [m/s²]; the Earth's where the scene's is switched off."""
     return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
+
+
+PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
+"""What can be acted in deep ground, as the settings and the core call it."""
+
+SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
+
+
+def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
+    """All that a bake of the scene depends on, as it is now; a ground or characters that were deleted are left out.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    grounded : bool
+        As if Grounding were on.
+    """
+    options = scene.softground
+    return BakeSettings(
+        file=bpy.data.filepath,
+        scene=scene.name,
+        ground=name_of(options.ground) if exists(options.ground) else None,
+        characters=tuple(character_of(entry) for entry in options.characters if is_set_up(entry)),
+        preset=options.material.preset,
+        surface=options.material.surface,
+        material=material_of(scene),
+        pressure=options.pressure,
+        painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
+        cell_size_m=typed(options.cell_size),
+        frames=(options.frame_start, options.frame_end),
+        frame_rate=frame_rate_of(scene),
+        time_stretch=time_stretch_of(scene),
+        gravity_m_s2=typed(gravity_of(scene)),
+        unit_scale_m=typed(scene.unit_settings.scale_length),
+        response=_response(options, grounded=grounded),
+        output=options.output,
+        detail=options.detail,
+        shape_keys=options.shape_keys,
+        tread_m=typed(options.tread),
+        keep_forces=options.keep_forces,
+    )
+
+
+def is_thing(character: Any) -> bool:
+    """Whether an entry of the characters is of objects without a rig."""
+    return character.armature is None and any(sole.object for sole in character.soles)
+
+
+def is_set_up(character: Any) -> bool:
+    """Whether an entry of the characters still has what leaves prints: an armature, or an object."""
+    return exists(character.armature) if character.armature else is_thing(character)
+
+
+def character_of(character: Any) -> CharacterSettings:
+    """An entry of the characters, with its joints and soles as the user left them."""
+    armature = character.armature
+    soles = tuple(
+        SoleSource(
+            sole.name,
+            SIDE_TO_CODE[sole.side],
+            sole.bone,
+            sole.toe_bone,
+            sole.object.name_full if sole.object else "",
+            sole.kind == "LIMB",
+        )
+        for sole in character.soles
+        if sole.object or (sole.bone and armature)
+    )
+    return CharacterSettings(
+        armature=name_of(armature) if armature else None,
+        name=armature.name if armature else character.name,
+        mass_kg=typed(character.mass),
+        force_model=character.force_model,
+        joints={entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone},
+        soles=soles,
+    )
+
+
+def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
+    """What is asked of the characters, None if nothing."""
+    grounded = grounded or (options.grounding.use and options.output != "PRINTS")
+    tilted = options.tilt.use and (grounded or options.output != "PRINTS")
+    if not (tilted or grounded):
+        return None
+    tilt, grounding = options.tilt, options.grounding
+    gains = TiltGains(typed(tilt.frequency), typed(tilt.damping))
+    acted = Performance(**{part: typed(getattr(grounding, part)) for part in PERFORMANCE})
+    return ResponseOptions(
+        TiltOptions(gains, typed(tilt.strength), typed(tilt.lateral)) if tilted else None,
+        GroundingOptions(typed(grounding.align), typed(grounding.lock), acted) if grounded else None,
+    )
+
+
+def name_of(thing: bpy.types.Object) -> ObjectName:
+    """An object by its name, to be found again."""
+    return ObjectName(thing.name, thing.session_uid)
+
+
+def found(name: ObjectName) -> bpy.types.Object:
+    """The object of a name, whatever it is called by now.
+
+    Raises
+    ------
+    InputError
+        If it was deleted.
+    """
+    thing = bpy.data.objects.get(name.name)
+    if thing is None or thing.session_uid != name.uid:
+        thing = next((other for other in bpy.data.objects if other.session_uid == name.uid), None)
+    if thing is None:
+        raise InputError(f"'{name.name}' was deleted: choose another object, or take it out of the settings.")
+    return thing
 
 
 def user_folder() -> Path:

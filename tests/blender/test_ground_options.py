@@ -131,7 +131,9 @@ def test_a_vertex_group_scales_its_members_only(walk):
     x = place(ground)[:, 0]
     y = place(ground)[:, 1]
     group.remove(np.flatnonzero((x > 0) | (y > 0)).tolist())
-    factors = painted_ground.factors(ground, ground.data, painted_ground.names_of(walk))
+    factors = painted_ground.factors(
+        ground, ground.data, painted_ground.names_of(ground, settings.snapshot(walk).painted)
+    )
     assert (factors[:, 1] == ((x > 0) | (y > 0))).all()
     assert (factors[:, [0, 2]] == 1).all()
     bake(walk)

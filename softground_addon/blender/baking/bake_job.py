@@ -28,15 +28,15 @@ from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail, sample_at
 from ...core.record.sole_marks import sole_marks
+from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import settings
-from ..characters.character_setup import characters_of
 from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_warning
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
-from ..reading.shots import Shot, estimate_shot, ground_of, read_shot
+from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 from ..response import response_job
 from . import bake_report
 from .bake_checks import check_volumes, copy_warnings, coverage, coverage_warnings, shortest_sole, wants_detail
@@ -59,7 +59,7 @@ class BakeResult:
     footprints: tuple[Footprint, ...]
 
 
-def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = False) -> Job[BakeResult]:
+def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | None = None) -> Job[BakeResult]:
     """Bake the scene's characters into its ground.
 
     Without a ground in the settings, one is created that fits the walk.
@@ -67,11 +67,10 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its `softground` settings say what to do.
     write : bool
         False computes and reports only, and changes nothing.
-    response_only : bool
-        Leave the ground as it is, whatever the settings say.
+    wanted : BakeSettings, optional
+        What to do, from `shots.settings_of`; by default what the scene's settings say as the bake begins.
 
     Raises
     ------
@@ -80,30 +79,30 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     BakeError
         If the result fails a check.
     """
+    wanted = wanted or settings_of(scene)
     started = time.perf_counter()
-    options = scene.softground
-    characters = characters_of(scene)
-    moving = bake_report.ground_warnings(options.ground, options.frame_start)
-    shot = yield from read_shot(scene)
-    movers = staleness.of_movers(scene)
+    given = settings.found(wanted.ground) if wanted.ground else None
+    moving = bake_report.ground_warnings(given, wanted.frames[0])
+    shot = yield from read_shot(scene, wanted)
+    movers = staleness.of_movers(scene, wanted)
     surface = shot.surface
     vertices = surface.vertices if surface else None
     shot_hash = yield from meanwhile(Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, vertices))
     sampled = time.perf_counter()
 
-    loads, footprints, forces, answers = yield from _press(scene, shot)
+    loads, footprints, forces, answers = yield from _press(wanted, shot)
     simulated = time.perf_counter()
 
     gaps = response_job.gap_table(answers)
     if gaps is None:
         gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, footprints)
-    layers = (yield from response_job.layers_of(scene, characters, answers)) if write else []
-    inputs = bake_report.inputs_of(scene)
+    layers = (yield from response_job.layers_of(scene, wanted, answers)) if write else []
+    inputs = wanted.inputs()
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
-    input_hash = report.hash_inputs(inputs, shot_hash)
-    ground_name, cell_size = str(inputs["ground"] or "the ground"), settings.cell_size_of(scene)
-    warnings = [*bake_report.warnings(footprints, loads, cell_size, ground_name), *moving]
+    input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
+    ground_name = wanted.ground.name if wanted.ground else "the ground"
+    warnings = [*bake_report.warnings(footprints, loads, wanted.cell_size_m, ground_name), *moving]
     gap_warnings = response_job.warnings(answers)
     build_report = partial(
         report.build,
@@ -121,14 +120,14 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     shot = replace(shot, motions=())
     del loads, answers
     written: _Written | None = None
-    if write and not response_only and options.output != "RESPONSE":
+    if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash}
-        written = yield from _write(scene, shot, footprints, about, sole_length)
+        written = yield from _write(scene, wanted, shot, footprints, about, sole_length)
         warnings += written.warnings
-    if write and options.output != "PRINTS":
-        response_job.put_layers(scene, characters, layers)
+    if write and wanted.output != "PRINTS":
+        response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()
-    frames = options.frame_end - options.frame_start + 1
+    frames = wanted.frames[1] - wanted.frames[0] + 1
     result = build_report(
         timings={
             "sample": sampled - started,
@@ -142,15 +141,17 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, response_only: bool = Fa
     if written:
         ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
         ground_mesh.note_warnings(written.carrier, result["warnings"])
-        staleness.store(bake_report.inputs_of(scene), scene, movers)
+        stamped = wanted.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
+        staleness.store(stamped, written.ground, movers)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 
 
 @dataclass(frozen=True)
 class _Written:
-    """What was written to the ground."""
+    """What was written to the ground, and what carries it."""
 
+    ground: bpy.types.Object
     carrier: bpy.types.Object
     error: float
     warnings: list[str]
@@ -158,6 +159,7 @@ class _Written:
 
 def _write(
     scene: bpy.types.Scene,
+    wanted: BakeSettings,
     shot: Shot,
     footprints: Sequence[Footprint],
     about: dict[str, Any],
@@ -168,6 +170,7 @@ def _write(
     Parameters
     ----------
     scene : bpy.types.Scene
+    wanted : BakeSettings
     shot : Shot
         Of its ground; the motions are not needed.
     footprints : sequence of Footprint
@@ -176,16 +179,14 @@ def _write(
     sole_length : float
         Of the shortest sole [m].
     """
-    options = scene.softground
-    blur_sigma, cell_size = settings.material_of(scene).blur_sigma, settings.cell_size_of(scene)
-    frame_rate, unit_scale = settings.frame_rate_of(scene), scene.unit_settings.scale_length
     at_the_end = {
-        "frame": float(options.frame_end),
-        "frame_rate": frame_rate,
-        "cell_size": cell_size,
-        "blur_sigma": blur_sigma,
+        "frame": float(wanted.frames[1]),
+        "frame_rate": wanted.frame_rate,
+        "cell_size": wanted.cell_size_m,
+        "blur_sigma": wanted.material.blur_sigma,
     }
-    left = record.BakeRecord(footprints, about, baked_ground.edits_of(options.ground) if options.ground else {})
+    edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
+    left = record.BakeRecord(footprints, about, edits)
     footprints = left.edited
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
@@ -195,10 +196,10 @@ def _write(
         del pressed
         warnings: list[str] = []
         if shot.surface is None:
-            place = yield from _created(drafts, scene, shot, trail)
+            place = yield from _created(drafts, scene, wanted, shot, trail)
             about["inputs"]["ground"] = place.carrier.name
         else:
-            place, warnings = yield from _given(drafts, scene, shot, shot.surface, trail, sole_length)
+            place, warnings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
         stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
         x, y = place.position[:, 0], place.position[:, 1]
@@ -207,15 +208,15 @@ def _write(
             footprints,
             x,
             y,
-            blur_sigma=blur_sigma,
-            frame_rate=frame_rate,
-            time_stretch=settings.time_stretch_of(scene),  # nodes count the animation's frames
+            blur_sigma=wanted.material.blur_sigma,
+            frame_rate=wanted.frame_rate,
+            time_stretch=wanted.time_stretch,  # nodes count the animation's frames
         )
         spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
         table = drafts.enter_context(playback.keyframe_tables(lines))
         del lines  # they are large, and all is in the table
         yield Progress("write", 0.8)
-        marks = _tread(footprints, place.position, options.tread)
+        marks = _tread(footprints, place.position, wanted.tread_m)
         yield Progress("write", 0.9)
         carrier = yield from baked_ground.write(
             place,
@@ -223,8 +224,8 @@ def _write(
             spans,
             table,
             stored,
-            unit_scale=unit_scale,
-            shape_keys=options.shape_keys,
+            unit_scale=wanted.unit_scale_m,
+            shape_keys=wanted.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
         error, publish = spans.error, place.publish if place.is_draft else None
@@ -232,45 +233,47 @@ def _write(
         if publish:
             yield Progress("write", 0.9)
             publish()
-    return _Written(carrier, error, warnings)
+    ground = settings.found(wanted.ground) if wanted.ground else carrier
+    return _Written(ground, carrier, error, warnings)
 
 
-def _created(drafts: ExitStack, scene: bpy.types.Scene, shot: Shot, trail: Trail) -> Job[baked_ground.Place]:
+def _created(
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, trail: Trail
+) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
-    options, cell_size = scene.softground, settings.cell_size_of(scene)
-    reach = created_ground.reach_for(scene)
+    reach = created_ground.reach_of(wanted.material)
     yield Progress("write", 0.2)
-    layout = created_ground.lay_out(shot.plan, cell_size, scene.unit_settings.scale_length, reach=reach)
+    layout = created_ground.lay_out(shot.plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
     yield Progress("write", 0.3)
-    drafts.enter_context(drafted(options.material.surface))
+    drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)
     ground = drafts.enter_context(created_ground.draft(layout))
     yield Progress("write", 0.3)
-    return baked_ground.on_created(scene, ground, layout, trail)
+    return baked_ground.on_created(scene, ground, layout, trail, wanted.surface)
 
 
 def _given(
     drafts: ExitStack,
-    scene: bpy.types.Scene,
+    wanted: BakeSettings,
     shot: Shot,
     surface: ground_mesh.GroundSurface,
     trail: Trail,
     sole_length: float,
 ) -> Job[tuple[baked_ground.Place, list[str]]]:
     """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; warnings."""
-    options, cell_size = scene.softground, settings.cell_size_of(scene)
-    ground, vertices = options.ground, surface.vertices
+    assert wanted.ground is not None
+    ground, vertices = settings.found(wanted.ground), surface.vertices
+    detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
         Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
-    warnings = coverage_warnings(ground, cover, options.detail, cell_size)
-    if not wants_detail(ground, cover, options.detail, cell_size, sole_length):
-        unit_scale = scene.unit_settings.scale_length
-        if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=options.detail):
+    warnings = coverage_warnings(ground, cover, detail, cell_size)
+    if not wants_detail(ground, cover, detail, cell_size, sole_length):
+        if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
             return baked_ground.on_itself(ground, index, vertices), warnings
         warnings = [*warnings, undone_warning(ground)]
-    coarse = trail_detail.surface_of(ground, scene.unit_settings.scale_length)
+    coarse = trail_detail.surface_of(ground, unit_scale)
     refinement = yield from meanwhile(
         Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), cell_size)
     )
@@ -293,49 +296,48 @@ def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Ar
 
 
 def _press(
-    scene: bpy.types.Scene, shot: Shot
+    wanted: BakeSettings, shot: Shot
 ) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object] | None, list[response_job.CharacterResponse]]]:
     """Loads, footprints and, on request, forces of a shot, and how its characters answer.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
     lean that the pressed ground gives is the lean that pressed it.
     """
-    characters = characters_of(scene)
-    asked = response_job.options_of(scene)
+    asked = wanted.response
     if asked:
-        response_job.check_characters(characters)
+        response_job.check_characters(wanted.characters)
     standing = yield from response_job.standing_on(shot.motions, shot.terrain, asked)
-    loads = yield from estimate_shot(scene, replace(shot, motions=standing))
-    footprints, forces = yield from _simulate(scene, shot, loads)
+    loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
+    footprints, forces = yield from _simulate(wanted, shot, loads)
     leaning = None
     for _ in range(response_job.LEAN_PASSES):
         before = leaning
         leaning = yield from response_job.leaning(loads, standing, shot.terrain, footprints, asked)
         if not response_job.leans_anew(leaning, before):
             break
-        loads = yield from estimate_shot(scene, replace(shot, motions=leaning.motions))
-        footprints, forces = yield from _simulate(scene, shot, loads)
-    check_volumes(footprints, settings.material_of(scene), shot.surface.factors if shot.surface else None)
+        loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions))
+        footprints, forces = yield from _simulate(wanted, shot, loads)
+    check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
     answers = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
     return loads, footprints, forces, answers
 
 
 def _simulate(
-    scene: bpy.types.Scene, shot: Shot, loads: Sequence[CharacterLoads]
+    wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
 ) -> Job[tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_cell_size(loads, settings.cell_size_of(scene))
+    check_cell_size(loads, wanted.cell_size_m)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
-    count, wanted = max(len(motion.frames) for motion in shot.motions), scene.softground.keep_forces
-    for result in simulate(loads, ground_of(scene, shot), settings.cell_size_of(scene)):
+    count = max(len(motion.frames) for motion in shot.motions)
+    for result in simulate(loads, ground_of(wanted, shot), wanted.cell_size_m):
         footprints += result.footprints
         frames.append(result.frame)
-        if wanted:
+        if wanted.keep_forces:
             forces.append(result.forces)
         yield Progress("simulate", len(frames) / count)
     footprints.sort(
         key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
     )
-    return footprints, bake_report.force_table(loads, frames, forces) if wanted else None
+    return footprints, bake_report.force_table(loads, frames, forces) if wanted.keep_forces else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import bpy
@@ -15,7 +14,6 @@ from ...core.loads.missed_steps import advice, missed_steps
 from ...core.loads.sliding import treadmill_speed
 from ...core.record.footprints import Footprint
 from .. import properties, settings
-from ..characters.character_setup import characters_of, mapping_of, title_of
 from ..ground import still_ground
 from ..jobs import STAGES
 from ..reading import staleness
@@ -128,42 +126,7 @@ def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
 
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
-    options = scene.softground
-    if options.ground is None:
-        return ()
-    return staleness.reasons(inputs_of(scene), scene)
-
-
-def inputs_of(scene: bpy.types.Scene) -> dict[str, object]:
-    """The settings that a bake of the scene depends on, in SI units."""
-    options = scene.softground
-    return {
-        "file": bpy.data.filepath,
-        "scene": scene.name,
-        "ground": options.ground.name if options.ground else None,
-        "characters": [
-            {
-                "armature": character.armature.name if character.armature else None,
-                "name": title_of(character),
-                "mass_kg": settings.typed(character.mass),
-                "force_model": character.force_model,
-                "joints": {joint: list(place) for joint, place in mapping_of(character).joints.items()},
-                "soles": [asdict(source) for source in mapping_of(character).soles],
-            }
-            for character in characters_of(scene)
-        ],
-        "preset": options.material.preset,
-        "material": asdict(settings.material_of(scene)),
-        "pressure": options.pressure,
-        "painted": [options.painted.stiffness, options.painted.layer_depth, options.painted.rim],
-        "cell_size_m": settings.cell_size_of(scene),
-        "frames": [options.frame_start, options.frame_end],
-        "frame_rate": settings.frame_rate_of(scene),
-        "time_stretch": settings.time_stretch_of(scene),
-        "gravity_m_s2": settings.typed(settings.gravity_of(scene)),
-        "unit_scale_m": settings.typed(scene.unit_settings.scale_length),
-        "response": asdict(asked) if (asked := response_job.options_of(scene)) else None,
-    }
+    return staleness.reasons(scene, settings.snapshot(scene))
 
 
 def force_table(

@@ -12,13 +12,12 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
 from ..properties import SoftGroundCharacter
-from ..settings import exists, time_stretch_of
+from ..settings import SIDE_TO_CODE, character_of, is_set_up, time_stretch_of
 from .prop_extraction import surface_of
-from .rig_mapping import RigMapping, SoleSource, instances_armature, map_rig, require_armature
+from .rig_mapping import RigMapping, instances_armature, map_rig, require_armature
 from .rig_sampling import is_animated, is_simulated
 
-_SIDE_TO_CODE = {"LEFT": "L", "RIGHT": "R", "NONE": ""}
-_SIDE_TO_ENUM = {code: side for side, code in _SIDE_TO_CODE.items()}
+_SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
 
 def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> SoftGroundCharacter:
@@ -235,16 +234,6 @@ def _side_of(name: str) -> str:
     return next((side for end, side in ((".L", "LEFT"), (".R", "RIGHT")) if name.upper().endswith(end)), "NONE")
 
 
-def is_thing(character: SoftGroundCharacter) -> bool:
-    """Whether an entry is of objects without a rig."""
-    return character.armature is None and any(sole.object for sole in character.soles)
-
-
-def is_set_up(character: SoftGroundCharacter) -> bool:
-    """Whether an entry still has what leaves prints: an armature, or an object."""
-    return exists(character.armature) if character.armature else is_thing(character)
-
-
 def title_of(character: SoftGroundCharacter) -> str:
     """What the user calls a character: its armature's name, or that of the thing."""
     return character.armature.name if character.armature else character.name
@@ -255,31 +244,10 @@ def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
     return [character for character in scene.softground.characters if is_set_up(character)]
 
 
-def movers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The armatures and objects whose animation a bake of the scene reads."""
-    movers: list[bpy.types.Object] = []
-    for character in characters_of(scene):
-        movers += [character.armature] if character.armature else []
-        movers += [sole.object for sole in character.soles if sole.object]
-    return movers
-
-
 def mapping_of(character: SoftGroundCharacter) -> RigMapping:
     """The joints and soles of a character as the user left them."""
-    joints = {entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone}
-    soles = tuple(
-        SoleSource(
-            sole.name,
-            _SIDE_TO_CODE[sole.side],
-            sole.bone,
-            sole.toe_bone,
-            sole.object.name_full if sole.object else "",
-            sole.kind == "LIMB",
-        )
-        for sole in character.soles
-        if sole.object or (sole.bone and character.armature)
-    )
-    return RigMapping(joints, soles, "settings")
+    mapped = character_of(character)
+    return RigMapping(mapped.joints, mapped.soles, "settings")
 
 
 def animated_frames(

@@ -13,39 +13,12 @@ import bpy
 from mathutils import Vector
 
 from ...core.errors import InputError
+from ...core.settings import SoleSource
 from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
 from .rest_pose import map_by_rest_pose
 
 BoneEnd = tuple[str, str]
 """A bone's name, and "head" or "tail"."""
-
-
-@dataclass(frozen=True)
-class SoleSource:
-    """What one sole is made from.
-
-    Attributes
-    ----------
-    name : str
-        What the user sees, e.g. "foot.L".
-    side : str
-        "L", "R" or "".
-    bone : str
-        Bone of the armature that carries the sole; empty if an object does.
-    toe_bone : str
-        Bone of the toes; empty for a sole of one piece.
-    object : str
-        Name of an object that prints with its own mesh instead; empty if a bone does.
-    limb : bool
-        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
-    """
-
-    name: str
-    side: str = ""
-    bone: str = ""
-    toe_bone: str = ""
-    object: str = ""
-    limb: bool = False
 
 
 @dataclass(frozen=True)

@@ -79,10 +79,12 @@ def clear(ground: bpy.types.Object) -> None:
     ground_mesh.restore(ground)
 
 
-def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, trail: Trail) -> Place:
+def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, trail: Trail, surface: str) -> Place:
     """A ground that is not in the scene yet."""
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
-    return Place(index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft), is_draft=True)
+    return Place(
+        index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft, surface), is_draft=True
+    )
 
 
 def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:

@@ -10,9 +10,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.ground.material import GroundMaterial
 from ...core.ground_plan import GroundPlan
 from ...core.meshing.graded_grid import GradedGrid, graded_grid
-from .. import settings
+from ...core.settings import BakeSettings
 from .ground_mesh import discard, mesh_of, write_positions
 from .materials import ensure_material
 
@@ -52,17 +53,16 @@ class Layout:
     face_size: NDArray[np.intp]
 
 
-def create_ground(scene: bpy.types.Scene, plan: GroundPlan) -> bpy.types.Object:
-    """A new ground with the material of the scene's preset, set as the scene's ground."""
-    layout = lay_out(plan, settings.cell_size_of(scene), scene.unit_settings.scale_length, reach=reach_for(scene))
+def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
+    """A new ground with the material of the preset, set as the scene's ground."""
+    layout = lay_out(plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
     with draft(layout) as ground:
-        publish(scene, ground)
+        publish(scene, ground, wanted.surface)
     return ground
 
 
-def reach_for(scene: bpy.types.Scene) -> float:
-    """How far beyond the soles the scene's material moves the ground [m]."""
-    material = settings.material_of(scene)
+def reach_of(material: GroundMaterial) -> float:
+    """How far beyond the soles a material moves the ground [m]."""
     return material.rim_reach + BLUR_REACH * material.blur_sigma
 
 
@@ -114,9 +114,9 @@ def draft(layout: Layout) -> Iterator[bpy.types.Object]:
             discard(ground)
 
 
-def publish(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
-    """Put a draft into a scene as its ground, with the material of its preset."""
-    mesh_of(ground).materials.append(ensure_material(scene.softground.material.surface))
+def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:
+    """Put a draft into a scene as its ground, with the render material of some surface."""
+    mesh_of(ground).materials.append(ensure_material(surface))
     scene.collection.objects.link(ground)
     scene.softground.ground = ground
     for layer in scene.view_layers:

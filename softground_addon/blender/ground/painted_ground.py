@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.variation import CHANNELS
+from ..properties import SoftGroundPainted
 
 Array = NDArray[np.float64]
 
@@ -18,20 +21,18 @@ Names = tuple[str, ...]
 """Of what is painted, in the order of `CHANNELS`; empty where nothing is."""
 
 
-def names_of(scene: bpy.types.Scene) -> Names:
-    """What the scene's ground is painted with, of its own mesh.
+def names_of(ground: bpy.types.Object, painted: Sequence[str]) -> Names:
+    """Which of the names that were chosen, in the order of `CHANNELS`, the mesh of a ground is painted with.
 
     Raises
     ------
     InputError
         If a name that the user chose is not there, or is of another kind.
     """
-    ground, painted = scene.softground.ground, scene.softground.painted
-    return tuple(_name(ground, painted, setting) for setting in _SETTINGS.values())
+    return tuple(_name(ground, *chosen) for chosen in zip(painted, _SETTINGS.values(), strict=True))
 
 
-def _name(ground: bpy.types.Object, painted: bpy.types.PropertyGroup, setting: str) -> str:
-    name: str = getattr(painted, setting)
+def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
     attribute = ground.data.attributes.get(name) if name else None
     if attribute and (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
         raise InputError(
@@ -40,7 +41,7 @@ def _name(ground: bpy.types.Object, painted: bpy.types.PropertyGroup, setting: s
         )
     if is_there(ground, name):
         return name
-    if name and name != painted.bl_rna.properties[setting].default:
+    if name and name != SoftGroundPainted.bl_rna.properties[setting].default:
         raise InputError(
             f"Ground '{ground.name}' has no vertex group or attribute '{name}': paint one of that name, or leave the "
             "field in the Ground panel empty."

@@ -73,9 +73,10 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
             self.report({"INFO"}, f"'{chosen.name}' is the ground")
             return {"FINISHED"}
         scene = settings.scene_of(context)
-        plan = jobs.run(shots.fit_ground(scene))
+        wanted = shots.settings_of(scene)
+        plan = jobs.run(shots.fit_ground(scene, wanted))
         with analysis.own_changes(scene):
-            ground = create_ground(scene, plan)
+            ground = create_ground(scene, wanted, plan)
         self.report({"INFO"}, f"Created '{ground.name}' with {len(ground_mesh.mesh_of(ground).vertices):,} vertices")
         for warning in plan.warnings:
             self.report({"WARNING"}, warning)

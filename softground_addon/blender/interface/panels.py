@@ -9,8 +9,8 @@ import bpy
 from ...core.loads.cell_limits import BYTES_PER_CELL
 from ...core.motion.motion import JOINTS
 from .. import session, settings
-from ..characters.character_setup import is_set_up, is_thing
 from ..ground import baked_ground, ground_mesh, still_ground
+from ..settings import is_set_up, is_thing
 from ..translation import iface_
 from . import bake_result, prediction
 from .character_editing import active_character, active_sole
@@ -184,7 +184,7 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         column.prop(options, "shape_keys")
         foretold = prediction.of(settings.scene_of(context))
         if foretold:
-            _note(layout, _estimate(foretold.analysis.area, settings.cell_size_of(settings.scene_of(context))))
+            _note(layout, _estimate(foretold.analysis.area, settings.scene_of(context).softground.cell_size))
 
 
 class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):

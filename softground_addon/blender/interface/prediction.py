@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .. import session
+from .. import session, settings
 from ..live import live
 from ..reading import analysis
 from ..reading.analysis import Analysis
@@ -43,10 +43,11 @@ class DepthPrediction:
 
 def of(scene: bpy.types.Scene) -> DepthPrediction | None:
     """The prediction for a scene whose shot is known; to be shown, and worked out soon where it is outdated."""
-    known = analysis.known(scene)
+    wanted = settings.snapshot(scene)
+    known = analysis.known(scene, wanted)
     if known is None:
         return None
-    depth = analysis.known_depth(scene)
+    depth = analysis.known_depth(known, wanted)
     if depth is None:
         if not bpy.app.timers.is_registered(_work_out):
             bpy.app.timers.register(_work_out, first_interval=SOON)

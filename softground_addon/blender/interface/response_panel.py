@@ -112,7 +112,7 @@ class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
         column.separator()
-        for part in response_job.PERFORMANCE:
+        for part in settings.PERFORMANCE:
             column.prop(options.grounding, part)
         column = _group(layout, options.tilt, ("strength", "lateral", "frequency", "damping"))
         column.operator_menu_enum("softground.tilt_preset", "source")

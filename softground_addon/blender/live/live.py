@@ -7,6 +7,7 @@ working. While live mode is on, the ground carries what a bake would leave on it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -22,16 +23,17 @@ from ...core.playback.playback_curves import playback_curves_at
 from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
+from ...core.settings import Acts, BakeSettings
 from .. import jobs, session, settings
 from ..baking import bake_report
 from ..baking.bake_checks import coverage, shortest_sole, wants_detail
 from ..characters.character_setup import characters_of
 from ..ground import baked_ground, ground_mesh, playback, trail_detail
-from ..ground.created_ground import create_ground, reach_for
+from ..ground.created_ground import create_ground, reach_of
 from ..ground.modified_prints import are_undone
 from ..operator_base import reports_errors
 from ..reading import analysis, staleness
-from ..reading.shots import ground_of
+from ..reading.shots import ground_of, settings_of
 from ..translation import rpt_
 from .live_ground import LiveGround
 
@@ -54,23 +56,22 @@ class LiveMode:
     """
 
     def __init__(self, scene: bpy.types.Scene) -> None:
-        settings.forget_deleted_ground(scene)
-        options = scene.softground
+        wanted = settings_of(scene)
         known = analysis.read(scene)
-        if options.ground is None:
+        if wanted.ground is None:
             with analysis.own_changes(scene):
-                create_ground(scene, known.shot.plan)
+                create_ground(scene, wanted, known.shot.plan)
+            wanted = settings.snapshot(scene)
             known = analysis.read(scene)
         self.scene = scene.session_uid
         self.rendering = False
-        self._owner = options.ground.session_uid
-        self._ground = _carrier(scene, known)
-        self._begin(scene, known)
+        self._owner = wanted.ground
+        self._ground = _carrier(wanted, known)
+        self._begin(wanted, known)
 
-    def _begin(self, scene: bpy.types.Scene, known: analysis.Analysis) -> None:
-        self._analysis = known
-        self._playhead = Playhead(known.loads, ground_of(scene, known.shot), settings.cell_size_of(scene))
-        self._frame_rate = known.shot.motions[0].frame_rate
+    def _begin(self, wanted: BakeSettings, known: analysis.Analysis) -> None:
+        self._analysis, self._wanted = known, wanted
+        self._playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
 
     def follow(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
@@ -85,7 +86,7 @@ class LiveMode:
         return True
 
     def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
-        self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._frame_rate)
+        self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._wanted.frame_rate)
 
     def show_anew(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
@@ -100,7 +101,7 @@ class LiveMode:
     def read_anew(self, scene: bpy.types.Scene) -> bool:
         """Start from the animation, mass and forces as they are now; False if that is not possible."""
         try:
-            self._begin(scene, analysis.read(scene))
+            self._begin(settings.snapshot(scene), analysis.read(scene))
         except InputError:
             return False
         return self.show_anew(scene)
@@ -114,33 +115,32 @@ class LiveMode:
         return self._playhead.in_contact(), self._playhead.ground.cell_size, self._playhead.material.rim_reach
 
     def keep(self, scene: bpy.types.Scene) -> None:
-        """Leave the ground as it is shown, as the bake of the frames up to now."""
+        """Leave the ground as it is shown, as the bake of the frames up to now with what they were pressed with."""
         ground = self._ground.object()
         if ground is None:
             return
         footprints = self._playhead.footprints()
-        unit_scale = scene.unit_settings.scale_length
-        sigma = self._playhead.material.blur_sigma
+        wanted = replace(self._wanted, material=self._playhead.material)
+        unit_scale, sigma = wanted.unit_scale_m, wanted.material.blur_sigma
         pressed = PressedGround.at(
             footprints,
             frame=self._playhead.frame,
-            frame_rate=self._frame_rate,
+            frame_rate=wanted.frame_rate,
             cell_size=self._playhead.ground.cell_size,
             blur_sigma=sigma,
         )
         vertices = ground_mesh.rest_vertices(ground, unit_scale)
         index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
-        inputs = bake_report.inputs_of(scene)
-        so_far = inputs | {"frames": [scene.softground.frame_start, int(self._playhead.frame)]}
-        stored = record.dump(record.BakeRecord(footprints, {"inputs": so_far, "input_hash": ""}))
+        wanted = replace(wanted, frames=(wanted.frames[0], int(self._playhead.frame)))
+        stored = record.dump(record.BakeRecord(footprints, {"inputs": wanted.inputs(), "input_hash": ""}))
         place = baked_ground.on_itself(ground, index, vertices)
         across = place.position[:, :2].T
         spans, lines = playback_curves_at(
             footprints,
             *across,
             blur_sigma=sigma,
-            frame_rate=self._frame_rate,
-            time_stretch=settings.time_stretch_of(scene),
+            frame_rate=wanted.frame_rate,
+            time_stretch=wanted.time_stretch,
         )
         with playback.keyframe_tables(lines) as table:
             writing = baked_ground.write(
@@ -150,40 +150,43 @@ class LiveMode:
                 table,
                 stored,
                 unit_scale=unit_scale,
-                shape_keys=scene.softground.shape_keys,
+                shape_keys=wanted.shape_keys,
             )
             carrier = jobs.run(writing)
         ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
-        staleness.store(inputs, scene)
+        owner = settings.found(wanted.ground) if wanted.ground else carrier
+        staleness.store(wanted.inputs(Acts.WRITING), owner, staleness.of_movers(scene, wanted))
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner), None)
+        owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner.uid), None)
         ground = owner or self._ground.object()
         if ground is not None:
             baked_ground.clear(ground)
 
 
-def _carrier(scene: bpy.types.Scene, known: analysis.Analysis) -> LiveGround:
-    """What takes the prints: the scene's ground, or a copy that is fine where its characters will step.
+def _carrier(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
+    """What takes the prints: the ground, or a copy that is fine where its characters will step.
 
     Raises
     ------
     InputError
         If the ground is too coarse and is to stay so.
     """
-    options, unit_scale = scene.softground, scene.unit_settings.scale_length
-    ground, shot, cell_size = options.ground, known.shot, settings.cell_size_of(scene)
+    assert wanted.ground is not None
+    ground, shot = settings.found(wanted.ground), known.shot
+    unit_scale, cell_size, detail = wanted.unit_scale_m, wanted.cell_size_m, wanted.detail
     vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
     if shot.plan.footfalls is not None:
         footfalls = cells_at(shot.plan.footfalls, cell_size)
         cover = coverage(vertices, slice(None), footfalls, cell_size)
         under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
-        if wants_detail(ground, cover, options.detail, cell_size, shortest_sole(shot.motions)) or are_undone(
-            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=options.detail
+        if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
+            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
         ):
             surface = trail_detail.surface_of(ground, unit_scale)
-            refinement = refine(surface, trail_detail.region_around(footfalls, cell_size, reach_for(scene)), cell_size)
+            region = trail_detail.region_around(footfalls, cell_size, reach_of(wanted.material))
+            refinement = refine(surface, region, cell_size)
             with trail_detail.draft(ground, surface, refinement) as draft:
                 ground = trail_detail.publish(ground, draft)
             vertices = refinement.at_vertices(surface, surface.vertices)

@@ -6,9 +6,10 @@ as known until what it was read from changes; what the add-on itself writes leav
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 
@@ -18,16 +19,20 @@ from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import pressed_area
 from ...core.loads.estimate import CharacterLoads
 from ...core.prediction import TAKES_NO_PRINT, PropLoad, StanceLoad, deepest, matching_modulus, stance_loads
+from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import jobs, settings
-from ..characters.character_setup import characters_of
 from . import staleness
-from .shots import Shot, estimate_shot, ground_of, read_shot
+from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 
 TRIALS = 4
 """Bakes that a match may compute: two are enough unless feet slide."""
 CLOSE_ENOUGH = 0.005
 """Relative error of a matched depth."""
+
+
+_Source = tuple[Mapping[str, Any], Any]
+"""Settings that decide what is read of a shot, and where its ground lies."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +41,12 @@ class Analysis:
 
     Attributes
     ----------
-    sources : frozenset of hashable
+    sources : tuple
         What it was read from, as far as it is seen in the settings: several where the add-on itself changed them.
     hashes : frozenset of str
         Of the animation, the meshes and the ground that it was read from, likewise.
-    terms : hashable
-        What the loads depend on beside that.
+    terms : tuple
+        Settings that the loads and the stances depend on beside that.
     shot : Shot
     loads : list of CharacterLoads
     stances : list of StanceLoad or PropLoad
@@ -49,9 +54,9 @@ class Analysis:
         That the soles cover on the ground, with each step counted [m²].
     """
 
-    sources: frozenset[Hashable]
+    sources: tuple[_Source, ...]
     hashes: frozenset[str]
-    terms: Hashable
+    terms: tuple[Any, ...]
     shot: Shot
     loads: list[CharacterLoads]
     stances: list[StanceLoad | PropLoad]
@@ -85,22 +90,23 @@ def is_empty() -> bool:
     return not _known
 
 
-def known(scene: bpy.types.Scene) -> Analysis | None:
+def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models that it was last asked for.
 
     Only looks; see `current`.
     """
     analysis = _known.get(scene.session_uid)
-    return analysis if analysis and _source(scene) in analysis.sources else None
+    return analysis if analysis and _source(wanted or settings.snapshot(scene)) in analysis.sources else None
 
 
 def current(scene: bpy.types.Scene) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
-    analysis = known(scene)
-    if analysis is None or analysis.terms == _terms(scene):
+    wanted = settings.snapshot(scene)
+    analysis = known(scene, wanted)
+    if analysis is None or analysis.terms == _terms(wanted):
         return analysis
     try:
-        return _keep(scene, analysis.shot, analysis.sources, analysis.hashes)
+        return _keep(scene, wanted, analysis.shot, analysis.sources, analysis.hashes)
     except InputError:
         del _known[scene.session_uid]
         return None
@@ -116,8 +122,9 @@ def read(scene: bpy.types.Scene) -> Analysis:
     """
     analysis = current(scene)
     if analysis is None:
-        shot = jobs.run(read_shot(scene))
-        analysis = _keep(scene, shot, frozenset([_source(scene)]), frozenset([_hash_of(scene)]))
+        wanted = settings_of(scene)
+        shot = jobs.run(read_shot(scene, wanted))
+        analysis = _keep(scene, wanted, shot, (_source(wanted),), frozenset([_hash_of(scene)]))
     return analysis
 
 
@@ -131,11 +138,11 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     if analysis is None:
         return
     _tell_of_changes(scene)
-    source = _source(scene)
+    source = _source(settings.snapshot(scene))
     if source in analysis.sources:
         _known[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
-        sources, hashes = analysis.sources | {source}, analysis.hashes | {_hash_of(scene)}
+        sources, hashes = (*analysis.sources, source), analysis.hashes | {_hash_of(scene)}
         _known[scene.session_uid] = replace(analysis, sources=sources, hashes=hashes)
 
 
@@ -150,24 +157,21 @@ def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = Non
     analysis = current(scene)
     if analysis is None:
         return None
-    key = _key(scene, analysis, material)
+    key = _key(settings.snapshot(scene), analysis, material)
     if key not in _depths:
         _depths[key] = deepest(analysis.stances, *key[1:])
     return _depths[key]
 
 
-def known_depth(scene: bpy.types.Scene) -> float | None:
+def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:
     """The expected depth [m] if it was asked for since anything has changed that it depends on. Only looks."""
-    analysis = known(scene)
-    if analysis is None or analysis.terms != _terms(scene):
-        return None
-    return _depths.get(_key(scene, analysis))
+    return _depths.get(_key(wanted, analysis)) if analysis.terms == _terms(wanted) else None
 
 
 def _key(
-    scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial | None = None
+    wanted: BakeSettings, analysis: Analysis, material: GroundMaterial | None = None
 ) -> tuple[int, GroundMaterial, Pressure]:
-    return id(analysis.stances), material or settings.material_of(scene), scene.softground.pressure
+    return id(analysis.stances), material or wanted.material, wanted.pressure
 
 
 def match_depth(scene: bpy.types.Scene, depth: float) -> float:
@@ -178,33 +182,32 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
     InputError
         If there is none, or the shot cannot be read.
     """
-    analysis = read(scene)
-    material = settings.material_of(scene)
+    analysis, wanted = read(scene), settings.snapshot(scene)
     aim = depth
     for _ in range(TRIALS):
-        material = replace(
-            material, youngs_modulus=matching_modulus(analysis.stances, material, aim, scene.softground.pressure)
-        )
-        reached = _simulated_depth(scene, analysis, material)
+        modulus = matching_modulus(analysis.stances, wanted.material, aim, wanted.pressure)
+        wanted = replace(wanted, material=replace(wanted.material, youngs_modulus=modulus))
+        reached = _simulated_depth(wanted, analysis)
         if not reached > 0:
             raise InputError(TAKES_NO_PRINT)
         if abs(reached - depth) <= CLOSE_ENOUGH * depth:
             break
         aim *= depth / reached  # sliding feet print less deep than predicted
-    return material.youngs_modulus
+    return wanted.material.youngs_modulus
 
 
-def _simulated_depth(scene: bpy.types.Scene, analysis: Analysis, material: GroundMaterial) -> float:
-    ground = replace(ground_of(scene, analysis.shot), material=material)
-    results = simulate(analysis.loads, ground, settings.cell_size_of(scene))
+def _simulated_depth(wanted: BakeSettings, analysis: Analysis) -> float:
+    results = simulate(analysis.loads, ground_of(wanted, analysis.shot), wanted.cell_size_m)
     return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
 
 
-def _keep(scene: bpy.types.Scene, shot: Shot, sources: frozenset[Hashable], hashes: frozenset[str]) -> Analysis:
+def _keep(
+    scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
+) -> Analysis:
     """Work the loads of a shot out and know it from now on."""
-    loads = jobs.run(estimate_shot(scene, shot))
-    stances = stance_loads(loads, shot.terrain, settings.cell_size_of(scene), shot.variation)
-    analysis = Analysis(sources, hashes, _terms(scene), shot, loads, stances, pressed_area(loads))
+    loads = jobs.run(estimate_shot(wanted, shot))
+    stances = stance_loads(loads, shot.terrain, wanted.cell_size_m, shot.variation)
+    analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, stances, pressed_area(loads))
     _known[scene.session_uid] = analysis
     _depths.clear()
     return analysis
@@ -212,37 +215,20 @@ def _keep(scene: bpy.types.Scene, shot: Shot, sources: frozenset[Hashable], hash
 
 def _hash_of(scene: bpy.types.Scene) -> str:
     """What a shot is read from, as far as it is not seen in the settings."""
-    return report.hash_inputs(staleness.of_movers(scene), staleness.of_ground(scene))
+    wanted = settings.snapshot(scene)
+    return report.hash_inputs(staleness.of_movers(scene, wanted), staleness.of_ground(wanted))
 
 
-def _source(scene: bpy.types.Scene) -> Hashable:
+def _source(wanted: BakeSettings) -> _Source:
     """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
-    options = scene.softground
-    return (
-        (options.frame_start, options.frame_end, settings.frame_rate_of(scene), settings.time_stretch_of(scene)),
-        (settings.gravity_of(scene), scene.unit_settings.scale_length),
-        options.ground and (options.ground.session_uid, *(tuple(row) for row in options.ground.matrix_world)),
-        (options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
-        tuple(
-            (
-                character.armature and character.armature.session_uid,
-                tuple((joint.name, joint.bone, joint.end) for joint in character.joints),
-                tuple(
-                    (s.name, s.side, s.kind, s.bone, s.toe_bone, s.object and s.object.name) for s in character.soles
-                ),
-            )
-            for character in characters_of(scene)
-        ),
-    )
+    place = wanted.ground and [tuple(row) for row in settings.found(wanted.ground).matrix_world]
+    return wanted.between(Acts.READING, Acts.READING), place
 
 
-def _terms(scene: bpy.types.Scene) -> Hashable:
-    tau = scene.softground.material.characteristic_time
-    return tuple(
-        (
-            character.mass,
-            character.force_model,
-            tau if character.force_model == "IMPULSE" or character.armature is None else None,
-        )
-        for character in characters_of(scene)
-    )
+def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
+    """What the loads depend on, and the stances: whatever acts on the prints but what a prediction is asked about."""
+    told = wanted.between(Acts.LOADS, Acts.PRESSING)
+    for asked in ("material", "pressure", "preset"):
+        del told[asked]
+    landing = any(one.force_model == "IMPULSE" or one.armature is None for one in wanted.characters)
+    return told, wanted.material.characteristic_time if landing else None

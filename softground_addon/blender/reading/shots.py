@@ -17,14 +17,14 @@ from ...core.ground.variation import PaintedSurface
 from ...core.ground_plan import GroundPlan, plan_ground
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
+from ...core.settings import BakeSettings
 from .. import settings
-from ..characters.character_setup import characters_of, mapping_of, title_of
 from ..characters.prop_extraction import check_things
+from ..characters.rig_mapping import RigMapping
 from ..characters.rig_sampling import sample_character, sample_thing
 from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
-from ..properties import SoftGroundCharacter
 
 Array = NDArray[np.float64]
 
@@ -57,52 +57,78 @@ class Shot:
         return PaintedSurface(self.terrain) if painted and isinstance(self.terrain, MeshTerrain) else None
 
 
-def read_shot(scene: bpy.types.Scene) -> Job[Shot]:
+def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
+    """The scene's settings as they are now (`settings.snapshot`), if they can be baked.
+
+    Raises
+    ------
+    InputError
+        If not; names what is wrong and the remedy.
+    """
+    settings.forget_deleted_ground(scene)
+    for character in scene.softground.characters:
+        if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
+            raise InputError(
+                f"The object of '{character.name}' is gone: choose another one in Soles, or remove '{character.name}' "
+                "from the characters."
+            )
+    wanted = settings.snapshot(scene, grounded=grounded)
+    if not wanted.characters:
+        raise InputError(
+            "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
+            "Character."
+        )
+    for one in wanted.characters:
+        check_things(scene, one.name, one.soles)
+    start, end = wanted.frames
+    if end <= start:
+        raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
+    if wanted.ground is not None:
+        ground_checks.check_usable(settings.found(wanted.ground))
+    return wanted
+
+
+def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
     """What the scene's characters do, and the ground that they do it on.
 
     Raises
     ------
     InputError
-        If the settings, a character or the ground cannot be used; names it and the remedy.
+        If a character or the ground cannot be used; names it and the remedy.
     """
-    options = scene.softground
-    characters = characters_of(scene)
-    check_settings(scene, characters)
-    motions = yield from sample_characters(scene, characters)
+    motions = yield from sample_characters(scene, wanted)
     plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-    if options.ground is None:
+    if wanted.ground is None:
         return Shot(tuple(motions), plan, None, plan.terrain)
-    painted = painted_ground.names_of(scene)
-    surface = ground_mesh.undisturbed_surface(options.ground, scene.unit_settings.scale_length, painted)
+    ground = settings.found(wanted.ground)
+    painted = painted_ground.names_of(ground, wanted.painted)
+    surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
     yield Progress("sample", 1.0)
     work = ground_mesh.terrain_of.slices(surface, np.stack([plan.lower, plan.upper]))
     terrain = yield from meanwhile(Progress("sample", 1.0), work)
     return Shot(tuple(motions), plan, surface, terrain)
 
 
-def ground_of(scene: bpy.types.Scene, shot: Shot) -> SoftGround:
-    """The ground of a shot, with the material and the spread of pressure that the scene has now."""
-    return SoftGround(shot.terrain, settings.material_of(scene), scene.softground.pressure, shot.variation)
+def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
+    """The ground of a shot, with the material and the spread of pressure that are wanted."""
+    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation)
 
 
-def estimate_shot(scene: bpy.types.Scene, shot: Shot) -> Job[list[CharacterLoads]]:
-    """The loads of all characters of a shot, with the masses and force models that the scene has now.
+def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]:
+    """The loads of all characters of a shot, with the masses and force models that are wanted.
 
     Raises
     ------
     InputError
         If nobody touches the ground.
     """
-    material = settings.material_of(scene)
-    characters = characters_of(scene)
     loads = []
-    for motion, character in zip(shot.motions, characters, strict=True):
-        moved = replace(motion, mass=settings.typed(character.mass))
-        work = estimate_loads.slices(moved, shot.terrain, force_model=character.force_model, material=material)
+    for motion, character in zip(shot.motions, wanted.characters, strict=True):
+        moved = replace(motion, mass=character.mass_kg)
+        work = estimate_loads.slices(moved, shot.terrain, force_model=character.force_model, material=wanted.material)
         loads.append((yield from meanwhile(Progress("sample", 1.0), work)))
-    ground = scene.softground.ground
     yield Progress("sample", 1.0)
-    check_contacts(loads, shot.terrain, ground and ground.name)
+    check_contacts(loads, shot.terrain, wanted.ground.name if wanted.ground else None)
     return loads
 
 
@@ -137,7 +163,7 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
             )
 
 
-def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
+def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
     """The ground that fits the walk of the scene's characters.
 
     Raises
@@ -145,48 +171,20 @@ def fit_ground(scene: bpy.types.Scene) -> Job[GroundPlan]:
     InputError
         If the characters cannot be read.
     """
-    characters = characters_of(scene)
-    check_settings(scene, characters)
-    motions = yield from sample_characters(scene, characters)
+    motions = yield from sample_characters(scene, wanted)
     return (yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions)))
 
 
-def check_settings(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> None:
-    """Raise InputError, naming the remedy, if the scene's settings cannot be baked."""
-    settings.forget_deleted_ground(scene)
-    options = scene.softground
-    for character in options.characters:
-        if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
-            raise InputError(
-                f"The object of '{character.name}' is gone: choose another one in Soles, or remove '{character.name}' "
-                "from the characters."
-            )
-    if not characters:
-        raise InputError(
-            "No character is set up: select an animated armature, or objects that fall or roll, and press Add "
-            "Character."
-        )
-    for character in characters:
-        check_things(scene, title_of(character), mapping_of(character).soles)
-    if options.frame_end <= options.frame_start:
-        raise InputError(
-            f"The frame range {options.frame_start}-{options.frame_end} is empty: set End after Start in the Bake "
-            "panel."
-        )
-    if options.ground is not None:
-        ground_checks.check_usable(options.ground)
-
-
-def sample_characters(scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter]) -> Job[list[CharacterMotion]]:
+def sample_characters(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[list[CharacterMotion]]:
     """The motion of each character."""
     motions = []
-    options = scene.softground
-    frames = range(options.frame_start, options.frame_end + 1)
-    for number, character in enumerate(characters):
-        mapping, mass = mapping_of(character), settings.typed(character.mass)
-        if character.armature:
-            job = sample_character(scene, character.armature, mapping, mass=mass, frames=frames)
+    frames = range(wanted.frames[0], wanted.frames[1] + 1)
+    for number, one in enumerate(wanted.characters):
+        mapping = RigMapping(one.joints, one.soles, "settings")
+        if one.armature:
+            armature = settings.found(one.armature)
+            job = sample_character(scene, armature, mapping, mass=one.mass_kg, frames=frames)
         else:
-            job = sample_thing(scene, character.name, mapping, mass=mass, frames=frames)
-        motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(characters))))
+            job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames)
+        motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
     return motions

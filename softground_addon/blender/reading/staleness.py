@@ -4,78 +4,91 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.errors import InputError
 from ...core.files import report
-from ..characters.character_setup import ancestors, characters_of, leaders, movers_of, title_of
+from ...core.settings import Acts, BakeSettings, CharacterSettings
+from .. import settings
+from ..characters.character_setup import ancestors, leaders
+from ..characters.rig_sampling import object_named
 from ..characters.sole_extraction import meshes_on
 from ..compat import SERIES
 from ..ground import ground_mesh, painted_ground, playback
 from ..ground.baked_ground import carrier_of
-from ..properties import SoftGroundCharacter
 from . import input_hashes
 
 FINGERPRINTS = "softground_fingerprints"
 """Property of the mesh that carries a bake: what it was made from, as JSON."""
 
-SETTINGS, WRITING, GROUND, SURFACE, PRINTS = "settings", "writing", "ground", "surface", "prints"
+SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
 ANIMATION, PLACE, MOVEMENT, BODY = "animation", "place", "movement", "body"
 VERSION = "version"
+_WRITING = "writing"
+"""Of version 0.1: how its prints were put on the ground."""
 _OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
-_NOT_INPUTS = ("file", "scene")
-"""Entries of a bake's inputs that may change without the bake changing."""
+_OF_0_1 = (
+    *("ground", "characters", "preset", "material", "pressure", "painted", "cell_size_m", "frames"),
+    *("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "response"),
+)
+"""Settings of which bakes of version 0.1 hold one hash."""
 
 
-def store(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: Mapping[str, str] | None = None) -> None:
-    """Note with the bake that was just written to the scene's ground what it was made from.
+def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[str, str]) -> None:
+    """Note with the bake that was just written to a ground what it was made from.
 
     Parameters
     ----------
     inputs : mapping
-        What it was made with.
-    scene : bpy.types.Scene
-    movers : mapping of str to str, optional
-        From `of_movers`, as they were when they were read; without, as they are now.
+        Settings that it was made with, as `BakeSettings.inputs` has them.
+    ground : bpy.types.Object
+    hashes : mapping of str to str
+        From `of_movers`, as they were when they were read.
     """
-    mesh = ground_mesh.mesh_of(carrier_of(scene.softground.ground))
-    mesh[FINGERPRINTS] = json.dumps(_fingerprints(inputs, scene, of_movers(scene) if movers is None else movers))
+    painted = inputs["painted"]
+    stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, painted), **hashes}
+    ground_mesh.mesh_of(carrier_of(ground))[FINGERPRINTS] = json.dumps(stamp)
 
 
-def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, ...]:
-    """What has changed since the bake on the scene's ground, for the user to read; nothing where there is none.
+def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
+    """What has changed since the bake on a ground, for the user to read; nothing where there is none.
 
     Parameters
     ----------
-    inputs : mapping
+    scene : bpy.types.Scene
+    wanted : BakeSettings
         What a bake would be made with now.
-    scene : bpy.types.Scene
-        Has a ground.
     """
-    ground = scene.softground.ground
+    if wanted.ground is None:
+        return ()
+    ground = settings.found(wanted.ground)
     carrier = carrier_of(ground)
     if not ground_mesh.is_baked(carrier):
         return ()
-    if edited := next((thing for thing in (ground, carrier, *_bodies_of(scene)) if thing.mode == "EDIT"), None):
+    if edited := next((thing for thing in (ground, carrier, *_bodies_of(scene, wanted)) if thing.mode == "EDIT"), None):
         return (f"'{edited.name}' is in Edit Mode",)
     if playback.modifier_of(carrier) is None:
         return (f"'{carrier.name}' has lost its playback, and shows one moment only",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
-        now = _fingerprints(inputs, scene, of_movers(scene))
-        left_out = () if then.get(VERSION) == now[VERSION] else _OF_VERSION
+        inputs = wanted.inputs(Acts.WRITING)
+        now = {**_of_settings(inputs), **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
+        if SETTINGS in then:
+            now |= _as_in_0_1(inputs)
+        left_out = (VERSION,) if then.get(VERSION) == SERIES else _OF_VERSION
         told = (key for key in then if key.partition(":")[0] not in left_out)  # earlier bakes tell of less
         changed = [key for key in told if then[key] != now.get(key)]
     except (KeyError, TypeError, ValueError, AttributeError):
         return ("The bake does not say what it was made from",)
     texts = {
         SETTINGS: "The settings have changed",
-        WRITING: "The settings have changed",
+        _WRITING: "The settings have changed",
         GROUND: f"The mesh or the place of '{ground.name}' has changed",
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{carrier.name}' has been edited",
@@ -92,33 +105,44 @@ def reasons(inputs: Mapping[str, object], scene: bpy.types.Scene) -> tuple[str, 
     )
 
 
-def of_movers(scene: bpy.types.Scene) -> dict[str, str]:
+def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
-    ground, movers = scene.softground.ground, movers_of(scene)
+    ground = settings.found(wanted.ground) if wanted.ground else None
+    movers = [thing for one in wanted.characters for thing in _movers_of(one)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
-        **{f"{BODY}:{title_of(one)}": _of_body(scene, one) for one in characters_of(scene)},
+        **{f"{BODY}:{one.name}": _of_body(scene, one) for one in wanted.characters},
     }
 
 
-def of_ground(scene: bpy.types.Scene) -> dict[str, str]:
+def of_ground(wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the ground of a shot is read from, the same with and without a bake on it; none without ground."""
-    ground = scene.softground.ground
-    return {GROUND: _of_ground(ground), SURFACE: _of_surface(scene)} if ground else {}
+    if wanted.ground is None:
+        return {}
+    ground = settings.found(wanted.ground)
+    return {GROUND: _of_ground(ground), SURFACE: _of_surface(ground, wanted.painted)}
 
 
-def _fingerprints(inputs: Mapping[str, object], scene: bpy.types.Scene, movers: Mapping[str, str]) -> dict[str, str]:
-    options, ground = scene.softground, scene.softground.ground
+def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
+    """A hash of each setting; of one that was not there yet, earlier bakes do not tell."""
+    return {f"{SETTINGS}:{name}": report.hash_inputs(value) for name, value in inputs.items()}
+
+
+def _as_in_0_1(inputs: Mapping[str, Any]) -> dict[str, str]:
     return {
-        VERSION: SERIES,
-        SETTINGS: report.hash_inputs({key: value for key, value in inputs.items() if key not in _NOT_INPUTS}),
-        WRITING: f"{options.detail} {options.shape_keys}",
+        SETTINGS: report.hash_inputs({name: inputs[name] for name in _OF_0_1}),
+        _WRITING: f"{inputs['detail']} {inputs['shape_keys']}",
+    }
+
+
+def _of_bake(ground: bpy.types.Object, painted: Sequence[str]) -> dict[str, str]:
+    """Hashes of a ground with a bake on it."""
+    return {
         GROUND: f"{_of_ground(ground)}-{_modifiers_of(ground)}",
-        SURFACE: _of_surface(scene),
+        SURFACE: _of_surface(ground, painted),
         PRINTS: input_hashes.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
-        **movers,
     }
 
 
@@ -134,20 +158,19 @@ def _modifiers_of(ground: bpy.types.Object) -> list[str]:
     return [item.type for item in ground.modifiers if item == played or (item.show_viewport and item not in own)]
 
 
-def _of_surface(scene: bpy.types.Scene) -> str:
+def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:
     """What the ground's modifiers do, and how its material varies."""
-    ground = scene.softground.ground
     keyed = input_hashes.animated_paths_of(ground)
     told = [
         text for modifier in ground_mesh.users_modifiers(ground) for text in input_hashes.of_settings(modifier, keyed)
     ]
     told += filter(None, [input_hashes.of_keys(ground)])
     try:
-        painted = [name for name in painted_ground.names_of(scene) if name]
+        names = [name for name in painted_ground.names_of(ground, painted) if name]
     except InputError as error:
         return str(error)
-    told += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in painted]
-    return input_hashes.joined([*told, input_hashes.of_weights(ground, painted)])
+    told += [input_hashes.of_attribute(ground_mesh.mesh_of(ground), name) for name in names]
+    return input_hashes.joined([*told, input_hashes.of_weights(ground, names)])
 
 
 def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> str:
@@ -168,26 +191,36 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
     return input_hashes.joined(sorted(told))
 
 
-def _bodies_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def _movers_of(character: CharacterSettings) -> list[bpy.types.Object]:
+    """The armature and the objects of a character."""
+    return [*([settings.found(character.armature)] if character.armature else []), *_things_of(character)]
+
+
+def _things_of(character: CharacterSettings) -> list[bpy.types.Object]:
+    """The objects that print as soles of a character."""
+    return [object_named(sole.object) for sole in character.soles if sole.object]
+
+
+def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.types.Object]:
+    return meshes_on(scene, settings.found(character.armature)) if character.armature else []
+
+
+def _bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
-    characters = characters_of(scene)
-    worn = [mesh for one in characters if one.armature for mesh in meshes_on(scene, one.armature)]
-    return [*worn, *(sole.object for one in characters for sole in one.soles if sole.object)]
+    return [thing for one in wanted.characters for thing in (*_worn_by(scene, one), *_things_of(one))]
 
 
-def _of_body(scene: bpy.types.Scene, character: SoftGroundCharacter) -> str:
+def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     told = []
-    for thing in (sole.object for sole in character.soles if sole.object):
+    for thing in _things_of(character):
         modifiers = (text for modifier in thing.modifiers for text in input_hashes.of_settings(modifier))
         told.append(f"{_of_mesh(thing)} {input_hashes.joined(modifiers)}")
-    if character.armature:
-        told += [
-            f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} "
-            f"{input_hashes.of_place([worn])}"
-            for worn in meshes_on(scene, character.armature)
-        ]
+    told += [
+        f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
+        for worn in _worn_by(scene, character)
+    ]
     return input_hashes.joined(sorted(told))
 
 

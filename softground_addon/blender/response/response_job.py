@@ -16,27 +16,21 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
 from ...core.record.footprints import Footprint
 from ...core.response.grounding import Response, responding
-from ...core.response.performance import Performance, suggested_speed
+from ...core.response.performance import suggested_speed
 from ...core.response.response import (
     Gaps,
-    GroundingOptions,
-    TiltOptions,
     at_scene_frames,
     gaps,
     mean_sinkage,
     respond,
     stood_on,
 )
-from ...core.response.tilt import TiltGains
+from ...core.settings import BakeSettings, CharacterSettings, ResponseOptions
 from .. import settings
 from ..animation_layer import nla_layer
-from ..characters.character_setup import mapping_of
+from ..characters.rig_mapping import RigMapping
 from ..jobs import Job, Progress, counted, meanwhile
-from ..properties import SoftGroundCharacter
 from .character_keys import controls_of, response_curves
-
-PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
-"""What can be acted in deep ground, as the settings and the core call it."""
 
 NOTICEABLE_LEAN = np.radians(0.25)
 """A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
@@ -46,14 +40,6 @@ it, so that each pass makes the shot right further on (Picard iteration); two ar
 
 SHARE_OF_WRITING = 0.1
 """Part of a bake's last stage in which the rigs are read that get a layer."""
-
-
-@dataclass(frozen=True)
-class ResponseOptions:
-    """What the settings ask of the characters; None where something is off."""
-
-    tilt: TiltOptions | None
-    grounding: GroundingOptions | None
 
 
 @dataclass(frozen=True)
@@ -85,33 +71,15 @@ class CharacterResponse:
     sinkage: float
 
 
-def options_of(scene: bpy.types.Scene) -> ResponseOptions | None:
-    """What the scene's settings ask of the characters, None if nothing."""
-    options = scene.softground
-    if options.output == "PRINTS" or not (options.tilt.use or options.grounding.use):
-        return None
-    tilt = grounding = None
-    if options.tilt.use:
-        gains = TiltGains(settings.typed(options.tilt.frequency), settings.typed(options.tilt.damping))
-        tilt = TiltOptions(gains, settings.typed(options.tilt.strength), settings.typed(options.tilt.lateral))
-    if options.grounding.use:
-        grounding = GroundingOptions(
-            settings.typed(options.grounding.align),
-            settings.typed(options.grounding.lock),
-            Performance(**{part: settings.typed(getattr(options.grounding, part)) for part in PERFORMANCE}),
-        )
-    return ResponseOptions(tilt, grounding)
+def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
+    """Those that can answer the ground, with their armatures: things without a rig cannot."""
+    return [(one, settings.found(one.armature)) for one in characters if one.armature]
 
 
-def rigged(characters: Iterable[SoftGroundCharacter]) -> list[SoftGroundCharacter]:
-    """Those that can answer the ground: things without a rig cannot."""
-    return [character for character in characters if character.armature]
-
-
-def check_characters(characters: Iterable[SoftGroundCharacter]) -> None:
+def check_characters(characters: Iterable[CharacterSettings]) -> None:
     """Raise InputError, naming the remedy, where a character can take no layer."""
-    for character in rigged(characters):
-        nla_layer.check_layerable(character.armature)
+    for _, armature in rigged(characters):
+        nla_layer.check_layerable(armature)
 
 
 def standing_on(
@@ -186,16 +154,17 @@ def responses_of(
     return answers
 
 
-def layers_of(
-    scene: bpy.types.Scene, characters: Sequence[SoftGroundCharacter], answers: Sequence[CharacterResponse]
-) -> Job[list[Layer]]:
+def layers_of(scene: bpy.types.Scene, wanted: BakeSettings, answers: Sequence[CharacterResponse]) -> Job[list[Layer]]:
     """The keys of each character's layer; none without answers."""
     layers: list[Layer] = []
-    for number, (character, answer) in enumerate(zip(rigged(characters), answers, strict=False)):
-        reading = response_curves(scene, character.armature, mapping_of(character), answer.motion, answer.response)
+    rigs = [(one, one.armature) for one in wanted.characters if one.armature]
+    for number, ((character, armature), answer) in enumerate(zip(rigs, answers, strict=False)):
+        mapping = RigMapping(character.joints, character.soles, "settings")
+        reading = response_curves(scene, settings.found(armature), mapping, answer.motion, answer.response)
         frames = len(answer.motion.frames)
         curves = yield from counted(reading, "write", frames, part=number, parts=len(answers), share=SHARE_OF_WRITING)
-        layers.append(Layer(curves, _notes(scene, character, answer)))
+        carrier = controls_of(scene, settings.found(armature), mapping).bones[0]
+        layers.append(Layer(curves, _notes(carrier, answer)))
     return layers
 
 
@@ -207,29 +176,25 @@ WORST = "softground_worst_gaps"
 """Note of the frames where a gap is left, as JSON."""
 
 
-def _notes(scene: bpy.types.Scene, character: SoftGroundCharacter, answer: CharacterResponse) -> dict[str, str]:
-    controls = controls_of(scene, character.armature, mapping_of(character))
+def _notes(carrier: str, answer: CharacterResponse) -> dict[str, str]:
     return {
-        CARRIER: controls.bones[0],
+        CARRIER: carrier,
         WORST: json.dumps(worst_gaps([answer])),
         SPEED: f"{suggested_speed(answer.sinkage):.3f}",
     }
 
 
-def put_layers(
-    scene: bpy.types.Scene,
-    characters: Sequence[SoftGroundCharacter],
-    layers: Sequence[Layer],
-) -> None:
+def put_layers(scene: bpy.types.Scene, wanted: BakeSettings, layers: Sequence[Layer]) -> None:
     """Put each character's layer in the place of the one of an earlier bake; take that off where there is none now."""
-    stretch = settings.time_stretch_of(scene)
-    span = scene.softground.frame_start * stretch, scene.softground.frame_end * stretch
-    for number, character in enumerate(rigged(characters)):
+    start, end = (frame * wanted.time_stretch for frame in wanted.frames)
+    for number, (_, armature) in enumerate(rigged(wanted.characters)):
         if number < len(layers) and layers[number].curves:
-            nla_layer.add_layer(character.armature, layers[number].curves, span, layers[number].notes)
-            nla_layer.set_strength(character.armature, settings.typed(character.response_strength))
+            nla_layer.add_layer(armature, layers[number].curves, (start, end), layers[number].notes)
+            for shown in scene.softground.characters:  # how much of it shows is told at any time, and not by a bake
+                if shown.armature == armature:
+                    nla_layer.set_strength(armature, settings.typed(shown.response_strength))
         else:
-            nla_layer.remove_layer(character.armature)
+            nla_layer.remove_layer(armature)
 
 
 def remove_layers(scene: bpy.types.Scene) -> bool:

@@ -1,0 +1,202 @@
+"""Everything that a bake depends on, as it was when the bake began.
+
+The names of the fields are those of the report's inputs. A field says what it acts on first; where it says nothing,
+that is what the one says that it is part of, and `Acts.READING` at the top: of a setting that somebody adds without a
+thought, everything depends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from enum import IntEnum
+from typing import Any
+
+from .ground.material import GroundMaterial, Pressure
+from .loads.estimate import ForceModel
+from .response.response import GroundingOptions, TiltOptions
+
+
+class Acts(IntEnum):
+    """What a setting acts on first, in the order of a bake: a later one leaves what came before as it is."""
+
+    READING = 0
+    """What is read from the scene."""
+    LOADS = 1
+    """The forces on the ground."""
+    PRESSING = 2
+    """The prints."""
+    RESPONDING = 3
+    """The characters, and through them the prints."""
+    WRITING = 4
+    """How the prints are put on the ground."""
+    OUTPUT = 5
+    """Which results are made and where they go: a bake still fits when it changes."""
+
+
+def _on(acts: Acts) -> Mapping[str, Acts]:
+    return {"acts": acts}
+
+
+@dataclass(frozen=True)
+class ObjectName:
+    """An object of the scene: its name, and its number in this session, by which it is found whatever its name is."""
+
+    name: str
+    uid: int
+
+
+@dataclass(frozen=True)
+class SoleSource:
+    """What one sole is made from.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees, e.g. "foot.L".
+    side : str
+        "L", "R" or "".
+    bone : str
+        Bone of the armature that carries the sole; empty if an object does.
+    toe_bone : str
+        Bone of the toes; empty for a sole of one piece.
+    object : str
+        Name of an object that prints with its own mesh instead; empty if a bone does.
+    limb : bool
+        Whether the bone prints by whatever side of it faces down, as a hand, a knee or a back, and not by a sole.
+    """
+
+    name: str
+    side: str = ""
+    bone: str = ""
+    toe_bone: str = ""
+    object: str = ""
+    limb: bool = False
+
+
+@dataclass(frozen=True)
+class CharacterSettings:
+    """One character.
+
+    Attributes
+    ----------
+    armature : ObjectName or None
+        None of things without a rig.
+    name : str
+        What the user calls it.
+    mass_kg : float
+    force_model : 'WHOLE_BODY' or 'IMPULSE'
+    joints : mapping of str to (str, str)
+        Canonical joint to a bone and its end, "head" or "tail".
+    soles : tuple of SoleSource
+    """
+
+    armature: ObjectName | None
+    name: str
+    mass_kg: float = field(metadata=_on(Acts.LOADS))
+    force_model: ForceModel = field(metadata=_on(Acts.LOADS))
+    joints: Mapping[str, tuple[str, str]]
+    soles: tuple[SoleSource, ...]
+
+
+@dataclass(frozen=True)
+class ResponseOptions:
+    """What is asked of the characters; None where something is off."""
+
+    tilt: TiltOptions | None
+    grounding: GroundingOptions | None
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """Everything that a bake depends on, beside the objects themselves.
+
+    Attributes
+    ----------
+    file, scene : str
+        Where the shot is.
+    ground : ObjectName or None
+        None where one is to be made.
+    characters : tuple of CharacterSettings
+    preset, surface : str
+        Preset that was loaded last, and the render material of a ground that is made.
+    material : GroundMaterial
+    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
+    painted : (str, str, str)
+        What stiffness, layer depth and rim are painted with.
+    cell_size_m : float
+    frames : (int, int)
+        First and last of the scene.
+    frame_rate : float
+        Scene frames per second [Hz].
+    time_stretch : float
+        Frames of the animation per frame of the scene.
+    gravity_m_s2, unit_scale_m : float
+    response : ResponseOptions or None
+    output : 'BOTH', 'PRINTS' or 'RESPONSE'
+    detail : 'AUTO', 'ALWAYS' or 'NEVER'
+    shape_keys : bool
+    tread_m : float
+    keep_forces : bool
+    """
+
+    file: str = field(metadata=_on(Acts.OUTPUT))
+    scene: str = field(metadata=_on(Acts.OUTPUT))
+    ground: ObjectName | None
+    characters: tuple[CharacterSettings, ...]
+    preset: str = field(metadata=_on(Acts.PRESSING))
+    surface: str = field(metadata=_on(Acts.OUTPUT))
+    material: GroundMaterial = field(metadata=_on(Acts.PRESSING))
+    pressure: Pressure = field(metadata=_on(Acts.PRESSING))
+    painted: tuple[str, str, str]
+    cell_size_m: float = field(metadata=_on(Acts.PRESSING))
+    frames: tuple[int, int]
+    frame_rate: float
+    time_stretch: float
+    gravity_m_s2: float
+    unit_scale_m: float
+    response: ResponseOptions | None = field(metadata=_on(Acts.RESPONDING))
+    output: str = field(metadata=_on(Acts.OUTPUT))
+    detail: str = field(metadata=_on(Acts.WRITING))
+    shape_keys: bool = field(metadata=_on(Acts.WRITING))
+    tread_m: float = field(metadata=_on(Acts.WRITING))
+    keep_forces: bool = field(metadata=_on(Acts.OUTPUT))
+
+    def between(self, first: Acts, last: Acts) -> dict[str, Any]:
+        """The settings that act first on one of these stages."""
+        return _part(self, first, last)
+
+    def inputs(self, last: Acts = Acts.OUTPUT) -> dict[str, Any]:
+        """The settings that act up to a stage, by names and numbers alone, as the report has them."""
+        named: dict[str, Any] = _by_name(self.between(Acts.READING, last))
+        return named
+
+
+def _part(group: Any, first: Acts, last: Acts, inherited: Acts = Acts.READING) -> dict[str, Any]:
+    """The fields of a dataclass that act on some stages, and those of what it holds."""
+    found: dict[str, Any] = {}
+    for one in fields(group):
+        value, acts = getattr(group, one.name), one.metadata.get("acts", inherited)
+        if _is_group(value):
+            value = _part(value, first, last, acts)
+            is_in = bool(value)
+        elif isinstance(value, tuple) and any(map(_is_group, value)):
+            value = [_part(item, first, last, acts) for item in value]
+            is_in = any(value)
+        else:
+            is_in = first <= acts <= last
+        if is_in:
+            found[one.name] = value
+    return found
+
+
+def _is_group(value: Any) -> bool:
+    return is_dataclass(value) and not isinstance(value, ObjectName)
+
+
+def _by_name(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _by_name(part) for key, part in value.items()}
+    if isinstance(value, tuple | list):
+        return [_by_name(part) for part in value]
+    return value.name if isinstance(value, ObjectName) else value
