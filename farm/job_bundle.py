@@ -17,9 +17,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from softground_addon.batch import manifest
+from softground_addon.batch.manifest import BatchShot
 from softground_addon.core.errors import InputError, SoftGroundError
-from softground_addon.core.files import files, manifest
-from softground_addon.core.files.manifest import BatchShot
+from softground_addon.core.files import files
 
 MOST_TASKS = 1024
 """Most values of a task parameter that OpenJD 2023-09 takes."""

@@ -14,7 +14,9 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.command_line import batch, cli
+from softground_addon.batch import command
+from softground_addon.batch import manifest as manifests
+from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import ground_mesh
 from tests.blender import command_line, fingerprints, shots
 
@@ -173,9 +175,35 @@ def test_bad_input_exits_with_2_before_anything_is_baked(night, capfd, text, opt
     assert not (manifest.parent / "baked").exists()
 
 
+@pytest.mark.parametrize(
+    ("line", "options", "says"),
+    [
+        ("save = 'b.blend'", ("--report", "000.blend"), "'--report' would write over the shot"),
+        ("save = 'b.blend'", ("--report", "../{}/000.BLEND"), "'--report' would write over the shot"),
+        ("save = 'b.blend'", ("--report", "night.toml"), "'--report' would write over the manifest"),
+        ("save = 'b.blend'", ("--report", "b.blend"), "both write"),
+        ("save = 'b.blend', preset = 'bog.json'", ("--report", "bog.json"), "the preset of '000'"),
+        ("save = 'b.blend'", ("--report", "night.batch/000.receipt.json"), "the receipt of '000'"),
+        ("save = 'night.batch/000.log'", (), "the log of '000'"),
+        ("report = 'state/000.lock'", ("--state", "state"), "the lock of '000'"),
+        ("report = 'night.batch/batch.json'", (), "both write"),
+        ("report = 'night.batch'", (), "the state folder"),
+    ],
+)
+def test_no_result_replaces_what_the_batch_reads_or_keeps(night, capfd, monkeypatch, line, options, says):
+    path = night(1)
+    path.write_text(f"shots = [{{ file = '000.blend', {line} }}]")
+    (path.parent / "bog.json").write_text("{}")
+    before = {file: file.read_bytes() for file in path.parent.iterdir()}
+    monkeypatch.chdir(path.parent)
+    assert cli.run_in_blender(["batch", "night.toml", *(text.format(path.parent.name) for text in options)]) == 2
+    assert says in capfd.readouterr().err
+    assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
+
+
 def test_the_table_shows_hostile_names_on_one_line():
-    shot = batch.manifest.BatchShot(name='it\'s "two"\nlines\x1b[31m ❄ \u202e', file=Path("a.blend"))
-    lines = batch.table([batch.Outcome(shot, "refused", message="first\nsecond")]).splitlines()
+    shot = manifests.BatchShot(name='it\'s "two"\nlines\x1b[31m ❄ \u202e', file=Path("a.blend"))
+    lines = command.table([command.Outcome(shot, "refused", message="first\nsecond")]).splitlines()
     assert len(lines) == 3
     assert r"\nlines\x1b[31m" in lines[1]
     assert r"first\nsecond" in lines[1]

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from softground_addon.batch import manifest
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.core.errors import InputError
-from softground_addon.core.files import manifest
 from softground_addon.core.ground import presets
 from softground_addon.core.record import record
 from tests.blender import shots

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HALVES = {half: ROOT / "softground_addon" / half for half in ("core", "blender")}
+HALVES = {half: ROOT / "softground_addon" / half for half in ("core", "batch", "blender")}
 FOLDERS = [
     (half, path.parent.name)
     for half, root in HALVES.items()
@@ -41,7 +41,7 @@ def test_the_row_of_a_folder_shows_its_modules(half, folder):
     assert shown(row) == sorted(modules(HALVES[half] / folder))
 
 
-@pytest.mark.parametrize(("half", "folders"), [("core", set()), ("blender", {"properties"})])
+@pytest.mark.parametrize(("half", "folders"), [("core", set()), ("batch", set()), ("blender", {"properties"})])
 def test_the_first_row_shows_what_is_in_no_folder(half, folders):
     (row,) = re.findall(rf"^\| `softground_addon/{half}` itself.*", section(half), re.MULTILINE)
     assert shown(row) == sorted(modules(HALVES[half]) | folders)

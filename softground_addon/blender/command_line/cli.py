@@ -14,16 +14,17 @@ from typing import Any
 
 import bpy
 
+from ...batch import command, receipts
+from ...batch.manifest import BatchShot
 from ...core.errors import BakeError, InputError, SoftGroundError
-from ...core.files import files, receipts, report
-from ...core.files.manifest import BatchShot
+from ...core.files import files, report
 from ...core.ground import presets
 from .. import jobs, settings
 from ..baking import bake_job
 from ..characters.character_setup import set_up_automatically
 from ..output import export_formats
 from ..settings import user_folder
-from . import batch, cli_arguments
+from . import cli_arguments, program
 
 EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED_CHECK, EXIT_INTERRUPTED = 0, 2, 3, 130
 
@@ -45,7 +46,7 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
     try:
         options = cli_arguments.parse(arguments, standalone=standalone)
         if options.command == "batch":
-            return _batch_code(batch.bake_batch(options))
+            return _batch_code(command.bake_batch(options, program.made_by(), program.worker_command))
         if options.command == "export":
             _export(options)
         else:
@@ -74,7 +75,7 @@ def _interrupt(_number: int, _frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _batch_code(outcomes: Sequence[batch.Outcome]) -> int:
+def _batch_code(outcomes: Sequence[command.Outcome]) -> int:
     """The exit code of a batch: that of its worst shot."""
     statuses = {outcome.status for outcome in outcomes}
     if "interrupted" in statuses:
@@ -170,7 +171,7 @@ def _write_results(
         if options.receipt:
             receipts.write(
                 options.receipt,
-                made_by=batch.made_by(),
+                made_by=program.made_by(),
                 options=_batch_shot(options, target).options,
                 read=read,
                 wrote={str(path): receipts.checksum(partial) for path, partial in wrote.items()},
@@ -218,14 +219,16 @@ def _save_target(options: argparse.Namespace) -> Path | None:
 def _check_places(options: argparse.Namespace, target: Path | None) -> None:
     """Raise InputError unless all results can be written, each to a place of its own, and over no file that is read."""
     places = [Path(os.path.realpath(path)) for path in (target, options.report, options.receipt) if path]
-    for path in places:
+    named, read = map(files.identity, places), set(map(files.identity, _files_read(options)))
+    opened = files.identity(Path(bpy.data.filepath)) if bpy.data.filepath else None
+    taken: set[str] = set()
+    for path, name in zip(places, named, strict=True):
         files.check_place(path)
-        if places.count(path) > 1:
+        if name in taken:
             raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
-    read, opened = _files_read(options), Path(os.path.realpath(bpy.data.filepath))
-    for path in places:
-        if path in read and not path == opened == target:
+        if name in read and not (path == target and name == opened):
             raise InputError(f"'{path}' is read by this bake and would be lost: write to another file.")
+        taken.add(name)
 
 
 def _batch_shot(options: argparse.Namespace, target: Path | None) -> BatchShot:

@@ -7,9 +7,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...core.files.manifest import frame_range
+from ...batch import command
+from ...batch.manifest import frame_range
 from ..output import export_formats
-from . import batch
 
 
 def parse(arguments: Sequence[str], *, standalone: bool) -> argparse.Namespace:
@@ -48,7 +48,7 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     _add_bake(commands.add_parser("bake", help="bake the footprints of a shot"), standalone=standalone)
     _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
-    batch.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
+    command.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
     return parser
 
 
@@ -67,7 +67,7 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
     destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
     destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")
     bake.add_argument("--report", type=Path, metavar="FILE.json", help="write the report to this file")
-    bake.add_argument("--progress", choices=batch.PROGRESS_STYLES, default="plain", help="how to show progress")
+    bake.add_argument("--progress", choices=command.PROGRESS_STYLES, default="plain", help="how to show progress")
     bake.add_argument("--dry-run", action="store_true", help="check and compute everything, but do not save the shot")
     bake.add_argument(
         "--receipt", type=Path, metavar="FILE.json", help="write the checksums of what was read and written"

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import bpy
 
+from ...batch.manifest import BatchShot
+from ...batch.shell import command_line
 from ...core.errors import InputError
-from ...core.files.manifest import BatchShot
-from ...core.files.shell import command_line
 from .. import jobs, session, settings
 from ..characters import character_setup
-from ..command_line import batch
+from ..command_line import program
 from ..ground import baked_ground, ground_checks, ground_mesh
 from ..ground.created_ground import create_ground
 from ..operator_base import reports_errors
@@ -164,7 +164,7 @@ def bake_command(scene: bpy.types.Scene) -> str:
         scene=scene.name if len(bpy.data.scenes) > 1 else "",
         save=shot.with_name(f"{shot.stem}-baked.blend"),
     )
-    return command_line(batch.worker_command(shot, bake.options), windows=os.name == "nt")
+    return command_line(program.worker_command(shot, bake.options), windows=os.name == "nt")
 
 
 CLASSES = (

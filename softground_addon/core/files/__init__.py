@@ -1,1 +1,1 @@
-"""Files: the report, batches, receipts, point caches, and the only way to write one."""
+"""Files: the report, point caches, and the only way to write one."""

@@ -2,14 +2,59 @@
 
 from __future__ import annotations
 
-import glob
+import errno
+import hashlib
 import os
+import platform
+import re
+import secrets
 import shutil
+import stat
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import InputError
+
+_MACHINE = hashlib.sha256(platform.node().encode(errors="replace")).hexdigest()[:8]
+"""In the names of partial files: who may still be writing them cannot be seen from another machine."""
+
+LARGEST = 2**40
+"""Size of a file that is read through [bytes]; what claims more is none of a disk, such as the kernel's memory."""
+
+_BLOCK = 2**20
+"""Read at a time [bytes]."""
+
+
+def identity(path: Path) -> str:
+    """The same for all names of one file, or of the one that will be written there: through links, in any case."""
+    return unicodedata.normalize("NFC", os.path.realpath(path)).casefold()
+
+
+def regular_blocks(path: Path, largest: int = LARGEST) -> Iterator[bytes]:
+    """The content of a regular file, as long as it is now, block by block.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, is a pipe or a device, which may never end, or is larger than `largest` bytes.
+    """
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode):
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+    if about.st_size > largest:
+        raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
+    left = about.st_size
+    with path.open("rb") as content:
+        while left > 0 and (block := content.read(min(left, _BLOCK))):
+            left -= len(block)
+            yield block
+
+
+def read_regular(path: Path, largest: int) -> bytes:
+    """The whole of `regular_blocks`."""
+    return b"".join(regular_blocks(path, largest))
 
 
 @contextmanager
@@ -33,8 +78,9 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise _not_written(path, error) from error
     finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
+        for left in (partial, partial.with_name(f"{partial.name}@")):  # which Blender saves to before it renames
+            with suppress(OSError):
+                left.unlink(missing_ok=True)
 
 
 def check_place(path: Path) -> None:
@@ -81,9 +127,11 @@ _LARGEST_BLOCK = 2**20
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove what killed writers of `path` have left beside it; nobody may be writing it now."""
-    for left in path.parent.glob(f".{glob.escape(path.stem)}.*.partial{glob.escape(path.suffix)}"):
-        left.unlink(missing_ok=True)
+    """Remove what killed writers of `path` on this machine have left beside it; nobody here may be writing it now."""
+    name = re.compile(rf"\.{re.escape(path.stem)}\.{_MACHINE}-[0-9a-f]{{16}}\.partial{re.escape(path.suffix)}@?")
+    for left in path.parent.iterdir():
+        if name.fullmatch(left.name):
+            left.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -98,7 +146,8 @@ def _partial(path: Path) -> Path:
         raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
     if path.exists() and not os.access(path, os.W_OK):
         raise InputError(f"'{path}' is write-protected: choose another name, or let it be written.")
-    return path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")  # some writers go by the suffix
+    # Containers share process ids, and some writers go by the suffix.
+    return path.with_name(f".{path.stem}.{_MACHINE}-{secrets.token_hex(8)}.partial{path.suffix}")
 
 
 def _not_written(path: Path, error: OSError) -> InputError:

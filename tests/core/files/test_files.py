@@ -7,7 +7,15 @@ from pathlib import Path
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.files.files import check_place, remove_leftovers, replacing, write_text
+from softground_addon.core.files import files
+from softground_addon.core.files.files import (
+    check_place,
+    identity,
+    read_regular,
+    remove_leftovers,
+    replacing,
+    write_text,
+)
 
 
 def write_half(path):
@@ -110,3 +118,62 @@ def test_leftovers_of_a_killed_writer_are_found_by_their_name(tmp_path: Path):
         assert not partial.exists()
         partial.write_text("whole")
     assert {entry.name for entry in tmp_path.iterdir()} == {"a[1].json", other.name}
+
+
+@pytest.mark.parametrize("other", ["010.v2.blend", "010.partial.blend", "0100.blend", "010.json", "010"])
+def test_no_leftovers_of_another_file_are_taken_for_its_own(tmp_path: Path, other: str):
+    with replacing(tmp_path / other) as partial:
+        partial.write_text("being saved")
+        remove_leftovers(tmp_path / "010.blend")
+        assert partial.read_text() == "being saved"
+
+
+def test_what_another_machine_writes_is_left_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "010.blend"
+    monkeypatch.setattr(files, "_MACHINE", "0" * 8)
+    with replacing(path) as partial:
+        partial.write_text("being saved")
+        monkeypatch.undo()
+        remove_leftovers(path)
+        assert partial.exists()
+
+
+def test_two_writers_of_one_file_do_not_share_a_name(tmp_path: Path):
+    path = tmp_path / "010.blend"
+    with replacing(path) as one, replacing(path) as other:  # as in two containers with the same process id
+        one.write_text("one")
+        other.write_text("other")
+        assert one != other
+    assert path.read_text() == "one"
+
+
+def test_what_blenders_own_saving_leaves_is_removed(tmp_path: Path):
+    path, users = tmp_path / "010.blend", tmp_path / "010.blend@"
+    users.touch()
+    with pytest.raises(InputError), replacing(path) as partial:
+        partial.with_name(f"{partial.name}@").write_text("half")  # it ends before it has renamed
+    assert list(tmp_path.iterdir()) == [users]
+    left = tmp_path / f"{partial.name}@"
+    left.touch()
+    remove_leftovers(path)
+    assert list(tmp_path.iterdir()) == [users]
+
+
+def test_pipes_devices_and_endless_files_are_not_read(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe")
+    for place in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
+        with pytest.raises(OSError, match="no regular file"):
+            read_regular(place, 1000)
+    path = tmp_path / "a.json"
+    path.write_text("content")
+    assert read_regular(path, 7) == b"content"
+    with pytest.raises(OSError, match="larger than 6 bytes"):
+        read_regular(path, 6)
+
+
+def test_a_file_has_one_identity_whatever_its_name(tmp_path: Path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    names = ("real/Ä.blend", "link/Ä.blend", "real/../link/ä.BLEND", "real/A\u0308.blend")
+    assert len({identity(tmp_path / name) for name in names}) == 1
+    assert identity(tmp_path / "real/a.blend") != identity(tmp_path / "real/b.blend")

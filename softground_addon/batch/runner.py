@@ -14,14 +14,15 @@ import subprocess
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from ...core.errors import InputError
-from ...core.files import files, receipts
-from ...core.files.manifest import BatchShot
+from ..core.errors import InputError
+from ..core.files import files
+from . import receipts
+from .manifest import BatchShot
 
 try:
     import fcntl
@@ -63,9 +64,14 @@ class Workplace:
     made_by: str
     command: Callable[[Path, list[str]], list[str]]
 
+    @property
+    def report(self) -> Path:
+        """Where the outcome of every shot goes, unless the user names another place."""
+        return self.state / "batch.json"
+
     def receipt(self, shot: BatchShot) -> Path:
-        """The shot's receipt (see `core.files.files.receipts`)."""
-        return self.state / f"{shot.name}.json"
+        """The shot's receipt (see `receipts`); no shot's name makes it the report of the batch."""
+        return self.state / f"{shot.name}.receipt.json"
 
     def log(self, shot: BatchShot) -> Path:
         """Everything that the shot's workers have printed."""
@@ -74,6 +80,13 @@ class Workplace:
     def lock(self, shot: BatchShot) -> Path:
         """Held by whoever bakes the shot."""
         return self.state / f"{shot.name}.lock"
+
+    def files(self, shots: Iterable[BatchShot]) -> dict[Path, str]:
+        """What is kept in the state folder for these shots, and what each of it is."""
+        kinds = {self.receipt: "the receipt", self.log: "the log", self.lock: "the lock"}
+        return {self.state: "the state folder"} | {
+            place(shot): f"{kind} of '{shot.name}'" for shot in shots for place, kind in kinds.items()
+        }
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,12 @@
 """A receipt says that a shot is done only while what it read and wrote is on disk, byte for byte."""
 
 import json
+import os
+from pathlib import Path
 
 import pytest
 
-from softground_addon.core.files import receipts
+from softground_addon.batch import receipts
 
 OPTIONS = ["--preset=snow", "--save=baked.blend"]
 
@@ -87,4 +89,30 @@ def test_a_damaged_receipt_is_none(baked):
             path.write_text(json.dumps(content | {key: value}))
             assert done(baked) is None or (key, value) == ("totals", [])
     path.unlink()
+    assert done(baked) is None
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("kind", ["device", "pipe", "folder"])
+@pytest.mark.parametrize("where", ["read", "wrote"])
+def test_a_receipt_that_names_what_never_ends_is_none(baked, kind, where):
+    endless = {"device": Path("/dev/zero"), "pipe": baked / "pipe", "folder": baked}[kind]
+    os.mkfifo(baked / "pipe")
+    path = baked / "receipt.json"
+    content = json.loads(path.read_text())
+    content[where][str(endless)] = "0" * 64
+    path.write_text(json.dumps(content))
+    assert done(baked, outputs=("baked.blend", "report.json", *([str(endless)] if where == "wrote" else []))) is None
+
+
+@pytest.mark.timeout(20)
+def test_a_pipe_in_place_of_a_receipt_is_none(baked):
+    (baked / "receipt.json").unlink()
+    os.mkfifo(baked / "receipt.json")
+    assert done(baked) is None
+
+
+def test_a_receipt_that_is_absurdly_large_is_not_read(baked):
+    with (baked / "receipt.json").open("r+b") as receipt:
+        receipt.truncate(2**40)
     assert done(baked) is None

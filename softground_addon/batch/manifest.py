@@ -22,15 +22,19 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.files.files import identity, read_regular
 
 LONGEST_NAME = 150
 """Most bytes of a shot's name in UTF-8: file systems take 255, of which the names of partial files need some."""
+
+LARGEST = 2**24
+"""Size of a manifest that is read [bytes]: a hundred thousand shots."""
 
 FRAME_LIMIT = 1_048_574
 """Largest frame number that Blender takes, and minus the smallest."""
@@ -112,12 +116,14 @@ def load(path: Path) -> tuple[BatchShot, ...]:
     InputError
         If the file cannot be read or says nothing that can be baked; names every missing shot.
     """
+    origin = f"Manifest '{path}'"
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"Manifest '{path}' cannot be read: {error}") from None
+        raise InputError(f"{origin} cannot be read: {error}") from None
     folder = Path(os.path.realpath(path)).parent
-    shots = parse(text, folder, f"Manifest '{path}'", is_json=path.suffix.lower() == ".json")
+    shots = parse(text, folder, origin, is_json=path.suffix.lower() == ".json")
+    check_places(shots, origin, kept={path: "the manifest"})
     missing = [str(shot.file) for shot in shots if not is_file(shot.file)]
     if missing:
         listed = ", ".join(f"'{name}'" for name in missing[:10]) + (" and more" if len(missing) > 10 else "")
@@ -162,7 +168,8 @@ def parse(text: str, folder: Path, origin: str, *, is_json: bool = False) -> tup
             raise InputError(f"{where}: must be a table with a 'file'.")
         _check_keys(entry, _OF_A_SHOT, where)
         shots += _shots(entry, defaults, folder, where)
-    _check_unique(shots, origin)
+    _check_names(shots, origin)
+    check_places(shots, origin)
     return tuple(shots)
 
 
@@ -270,23 +277,59 @@ def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) ->
         raise InputError(f"{where}: unknown key {unknown[0]!r}. Known are: {', '.join(known)}.")
 
 
-def _check_unique(shots: list[BatchShot], origin: str) -> None:
-    """Refuse two shots of one name, and files that two bakes would write or one would write under another's feet."""
+def check_places(
+    shots: Iterable[BatchShot], origin: str, *, kept: Mapping[Path, str] | None = None, report: Path | None = None
+) -> None:
+    """Refuse results that would take the place of what a batch reads or keeps, or of each other.
+
+    Parameters
+    ----------
+    shots : iterable of BatchShot
+        All of the manifest.
+    origin : str
+        What error messages call the manifest.
+    kept : mapping of Path to str
+        Other files that no result may replace, and what each of them is.
+    report : Path, optional
+        Where the outcome of the batch goes.
+
+    Raises
+    ------
+    InputError
+        Naming both, and the file.
+    """
+    shots = tuple(shots)
+    read = {identity(path): what for path, what in (kept or {}).items()}
+    for shot in shots:
+        if shot.preset.lower().endswith(".json"):
+            read[identity(Path(shot.preset))] = f"the preset of '{shot.name}'"
+    sources: dict[str, list[str]] = {}
+    for shot in shots:
+        sources.setdefault(identity(shot.file), []).append(shot.name)
+    results = [(shot.name, path, shot.in_place and path == shot.file) for shot in shots for path in shot.outputs]
+    if report:
+        results.append(("--report", report, False))
+    written: dict[str, str] = {}
+    for name, path, is_source in results:
+        key = identity(path)
+        if key in written:
+            raise InputError(
+                f"{origin}: '{written[key]}' and '{name}' both write '{path}': give each a name of its own, such as by "
+                "{name} in the path."
+            )
+        if key in sources and sources[key] != ([name] if is_source else []):
+            raise InputError(f"{origin}: '{name}' would write over the shot '{path}'.")
+        if key in read:
+            raise InputError(f"{origin}: '{name}' would write over {read[key]}, '{path}': choose another name.")
+        written[key] = name
+
+
+def _check_names(shots: Iterable[BatchShot], origin: str) -> None:
     names: set[str] = set()
-    sources = {shot.file for shot in shots}
-    written: dict[Path, str] = {}
     for shot in shots:
         if shot.name.casefold() in names:
             raise InputError(f"{origin}: two shots are named '{shot.name}': give each a 'name' of its own.")
         names.add(shot.name.casefold())
-        for path in shot.outputs:
-            if path in written:
-                raise InputError(
-                    f"{origin}: '{written[path]}' and '{shot.name}' both write '{path}': use {{name}} in the path."
-                )
-            if path in sources and path != shot.file:
-                raise InputError(f"{origin}: '{shot.name}' would write over the shot '{path}'.")
-            written[path] = shot.name
 
 
 def _name(value: object, where: str) -> str:

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from softground_addon.blender.command_line.batch_runner import Outcome, Step, Workplace, run
+from softground_addon.batch.manifest import BatchShot
+from softground_addon.batch.runner import Outcome, Step, Workplace, run
 from softground_addon.core.errors import InputError
-from softground_addon.core.files.manifest import BatchShot
+from softground_addon.core.files import files
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,7 +24,8 @@ WORKER = """
     import json, os, signal, sys, time
     from pathlib import Path
     sys.path.insert(0, ROOT)
-    from softground_addon.core.files import files, receipts
+    from softground_addon.batch import receipts
+    from softground_addon.core.files import files
     shot, options = Path(sys.argv[1]), dict(option[2:].partition("=")[::2] for option in sys.argv[2:])
     with open(f"{shot}.runs", "a") as runs:
         runs.write(f"{os.getpid()}\\n")
@@ -72,6 +74,14 @@ class Batch:
         """The processes that have begun to bake a shot, by their ids."""
         path = Path(f"{shot.file}.runs")
         return [int(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def being_written(path):
+    """The name under which a file is written until it is whole."""
+    with files.replacing(path) as partial:
+        partial.touch()
+    path.unlink()
+    return partial
 
 
 def statuses(outcomes):
@@ -187,7 +197,7 @@ def test_garbage_on_a_workers_output_is_only_logged(batch):
 
 
 def test_an_interruption_ends_the_workers_and_leaves_the_rest_for_the_next_time(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 300.0)
+    monkeypatch.setattr("softground_addon.batch.runner.PATIENCE", 300.0)
     shots = [
         batch.shot(name, "say('simulate', 0.5); time.sleep(300 if run == 1 and shot.stem in 'bc' else 0)")
         for name in "abcd"
@@ -209,7 +219,7 @@ def test_an_interruption_ends_the_workers_and_leaves_the_rest_for_the_next_time(
 
 
 def test_a_worker_that_ignores_the_request_to_end_is_killed(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 0.5)
+    monkeypatch.setattr("softground_addon.batch.runner.PATIENCE", 0.5)
     shot = batch.shot("deaf", "signal.signal(signal.SIGTERM, signal.SIG_IGN); say('simulate', 0.5); time.sleep(60)")
 
     def interrupt(event):
@@ -221,8 +231,17 @@ def test_a_worker_that_ignores_the_request_to_end_is_killed(batch, monkeypatch):
         os.kill(*batch.runs(shot), 0)
 
 
+def test_a_shot_named_like_the_report_of_the_batch_is_baked_once(batch):
+    shot = batch.shot("batch")
+    place = Workplace(batch.folder / "state", "test", batch.command)
+    for expected in ("done", "skipped"):
+        assert statuses(batch.run(shot)) == [expected]
+        place.report.write_text("{}")  # as the command does at the end
+    assert len(batch.runs(shot)) == 1
+
+
 def test_two_batches_do_not_bake_the_same_shot_at_the_same_time(batch, monkeypatch):
-    monkeypatch.setattr("softground_addon.blender.command_line.batch_runner.PATIENCE", 300.0)
+    monkeypatch.setattr("softground_addon.batch.runner.PATIENCE", 300.0)
     shot = batch.shot("a", "time.sleep(1)")
     outcomes = []
     threads = [threading.Thread(target=lambda: outcomes.extend(batch.run(shot))) for _ in range(2)]
@@ -237,7 +256,7 @@ def test_two_batches_do_not_bake_the_same_shot_at_the_same_time(batch, monkeypat
 def test_what_a_killed_worker_left_behind_is_removed(batch):
     shot = batch.shot("a")
     (batch.folder / "baked").mkdir()
-    left, foreign = (batch.folder / "baked" / name for name in (".a.123.partial.blend", ".ab.123.partial.blend"))
+    left, foreign = (being_written(batch.folder / "baked" / name) for name in ("a.blend", "a.v2.blend"))
     left.touch()
     foreign.touch()
     batch.run(shot)
@@ -273,8 +292,8 @@ def test_no_shot_is_baked_twice_however_often_the_batch_is_killed(batch):
     script.write_text(
         f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
         "from pathlib import Path\n"
-        "from softground_addon.blender.command_line.batch_runner import Workplace, run\n"
-        "from softground_addon.core.files.manifest import BatchShot\n"
+        "from softground_addon.batch.runner import Workplace, run\n"
+        "from softground_addon.batch.manifest import BatchShot\n"
         f"folder = Path({str(batch.folder)!r})\n"
         "shots = [BatchShot(name=name, file=folder / f'{name}.blend', save=folder / 'baked' / f'{name}.blend')\n"
         "         for name in 'abcdefgh']\n"

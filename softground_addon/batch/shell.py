@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Sequence
 
-from ..errors import InputError
+from ..core.errors import InputError
 
 _PLAIN = re.compile(r"[\w\\/:.=+@~-]+", re.ASCII)
 """Words that the Windows shell leaves alone."""

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from softground_addon.batch import manifest
+from softground_addon.batch.manifest import BatchShot
 from softground_addon.core.errors import InputError
-from softground_addon.core.files import manifest
-from softground_addon.core.files.manifest import BatchShot
 
 FOLDER = Path(os.path.realpath("/shows/night"))
 
@@ -146,6 +146,40 @@ def test_an_unreadable_manifest_is_named(tmp_path, content):
     if content:
         path.write_bytes(content)
     with pytest.raises(InputError, match=r"night\.toml' cannot be read"):
+        manifest.load(path)
+
+
+@pytest.mark.timeout(20)
+def test_a_manifest_that_is_a_pipe_or_never_ends_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "huge.toml").touch()
+    os.truncate(tmp_path / "huge.toml", 2**40)
+    for path, says in ((tmp_path / "pipe.toml", "no regular"), (Path("/dev/zero"), "no regular"),
+                       (tmp_path / "huge.toml", "larger than")):  # fmt: skip
+        with pytest.raises(InputError, match=f"cannot be read.*{says}"):
+            manifest.load(path)
+
+
+@pytest.mark.parametrize(
+    ("shots", "says"),
+    [
+        ("{ file = 'a.blend', save = 'night.toml' }", "'a' would write over the manifest"),
+        ("{ file = 'a.blend', report = 'link/Night.TOML' }", "'a' would write over the manifest"),
+        ("{ file = 'a.blend', report = 'bog.json' }, { file = 'b.blend', save = 'c', preset = 'bog.json' }",
+         "'a' would write over the preset of 'b'"),
+        ("{ file = 'a.blend', save = 'link/B.blend' }, { file = 'b.blend', save = 'c' }", "'a' would write over"),
+        ("{ file = 'a.blend', save = 'x/C' }, { file = 'b.blend', save = 'x/c' }", "'a' and 'b' both write"),
+        ("{ file = 'a.blend', in_place = true }, { name = 'other', file = 'a.blend', scene = 'B', save = 'c' }",
+         "'a' would write over the shot"),
+    ],
+)  # fmt: skip
+def test_no_result_takes_the_place_of_what_is_read_or_of_another(tmp_path, shots, says):
+    for name in ("a.blend", "b.blend"):
+        (tmp_path / name).write_text("a shot")
+    (tmp_path / "link").symlink_to(tmp_path)
+    path = tmp_path / "night.toml"
+    path.write_text(f"shots = [{shots}]")
+    with pytest.raises(InputError, match=says):
         manifest.load(path)
 
 

@@ -7,15 +7,13 @@ import json
 import os
 import sys
 import time
-import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import bpy
-
-from ...core.files import files, manifest
-from .batch_runner import Outcome, Step, Workplace, run
+from ..core.files import files
+from . import manifest
+from .runner import Outcome, Step, Workplace, run
 
 SCHEMA_VERSION = 1
 
@@ -26,15 +24,6 @@ PROGRESS_STYLES = ("plain", "json", "openjd", "none")
 
 FIRST_ESTIMATE = 0.1
 """Share of a bake from which on its pace says something of the time left."""
-
-_PACKAGE = Path(__file__).parents[3]
-"""The folder of the extension, with its manifest."""
-
-
-def made_by() -> str:
-    """The programs that decide what a bake gives: SoftGround and Blender, with their versions."""
-    about = tomllib.loads((_PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
-    return f"SoftGround {about['version']}, Blender {bpy.app.version_string}"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,39 +46,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--progress", choices=PROGRESS_STYLES, default="plain", help="how to show progress")
 
 
-def bake_batch(options: argparse.Namespace) -> list[Outcome]:
+def bake_batch(
+    options: argparse.Namespace, made_by: str, worker_command: Callable[[Path, list[str]], list[str]]
+) -> list[Outcome]:
     """Bake the shots of a manifest; the outcome of each, in the manifest's order.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        From `add_arguments`.
+    made_by, worker_command
+        See `runner.Workplace`.
 
     Raises
     ------
     InputError
         If the manifest, or the place for the results, cannot be used; nothing was baked then.
     """
-    shots = manifest.chosen(manifest.load(options.manifest), options.shots)
-    state = Path(os.path.abspath(options.state or options.manifest.with_suffix(".batch")))
+    all_shots = manifest.load(options.manifest)
+    shots = manifest.chosen(all_shots, options.shots)
+    workplace = Workplace(
+        Path(os.path.abspath(options.state or options.manifest.with_suffix(".batch"))), made_by, worker_command
+    )
     # tasks of a farm bake a shot each from one state folder: they must not replace each other's reports
-    path = options.report or (None if options.shots else state / "batch.json")
+    path = options.report or (None if options.shots else workplace.report)
+    manifest.check_places(
+        all_shots,
+        f"Manifest '{options.manifest}'",
+        kept={options.manifest: "the manifest"} | workplace.files(all_shots),
+        report=options.report or workplace.report,
+    )
     if options.report:
         files.check_place(options.report.absolute())
     show = _Show(options.progress, len(shots), options.jobs)
     started = time.monotonic()
-    outcomes = run(
-        shots, Workplace(state, made_by(), worker_command), jobs=options.jobs, timeout=options.timeout, show=show
-    )
+    outcomes = run(shots, workplace, jobs=options.jobs, timeout=options.timeout, show=show)
     seconds = time.monotonic() - started
     if options.progress in ("plain", "openjd"):
         print(table(outcomes), flush=True)
     if path:
-        files.write_text(path, json.dumps(_report(options.manifest, outcomes, seconds), indent=2) + "\n")
+        files.write_text(path, json.dumps(_report(options.manifest, made_by, outcomes, seconds), indent=2) + "\n")
     return outcomes
-
-
-def worker_command(shot: Path, options: Sequence[str]) -> list[str]:
-    """The command line that bakes one shot in a process of its own, by the Blender that we run in."""
-    if bpy.app.binary_path:
-        return [bpy.app.binary_path, "--background", str(shot), "--command", "softground", "bake", *options]
-    package = __package__.rsplit(".", 2)[0]
-    return [sys.executable, "-m", package, "bake", str(shot), *options]
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -126,11 +123,11 @@ def printable(text: str) -> str:
     return shown.encode(encoding, "backslashreplace").decode(encoding)
 
 
-def _report(path: Path, outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
+def _report(path: Path, made_by: str, outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "manifest": os.path.abspath(path),
-        "made_by": made_by(),
+        "made_by": made_by,
         "seconds": round(seconds, 3),
         "totals": {status: sum(outcome.status == status for outcome in outcomes) for status in STATUSES},
         "shots": [

@@ -13,15 +13,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from . import files
+from ..core.files import files
+from ..core.files.files import read_regular, regular_blocks
 
 SCHEMA_VERSION = 1
 
 
+LARGEST = 2**24
+"""Size of a receipt that is read [bytes]: of a shot that links fifty thousand files."""
+
+
 def checksum(path: Path) -> str:
-    """SHA-256 of a file's content."""
-    with path.open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
+    """SHA-256 of a regular file's content; OSError for any other."""
+    digest = hashlib.sha256()
+    for block in regular_blocks(path):
+        digest.update(block)
+    return digest.hexdigest()
 
 
 def checksums(paths: Iterable[Path]) -> dict[str, str]:
@@ -84,7 +91,7 @@ def totals_if_done(
     that it links has changed, or if a result is missing or is not what the bake wrote.
     """
     try:
-        receipt = json.loads(path.read_text(encoding="utf-8"))
+        receipt = json.loads(read_regular(path, LARGEST))
         if (receipt["schema_version"], receipt["made_by"]) != (SCHEMA_VERSION, made_by):
             return None
         read, wrote = dict(receipt["read"]), dict(receipt["wrote"])

@@ -1,0 +1,27 @@
+"""The program that we run in: what it is, and how it is started again to bake one shot."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+_PACKAGE = Path(__file__).parents[3]
+"""The folder of the extension, with its manifest."""
+
+
+def made_by() -> str:
+    """The programs that decide what a bake gives: SoftGround and Blender, with their versions."""
+    about = tomllib.loads((_PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
+    return f"SoftGround {about['version']}, Blender {bpy.app.version_string}"
+
+
+def worker_command(shot: Path, options: Sequence[str]) -> list[str]:
+    """The command line that bakes one shot in a process of its own, by the Blender that we run in."""
+    if bpy.app.binary_path:
+        return [bpy.app.binary_path, "--background", str(shot), "--command", "softground", "bake", *options]
+    package = __package__.rsplit(".", 2)[0]
+    return [sys.executable, "-m", package, "bake", str(shot), *options]
