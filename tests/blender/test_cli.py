@@ -31,7 +31,7 @@ def test_it_sets_up_bakes_saves_and_reports_by_itself(shot, tmp_path):
     assert content["inputs"]["frames"] == [1, 40]
     assert len(content["steps"]) >= 3
     assert set(content["steps"][0]) == {
-        "contact", "character", "frame_start", "frame_end", "position", "area_m2", "peak_force_n", "max_depth_m",
+        "id", "contact", "character", "frame_start", "frame_end", "position", "area_m2", "peak_force_n", "max_depth_m",
         "compressed_m3", "rim_m3",
     }  # fmt: skip
     assert set(content["timings"]) == {"sample", "simulate", "write", "frames_per_second"}
