@@ -105,6 +105,11 @@ class Playhead:
         """The cells (rows, columns) of some windows that were in contact since the frame before the shown one."""
         return self._changes[self._shown].contact
 
+    def materials(self) -> list[GroundMaterial]:
+        """What the ground that is shown was pressed with, in order."""
+        pressed = dict.fromkeys(change.material for change in self._changes[1 : self._shown + 1])
+        return list(pressed) or [self.material]
+
     def footprints(self) -> list[Footprint]:
         """The record of the ground that is shown, with the contacts that are under way as they are by now."""
         until_now = [_until(self.frame, character) for character in self._loads]

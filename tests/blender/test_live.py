@@ -119,6 +119,52 @@ def test_keeping_leaves_a_bake_of_the_frames_so_far(live_shot):
     assert np.abs(heights(live_shot)).max() < LEVEL
 
 
+def test_kept_prints_say_which_frames_they_are_of(live_shot):
+    live_shot.frame_set(30)
+    bpy.ops.softground.live(keep=True)
+    _, about = baked_ground.load(live_shot.softground.ground)
+    assert about["inputs"]["frames"] == [1, 30]
+    assert bake_report.stale_reasons(live_shot) == ("The settings have changed",)
+    live_shot.softground.frame_end = 30
+    assert bake_report.stale_reasons(live_shot) == ()
+
+
+def test_kept_prints_are_stamped_with_the_material_that_pressed_them(live_shot):
+    material, options = live_shot.softground.material, live_shot.softground
+    live_shot.frame_set(30)
+    pressed_with = material.youngs_modulus
+    material.youngs_modulus /= 4
+    options.frame_end = 30
+    bpy.ops.softground.live(keep=True)
+    _, about = baked_ground.load(options.ground)
+    assert about["inputs"]["material"]["youngs_modulus"] == pressed_with
+    assert bake_report.stale_reasons(live_shot) == ("The settings have changed",)
+    material.youngs_modulus = pressed_with
+    assert bake_report.stale_reasons(live_shot) == ()
+
+
+def test_prints_of_several_materials_are_those_of_no_settings(live_shot):
+    material, options = live_shot.softground.material, live_shot.softground
+    stiff = material.youngs_modulus
+    live_shot.frame_set(30)
+    material.youngs_modulus = stiff / 4
+    live_shot.frame_set(options.frame_end)
+    bpy.ops.softground.live(keep=True)
+    for modulus in (stiff, stiff / 4):
+        material.youngs_modulus = modulus
+        assert bake_report.stale_reasons(live_shot) == ("The settings have changed",)
+
+
+def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
+    live_shot.frame_set(live_shot.softground.frame_end)
+    live_shot.softground.tread = 0.003
+    bpy.ops.softground.live(keep=True)
+    mesh = live_shot.softground.ground.data
+    marks = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.attributes[ground_mesh.SOLE].data.foreach_get("vector", marks)
+    assert marks.reshape(-1, 3)[:, 2].max() == pytest.approx(0.003, rel=1e-6)
+
+
 def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     live_shot.frame_set(live_shot.softground.frame_end)
     bpy.ops.softground.live(keep=True)

@@ -23,15 +23,13 @@ from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
-from ...core.playback.playback_curves import playback_curves_at
 from ...core.record import record
 from ...core.record.footprints import Footprint
-from ...core.record.pressed_ground import PressedGround, Trail, sample_at
-from ...core.record.sole_marks import sole_marks
+from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import settings
-from ..ground import baked_ground, created_ground, ground_mesh, playback, trail_detail
+from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_warning
 from ..jobs import Job, Progress, meanwhile
@@ -40,6 +38,7 @@ from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_
 from ..response import response_job
 from . import bake_report
 from .bake_checks import check_volumes, copy_warnings, coverage, coverage_warnings, shortest_sole, wants_detail
+from .publish import at_the_end, publish, sign
 
 Array = NDArray[np.float64]
 
@@ -139,10 +138,9 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         warnings=[*warnings, *gap_warnings],
     )
     if written:
-        ground_mesh.mesh_of(written.carrier)[ground_mesh.SUMMARY] = bake_report.summary(result)
-        ground_mesh.note_warnings(written.carrier, result["warnings"])
         stamped = wanted.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
-        staleness.store(stamped, written.ground, movers)
+        told = {"summary": bake_report.summary(result), "warnings": result["warnings"]}
+        sign(written.carrier, written.ground, stamped, movers, **told)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 
@@ -179,18 +177,12 @@ def _write(
     sole_length : float
         Of the shortest sole [m].
     """
-    at_the_end = {
-        "frame": float(wanted.frames[1]),
-        "frame_rate": wanted.frame_rate,
-        "cell_size": wanted.cell_size_m,
-        "blur_sigma": wanted.material.blur_sigma,
-    }
     edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
     left = record.BakeRecord(footprints, about, edits)
-    footprints = left.edited
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
-        pressed = yield from meanwhile(Progress("write", 0.1), PressedGround.at.slices(footprints, **at_the_end))
+        pressing = PressedGround.at.slices(left.edited, **at_the_end(wanted))
+        pressed = yield from meanwhile(Progress("write", 0.1), pressing)
         yield Progress("write", 0.1)
         trail = pressed.trail(trail_detail.FLOOR)
         del pressed
@@ -201,40 +193,11 @@ def _write(
         else:
             place, warnings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
-        stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
-        x, y = place.position[:, 0], place.position[:, 1]
-        sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **at_the_end))
-        over_time = playback_curves_at.slices(
-            footprints,
-            x,
-            y,
-            blur_sigma=wanted.material.blur_sigma,
-            frame_rate=wanted.frame_rate,
-            time_stretch=wanted.time_stretch,  # nodes count the animation's frames
-        )
-        spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
-        table = drafts.enter_context(playback.keyframe_tables(lines))
-        del lines  # they are large, and all is in the table
-        yield Progress("write", 0.8)
-        marks = _tread(footprints, place.position, wanted.tread_m)
-        yield Progress("write", 0.9)
-        carrier = yield from baked_ground.write(
-            place,
-            sample,
-            spans,
-            table,
-            stored,
-            unit_scale=wanted.unit_scale_m,
-            shape_keys=wanted.shape_keys,
-        )
-        ground_mesh.write_soles(carrier, place.index, marks)
-        error, publish = spans.error, place.publish if place.is_draft else None
-        del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
-        if publish:
-            yield Progress("write", 0.9)
-            publish()
-    ground = settings.found(wanted.ground) if wanted.ground else carrier
-    return _Written(ground, carrier, error, warnings)
+        publishing = publish(left, place, wanted)
+        del place  # it is as large as what is pressed, and not needed to the end
+        published = yield from publishing
+    ground = settings.found(wanted.ground) if wanted.ground else published.carrier
+    return _Written(ground, published.carrier, published.error, warnings)
 
 
 def _created(
@@ -285,14 +248,6 @@ def _given(
         Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
     )
     return baked_ground.on_detail(ground, draft, index, vertices), [*warnings, *copy_warnings(ground)]
-
-
-def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:
-    """What `ground_mesh.SOLE` says of places (K, 3), for a tread of some depth [m]; None without a tread."""
-    if not depth > 0 or not footprints:
-        return None
-    marks: Array = sole_marks(footprints, footprints[0].cell_size).sample(*position[:, :2].T)
-    return marks.T * (1.0, 1.0, depth)
 
 
 def _press(

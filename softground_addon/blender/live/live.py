@@ -7,7 +7,7 @@ working. While live mode is on, the ground carries what a bake would leave on it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import bpy
@@ -19,7 +19,6 @@ from ...core.errors import InputError
 from ...core.ground.heightfield import Window
 from ...core.meshing.refinement import refine
 from ...core.numerics.cell_keys import cells_at, keys_at
-from ...core.playback.playback_curves import playback_curves_at
 from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
@@ -27,8 +26,9 @@ from ...core.settings import Acts, BakeSettings
 from .. import jobs, session, settings
 from ..baking import bake_report
 from ..baking.bake_checks import coverage, shortest_sole, wants_detail
+from ..baking.publish import at_the_end, publish, sign
 from ..characters.character_setup import characters_of
-from ..ground import baked_ground, ground_mesh, playback, trail_detail
+from ..ground import baked_ground, ground_mesh, trail_detail
 from ..ground.created_ground import create_ground, reach_of
 from ..ground.modified_prints import are_undone
 from ..operator_base import reports_errors
@@ -60,9 +60,10 @@ class LiveMode:
         known = analysis.read(scene)
         if wanted.ground is None:
             with analysis.own_changes(scene):
-                create_ground(scene, wanted, known.shot.plan)
-            wanted = settings.snapshot(scene)
+                ground = create_ground(scene, wanted, known.shot.plan)
+            wanted = replace(wanted, ground=settings.name_of(ground))
             known = analysis.read(scene)
+        assert wanted.ground is not None
         self.scene = scene.session_uid
         self.rendering = False
         self._owner = wanted.ground
@@ -119,43 +120,30 @@ class LiveMode:
         ground = self._ground.object()
         if ground is None:
             return
+        pressed, now = self._playhead.materials(), settings.snapshot(scene)
+        made_with = replace(
+            self._wanted,
+            material=pressed[-1],
+            frames=(self._wanted.frames[0], int(self._playhead.frame)),
+            shape_keys=now.shape_keys,
+            tread_m=now.tread_m,
+        )
         footprints = self._playhead.footprints()
-        wanted = replace(self._wanted, material=self._playhead.material)
-        unit_scale, sigma = wanted.unit_scale_m, wanted.material.blur_sigma
-        pressed = PressedGround.at(
-            footprints,
-            frame=self._playhead.frame,
-            frame_rate=wanted.frame_rate,
-            cell_size=self._playhead.ground.cell_size,
-            blur_sigma=sigma,
+        vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
+        shown = PressedGround.at(footprints, **at_the_end(made_with))
+        place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
+        left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
+        published = jobs.run(publish(left, place, made_with))
+        inputs = made_with.inputs(Acts.WRITING)
+        if len(pressed) > 1:  # no setting gives this ground again
+            inputs["material"] = [asdict(material) for material in pressed]
+        sign(
+            published.carrier,
+            settings.found(self._owner),
+            inputs,
+            staleness.of_movers(scene, made_with),
+            summary=bake_report.summary_of_prints(footprints),
         )
-        vertices = ground_mesh.rest_vertices(ground, unit_scale)
-        index = np.flatnonzero(pressed.covers(*vertices[:, :2].T))
-        wanted = replace(wanted, frames=(wanted.frames[0], int(self._playhead.frame)))
-        stored = record.dump(record.BakeRecord(footprints, {"inputs": wanted.inputs(), "input_hash": ""}))
-        place = baked_ground.on_itself(ground, index, vertices)
-        across = place.position[:, :2].T
-        spans, lines = playback_curves_at(
-            footprints,
-            *across,
-            blur_sigma=sigma,
-            frame_rate=wanted.frame_rate,
-            time_stretch=wanted.time_stretch,
-        )
-        with playback.keyframe_tables(lines) as table:
-            writing = baked_ground.write(
-                place,
-                pressed.sample(*across),
-                spans,
-                table,
-                stored,
-                unit_scale=unit_scale,
-                shape_keys=wanted.shape_keys,
-            )
-            carrier = jobs.run(writing)
-        ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = bake_report.summary_of_prints(footprints)
-        owner = settings.found(wanted.ground) if wanted.ground else carrier
-        staleness.store(wanted.inputs(Acts.WRITING), owner, staleness.of_movers(scene, wanted))
 
     def discard(self) -> None:
         """Leave the ground as it was before."""

@@ -1,0 +1,125 @@
+"""From a record and a place to the ground that plays it: the only code that does this, whatever the record is from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.playback.playback_curves import playback_curves_at
+from ...core.record import record
+from ...core.record.footprints import Footprint
+from ...core.record.pressed_ground import sample_at
+from ...core.record.sole_marks import sole_marks
+from ...core.settings import BakeSettings
+from ..ground import baked_ground, ground_mesh, playback
+from ..ground.baked_ground import Place
+from ..jobs import Job, Progress, meanwhile
+from ..reading import staleness
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Published:
+    """What carries a bake, and the largest error of the heights that it plays [m]."""
+
+    carrier: bpy.types.Object
+    error: float
+
+
+def at_the_end(made_with: BakeSettings) -> dict[str, float]:
+    """The moment of a bake that the mesh itself shows, as `core.record.pressed_ground` takes it."""
+    return {
+        "frame": float(made_with.frames[1]),
+        "frame_rate": made_with.frame_rate,
+        "cell_size": made_with.cell_size_m,
+        "blur_sigma": made_with.material.blur_sigma,
+    }
+
+
+def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> Job[Published]:
+    """Let a ground play a record, as the artist's edits leave it. Nothing that the user sees changes before the end.
+
+    Parameters
+    ----------
+    left : BakeRecord
+    place : Place
+        Where it goes.
+    made_with : BakeSettings
+    """
+    footprints = left.edited
+    stored = yield from meanwhile(Progress("write", 0.5), record.dump.slices(left))
+    x, y = place.position[:, 0], place.position[:, 1]
+    moment = at_the_end(made_with)
+    sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **moment))
+    over_time = playback_curves_at.slices(
+        footprints,
+        x,
+        y,
+        blur_sigma=made_with.material.blur_sigma,
+        frame_rate=made_with.frame_rate,
+        time_stretch=made_with.time_stretch,  # nodes count the animation's frames
+    )
+    spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
+    with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
+        table = drafts.enter_context(playback.keyframe_tables(lines))
+        del lines  # they are large, and all is in the table
+        yield Progress("write", 0.8)
+        marks = _tread(footprints, place.position, made_with.tread_m)
+        yield Progress("write", 0.9)
+        carrier = yield from baked_ground.write(
+            place,
+            sample,
+            spans,
+            table,
+            stored,
+            unit_scale=made_with.unit_scale_m,
+            shape_keys=made_with.shape_keys,
+        )
+        ground_mesh.write_soles(carrier, place.index, marks)
+        error, show = spans.error, place.publish if place.is_draft else None
+        del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
+        if show:
+            yield Progress("write", 0.9)
+            show()
+    return Published(carrier, error)
+
+
+def sign(
+    carrier: bpy.types.Object,
+    ground: bpy.types.Object,
+    inputs: Mapping[str, Any],
+    hashes: Mapping[str, str],
+    *,
+    summary: Mapping[str, float],
+    warnings: Sequence[str] = (),
+) -> None:
+    """Note with what was published what the panel says of it, and what it was made from.
+
+    Parameters
+    ----------
+    carrier, ground : bpy.types.Object
+        What carries it, and the ground that it is of.
+    inputs, hashes
+        See `staleness.store`.
+    summary : mapping
+        From `bake_report`.
+    warnings : sequence of str
+    """
+    ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = dict(summary)
+    ground_mesh.note_warnings(carrier, warnings)
+    staleness.store(inputs, ground, hashes)
+
+
+def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:
+    """What `ground_mesh.SOLE` says of places (K, 3), for a tread of some depth [m]; None without a tread."""
+    if not depth > 0 or not footprints:
+        return None
+    marks: Array = sole_marks(footprints, footprints[0].cell_size).sample(*position[:, :2].T)
+    return marks.T * (1.0, 1.0, depth)
