@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from . import session
 from .baking import bake_report
-from .characters.rig_sampling import TEMPORARY
+from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
 from .interface import modal_bake, overlay
 from .live import live
@@ -55,8 +55,10 @@ def compare_bake() -> float | None:
         return SETTLED
     windows = bpy.context.window_manager.windows
     if windows:
-        session.current().stale = "\n".join(bake_report.stale_reasons(windows[0].scene))
-        session.redraw()
+        state, reasons = session.current(), "\n".join(bake_report.stale_reasons(windows[0].scene))
+        if state.stale != reasons:
+            state.stale = reasons
+            session.redraw()
     return None
 
 
@@ -120,7 +122,7 @@ def after_load(*_: Any) -> None:
 
 def _remove_left_over_scenes() -> None:
     """Scenes in which rigs are read may come back with an undo step or an autosave from within a bake."""
-    for scene in [scene for scene in bpy.data.scenes if scene.name.split(".")[0] == TEMPORARY]:
+    for scene in [scene for scene in bpy.data.scenes if scene.get(IS_TEMPORARY)]:
         remove_scene(scene)
 
 

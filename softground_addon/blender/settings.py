@@ -30,9 +30,20 @@ def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
     return cast("bpy.types.Scene", context.scene)
 
 
+_existing: dict[int, tuple[int, bool]] = {}
+"""By session uid of objects: their number of users when they were last looked for in the collections, and whether they
+were in one. Going through the collections takes too long to be done in `draw`; who leaves one has a user less."""
+
+
 def exists(thing: bpy.types.Object | None) -> bool:
     """Whether an object that the settings name is there: those deleted in the viewport live on in the settings only."""
-    return thing is not None and bool(thing.users_collection)
+    if thing is None:
+        return False
+    users, found = _existing.get(thing.session_uid, (-1, False))
+    if users != thing.users:
+        found = bool(thing.users_collection)
+        _existing[thing.session_uid] = thing.users, found
+    return found
 
 
 def forget_deleted_ground(scene: bpy.types.Scene) -> None:

@@ -284,3 +284,35 @@ def test_a_character_that_was_deleted_in_the_viewport_prints_no_more(scene, bake
     bpy.ops.softground.add_character()
     bpy.ops.softground.bake()
     assert [other.name] == [one.armature.name for one in scene.softground.characters if one.armature.users_collection]
+
+
+def test_a_fine_copy_that_was_deleted_in_the_viewport_does_not_live_on_after_clear(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    field = scene.softground.ground = plane(scene, vertices=2)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    activate(trail_detail.detail_of(field))
+    bpy.ops.object.delete()
+    assert trail_detail.detail_of(field) is None
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file()["objects"].keys() == before["objects"].keys()
+    assert fingerprints.of_file()["meshes"] == before["meshes"]
+
+
+def test_the_fine_copy_of_version_0_1_is_found_by_the_name_that_it_was_given(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    field = scene.softground.ground = plane(scene, vertices=2)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    copy = trail_detail.detail_of(field)
+    copy[trail_detail.NAMED] = copy.name
+    del field[trail_detail.DETAIL]
+    mine = copy.copy()
+    mine.name = "A Look of My Own"
+    scene.collection.objects.link(mine)
+    assert trail_detail.detail_of(field) == copy
+    bpy.ops.softground.bake()
+    assert field[trail_detail.DETAIL] == copy

@@ -79,7 +79,16 @@ def test_an_edited_action_makes_the_prediction_worthless(scene):
     assert analysis.known(scene) is None
 
 
-def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene):
-    bpy.data.scenes.new(rig_sampling.TEMPORARY)
+def test_a_working_scene_that_an_autosave_brought_back_is_removed(scene, tmp_path):
+    path, mine = str(tmp_path / "autosave.blend"), scene.name
+    with rig_sampling.sampling_scene(scene, "", (), ()):
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert [s.name for s in bpy.data.scenes] == [mine]
+
+
+def test_a_scene_of_the_users_stays_whatever_its_name(scene):
+    mine = bpy.data.scenes.new(rig_sampling.TEMPORARY)
     handlers.after_load()
-    assert [s.name for s in bpy.data.scenes] == [scene.name]
+    handlers.after_undo()
+    assert mine.name in bpy.data.scenes

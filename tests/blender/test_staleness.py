@@ -43,6 +43,19 @@ def test_a_fresh_bake_is_up_to_date_at_every_frame_also_after_a_reload(baked):
     assert bake_report.stale_reasons(baked) == ()
 
 
+def test_asking_whether_a_bake_is_outdated_touches_nothing(baked):
+    """What does would have Blender call the handlers, which ask again, for ever."""
+    updates = []
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(lambda *_: updates.append(1))
+    try:
+        assert bake_report.stale_reasons(baked) == ()
+        bpy.context.view_layer.update()
+    finally:
+        bpy.app.handlers.depsgraph_update_post.pop()
+    assert updates == []
+
+
 def change_setting(scene):
     scene.softground.material.youngs_modulus *= 1.01
 
@@ -152,6 +165,45 @@ def test_a_keyed_place_is_no_move(scene):
         assert bake_report.stale_reasons(scene) == ()
     armature.location.y = 0.1
     assert bake_report.stale_reasons(scene) == ("'Walker' or a parent of it was moved",)
+
+
+def stand_on_parent(field, support):
+    field.parent = support
+
+
+def stand_on_hidden_parent(field, support):
+    field.parent = support
+    support.hide_viewport = True
+
+
+def follow_by_constraint(field, support):
+    constraint = field.constraints.new("COPY_LOCATION")
+    constraint.target, constraint.use_offset = support, True
+
+
+@pytest.mark.parametrize("detail", ["NEVER", "ALWAYS"])
+@pytest.mark.parametrize("stand", [stand_on_parent, stand_on_hidden_parent, follow_by_constraint])
+def test_a_ground_is_known_to_have_been_moved_by_what_it_stands_on_however_it_is_hidden(scene, tmp_path, detail, stand):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    support = bpy.data.objects.new("Support", None)
+    scene.collection.objects.link(support)
+    support.rotation_euler.z, support.location = 0.3, (0.1, 0.2, 0.0)
+    field = scene.softground.ground = plane(scene)
+    scene.softground.detail = detail
+    stand(field, support)
+    bpy.context.view_layer.update()
+    bpy.ops.softground.bake()
+    assert bake_report.stale_reasons(scene) == ()
+    field.hide_viewport = True
+    path = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    scene = bpy.context.scene
+    assert bake_report.stale_reasons(scene) == ()
+    bpy.data.objects["Support"].location.x += 0.05
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(scene) == ("The mesh or the place of 'Field' has changed",)
 
 
 def test_a_cleared_ground_is_not_stale(baked):

@@ -36,6 +36,9 @@ _FARTHEST = 1e6
 TEMPORARY = "SoftGround Sampling"
 """Name of what exists only while a rig is read."""
 
+IS_TEMPORARY = "softground_is_temporary"
+"""Property of the scenes in which rigs are read, by which those that were left over are told from the user's."""
+
 _SCENE_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 """Render settings that decide which time a frame number means."""
 
@@ -231,6 +234,7 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
     temporary = bpy.data.scenes.new(TEMPORARY)
     probe = bpy.data.objects.new(TEMPORARY, None)
     names = temporary.name, probe.name
+    temporary[IS_TEMPORARY] = True
     try:
         for setting in _SCENE_TIME:
             setattr(temporary.render, setting, getattr(scene.render, setting))

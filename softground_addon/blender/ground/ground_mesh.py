@@ -14,6 +14,7 @@ from typing import Any, Literal, cast
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
@@ -44,6 +45,9 @@ PROPERTIES = (RECORD, SUMMARY, WARNINGS, "softground_fingerprints")
 
 CACHE = "SoftGround Cache"
 """Modifier that plays an exported cache of a bake in place of the native playback."""
+
+_BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
+"""Ways in which an object hangs on a part of its parent, which may lie elsewhere than the parent."""
 
 ON_SURFACE = 2e-3
 """Vertices deeper than this below the surface, such as the underside of a slab, do not move with it [m]."""
@@ -188,13 +192,30 @@ def undisturbed_surface(
 
 def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     """Object space to world space in metres, (4, 4), whether the ground is visible or not."""
-    if ground.visible_get():
-        matrix = np.array(ground.matrix_world, dtype=np.float64)
-    else:  # Blender keeps no world matrix of hidden objects
+    placed = ground.matrix_world if ground.visible_get() else placed_by_parents(ground)
+    if placed is None:
         with stand_in(ground) as evaluated:
-            matrix = np.array(evaluated.matrix_world, dtype=np.float64)
+            placed = evaluated.matrix_world.copy()
+    matrix = np.array(placed, dtype=np.float64)
     matrix[:3] *= unit_scale
     return matrix
+
+
+def placed_by_parents(thing: bpy.types.Object) -> Matrix | None:
+    """Object space to world space by an object's own values and those of its parents, hidden or not.
+
+    Blender keeps no world matrix of what is hidden. None where constraints, physics, bones or vertices have a say in
+    it: only Blender can tell then, by evaluating the object in a scene that shows it.
+    """
+    parent, body = thing.parent, thing.rigid_body
+    if any(not one.mute for one in thing.constraints) or (body and body.type == "ACTIVE"):
+        return None
+    if parent is None:
+        return thing.matrix_basis
+    if thing.parent_type in _BY_PARTS or (parent.type == "CURVE" and parent.data.use_path):
+        return None
+    above = placed_by_parents(parent)
+    return None if above is None else above @ thing.matrix_parent_inverse @ thing.matrix_basis
 
 
 @contextmanager

@@ -18,15 +18,18 @@ from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
 from ...core.numerics.cell_keys import Keys, keys_of
+from ..settings import exists
 from . import ground_mesh, playback, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
 
 Array = NDArray[np.float64]
 
+DETAIL = "softground_detail"
+"""Property of the ground while it is hidden: the copy."""
 DETAIL_OF = "softground_detail_of"
 """Property of the copy: the ground that it stands in for."""
 NAMED = "softground_named"
-"""Property of the copy: the name that it was given. Duplicates of it get another one, and carry the same properties."""
+"""Property of copies that version 0.1 made, whose grounds do not say which one it is: the name that it was given."""
 
 FLOOR = 1e-4
 """Ground that moves less stays coarse [m]: half of what the playback may be off while it moves."""
@@ -36,6 +39,15 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
     """The copy that takes the prints in place of a ground, which is hidden meanwhile; no duplicate of it."""
     if not hides(ground):
         return None  # a copy of the copy may still be there, as the user's own
+    if DETAIL not in ground.keys():  # noqa: SIM118  (an ID is no mapping)
+        return _detail_of_old(ground)
+    detail = ground[DETAIL]
+    stands_in = exists(detail) and detail.get(DETAIL_OF) == ground  # not for a ground that is a duplicate
+    return detail if stands_in else None
+
+
+def _detail_of_old(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The copy of a ground in a file of version 0.1."""
     candidates = [
         thing for thing in bpy.data.objects if thing.get(DETAIL_OF) == ground and thing.library == ground.library
     ]
@@ -81,7 +93,8 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
         detail.modifiers.remove(modifier)
     detail.data = mesh
     show_again(detail)
-    detail.pop(DETAIL_OF, None)  # of a ground that is a duplicate of such a copy
+    for name in (DETAIL, DETAIL_OF, NAMED):
+        detail.pop(name, None)  # of a hidden ground, or of one that is a duplicate of such a copy
     try:
         yield detail
     finally:
@@ -97,8 +110,10 @@ def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Obje
     detail = detail_of(ground)
     if detail is not None:
         _exchange_mesh(detail, ground_mesh.mesh_of(draft))
+        ground[DETAIL] = detail
         return detail
-    draft[DETAIL_OF], draft[NAMED] = ground, draft.name
+    _forget_deleted(ground)
+    ground[DETAIL], draft[DETAIL_OF] = draft, ground
     _put_beside(ground, draft)
     _choose_instead(draft, ground)
     hide(ground)
@@ -109,10 +124,17 @@ def remove(ground: bpy.types.Object) -> None:
     """Take the copy away and show the ground as it was shown, also where the user has deleted the copy."""
     detail = detail_of(ground)
     show_again(ground)
-    if detail is None:
-        return
-    _choose_instead(ground, detail)
-    ground_mesh.discard(detail)
+    if detail is not None:
+        _choose_instead(ground, detail)
+        ground_mesh.discard(detail)
+    _forget_deleted(ground)
+
+
+def _forget_deleted(ground: bpy.types.Object) -> None:
+    """Let go of a copy that was deleted in the viewport: it lives on in the ground's property only."""
+    detail = ground.pop(DETAIL, None)
+    if detail is not None and not detail.users:
+        ground_mesh.discard(detail)
 
 
 def _put_beside(ground: bpy.types.Object, draft: bpy.types.Object) -> None:

@@ -76,7 +76,7 @@ class LiveMode:
 
     def follow(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
-        ground = self._ground.object()
+        ground = self._object(scene)
         if ground is None:
             return False
         self._playhead.material = settings.material_of(scene)
@@ -89,9 +89,13 @@ class LiveMode:
     def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
         self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._wanted.frame_rate)
 
+    def _object(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
+        ground = scene.softground.ground
+        return self._ground.object(ground and baked_ground.carrier_of(ground))
+
     def show_anew(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
-        ground = self._ground.object()
+        ground = self._object(scene)
         if ground is None:
             return False
         self._ground.take_from(ground)
@@ -117,7 +121,7 @@ class LiveMode:
 
     def keep(self, scene: bpy.types.Scene) -> None:
         """Leave the ground as it is shown, as the bake of the frames up to now with what they were pressed with."""
-        ground = self._ground.object()
+        ground = self._object(scene)
         if ground is None:
             return
         pressed, now = self._playhead.materials(), settings.snapshot(scene)
@@ -148,7 +152,7 @@ class LiveMode:
     def discard(self) -> None:
         """Leave the ground as it was before."""
         owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner.uid), None)
-        ground = owner or self._ground.object()
+        ground = owner or self._ground.object(None)
         if ground is not None:
             baked_ground.clear(ground)
 

@@ -80,8 +80,7 @@ class LiveGround:
     """
 
     def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
-        self.uid = ground.session_uid
-        self.name = ground.name
+        self._uid = ground.session_uid
         x, y, z = vertices.T
         near = ((vertices[:, :2] >= shot.plan.lower) & (vertices[:, :2] <= shot.plan.upper)).all(axis=1)
         near = np.flatnonzero(near)
@@ -107,14 +106,13 @@ class LiveGround:
         self._age = np.full(len(self._rest), NEVER, dtype=np.float32)
         self._is_written = False
 
-    def object(self) -> bpy.types.Object | None:
-        """The ground, whatever its name has become; None if it is gone or no longer what live mode made of it."""
-        found = bpy.data.objects.get(self.name)
-        if found is None or found.session_uid != self.uid:
-            found = next((thing for thing in bpy.data.objects if thing.session_uid == self.uid), None)
+    def object(self, likely: bpy.types.Object | None) -> bpy.types.Object | None:
+        """The ground, which mostly is a likely one; None if it is gone or no longer what live mode made of it."""
+        found = likely
+        if found is None or found.session_uid != self._uid:
+            found = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
         if found is None:
             return None
-        self.name = found.name
         mesh = ground_mesh.mesh_of(found)
         intact = ground_mesh.is_baked(found) and len(mesh.vertices) == len(self._rest)
         return found if intact else None

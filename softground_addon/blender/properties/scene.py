@@ -123,6 +123,9 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     slowed_time: IntVectorProperty(
         name="Slowed Time Stretching", description="As Slow Down has set it; (0, 0) before", size=2, options={"HIDDEN"}
     )
+    has_layers: BoolProperty(
+        name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}
+    )
     keep_forces: BoolProperty(
         name="Forces in Report",
         description="Write the force under each sole at each frame into the report",

@@ -22,6 +22,7 @@ from ...core.prediction import TAKES_NO_PRINT, PropLoad, StanceLoad, deepest, ma
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import jobs, settings
+from ..ground import ground_mesh
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 
@@ -96,7 +97,7 @@ def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysi
     Only looks; see `current`.
     """
     analysis = _known.get(scene.session_uid)
-    return analysis if analysis and _source(wanted or settings.snapshot(scene)) in analysis.sources else None
+    return analysis if analysis and _source(scene, wanted or settings.snapshot(scene)) in analysis.sources else None
 
 
 def current(scene: bpy.types.Scene) -> Analysis | None:
@@ -124,7 +125,7 @@ def read(scene: bpy.types.Scene) -> Analysis:
     if analysis is None:
         wanted = settings_of(scene)
         shot = jobs.run(read_shot(scene, wanted))
-        analysis = _keep(scene, wanted, shot, (_source(wanted),), frozenset([_hash_of(scene)]))
+        analysis = _keep(scene, wanted, shot, (_source(scene, wanted),), frozenset([_hash_of(scene)]))
     return analysis
 
 
@@ -138,7 +139,7 @@ def own_changes(scene: bpy.types.Scene) -> Iterator[None]:
     if analysis is None:
         return
     _tell_of_changes(scene)
-    source = _source(settings.snapshot(scene))
+    source = _source(scene, settings.snapshot(scene))
     if source in analysis.sources:
         _known[scene.session_uid] = analysis
     elif analysis.shot.surface is None:
@@ -219,16 +220,30 @@ def _hash_of(scene: bpy.types.Scene) -> str:
     return report.hash_inputs(staleness.of_movers(scene, wanted), staleness.of_ground(wanted))
 
 
-def _source(wanted: BakeSettings) -> _Source:
+def _source(scene: bpy.types.Scene, wanted: BakeSettings) -> _Source:
     """What a shot is read from, as far as it is seen in the settings; what else was edited is told by a handler."""
-    place = wanted.ground and [tuple(row) for row in settings.found(wanted.ground).matrix_world]
-    return wanted.between(Acts.READING, Acts.READING), place
+    return _parts(wanted)[0], wanted.ground and _place(scene.softground.ground)
+
+
+def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
+    """The ground's world matrix, as far as it is known without a question to Blender, which would call the handlers."""
+    return [tuple(row) for row in ground_mesh.placed_by_parents(ground) or ground.matrix_world]
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
     """What the loads depend on, and the stances: whatever acts on the prints but what a prediction is asked about."""
-    told = wanted.between(Acts.LOADS, Acts.PRESSING)
-    for asked in ("material", "pressure", "preset"):
-        del told[asked]
     landing = any(one.force_model == "IMPULSE" or one.armature is None for one in wanted.characters)
-    return told, wanted.material.characteristic_time if landing else None
+    return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
+
+
+_parted: list[tuple[BakeSettings, tuple[dict[str, Any], dict[str, Any]]]] = []
+"""The settings that were taken apart last: panels and overlay ask for the same ones at each drawing."""
+
+
+def _parts(wanted: BakeSettings) -> tuple[dict[str, Any], dict[str, Any]]:
+    if not _parted or _parted[0][0] != wanted:
+        pressing = wanted.between(Acts.LOADS, Acts.PRESSING)
+        for asked in ("material", "pressure", "preset"):
+            del pressing[asked]
+        _parted[:] = [(wanted, (wanted.between(Acts.READING, Acts.READING), pressing))]
+    return _parted[0][1]

@@ -148,8 +148,16 @@ def _of_bake(ground: bpy.types.Object, painted: Sequence[str]) -> dict[str, str]
 
 def _of_ground(ground: bpy.types.Object) -> str:
     mesh = ground_mesh.mesh_of(ground)
-    place = np.round(ground_mesh.to_world_of(ground, 1.0), 6) + 0.0  # no negative zeros
-    return f"{input_hashes.of_topology(mesh)}-{input_hashes.of_positions(mesh)}-{zlib.crc32(place.tobytes()):08x}"
+    return f"{input_hashes.of_topology(mesh)}-{input_hashes.of_positions(mesh)}-{_of_standing(ground)}"
+
+
+def _of_standing(ground: bpy.types.Object) -> str:
+    """Where the ground is, told without having Blender evaluate anything: it calls the handlers, which ask this."""
+    matrix = ground_mesh.placed_by_parents(ground)
+    if matrix is None:
+        return f"{input_hashes.of_place([ground, *ancestors(ground)])}{_of_movement(ground, None)}"
+    place = np.round(np.array(matrix, dtype=np.float64), 6) + 0.0  # no negative zeros
+    return f"{zlib.crc32(place.tobytes()):08x}"
 
 
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:

@@ -193,6 +193,7 @@ def put_layers(scene: bpy.types.Scene, wanted: BakeSettings, layers: Sequence[La
             for shown in scene.softground.characters:  # how much of it shows is told at any time, and not by a bake
                 if shown.armature == armature:
                     nla_layer.set_strength(armature, settings.typed(shown.response_strength))
+            scene.softground.has_layers = True
         else:
             nla_layer.remove_layer(armature)
 
@@ -202,14 +203,17 @@ def remove_layers(scene: bpy.types.Scene) -> bool:
     layered = list(_layered(scene))
     for armature in layered:
         nla_layer.remove_layer(armature)
+    scene.softground.has_layers = False
     for layer in scene.view_layers:
         layer.update()
     return bool(layered)
 
 
 def has_layers(scene: bpy.types.Scene) -> bool:
-    """Whether any armature of the scene has a layer."""
-    return any(_layered(scene))
+    """Whether any armature of the scene may have a layer; quick enough for `poll`."""
+    options = scene.softground
+    armatures = (one.armature for one in options.characters if one.armature)
+    return options.has_layers or any(map(nla_layer.has_layer, armatures))  # files of 0.1 have no note of it
 
 
 def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:

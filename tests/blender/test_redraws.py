@@ -1,0 +1,57 @@
+"""What is asked at each redraw does not depend on how much there is in the file."""
+
+import bpy
+import pytest
+
+from softground_addon.blender.settings import exists
+from tests.blender import grounds, responders
+from tests.blender.redraws import fill, least_seconds, redraw, walk_over_all_objects
+
+OBJECTS = 10_000
+
+
+def nothing_baked(scene):
+    grounds.field(scene)
+
+
+def baked_on_a_copy(scene):
+    grounds.field(scene)
+    bpy.ops.softground.bake()
+
+
+def baked_with_a_response(scene):
+    responders.bake(scene)
+
+
+def live(scene):
+    grounds.field(scene)
+    bpy.ops.softground.live()
+
+
+def copy_deleted(scene):
+    baked_on_a_copy(scene)
+    bpy.context.active_object.select_set(True)
+    bpy.ops.object.delete()
+
+
+@pytest.mark.parametrize("set_up", [nothing_baked, baked_on_a_copy, baked_with_a_response, live, copy_deleted])
+def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, set_up):
+    set_up(short_walk)
+    bpy.ops.softground.predict_depth()
+    redraw(bpy.context)
+    before = least_seconds(redraw, bpy.context)
+    fill(short_walk, OBJECTS)
+    redraw(bpy.context)
+    longer = least_seconds(redraw, bpy.context) - before
+    assert longer < least_seconds(walk_over_all_objects) / 5
+
+
+def test_who_is_deleted_in_the_viewport_and_comes_back_is_there_again(scene):
+    thing = scene.softground.ground = bpy.data.objects.new("Field", bpy.data.meshes.new("Field"))
+    assert not exists(thing)
+    scene.collection.objects.link(thing)
+    assert exists(thing)
+    scene.collection.objects.unlink(thing)
+    assert not exists(thing)
+    scene.collection.objects.link(thing)
+    assert exists(thing)
