@@ -21,7 +21,11 @@ def records(file: Path) -> dict[str, list[Footprint]]:
     """The footprints in a file, by the name of the mesh that carries them."""
     bpy.ops.wm.open_mainfile(filepath=str(file))
     stored = {mesh.name: mesh.get(ground_mesh.RECORD) for mesh in bpy.data.meshes}
-    return {name: record.load(bytes(memoryview(one).cast("B")))[0] for name, one in stored.items() if one is not None}
+    return {
+        name: list(record.load(bytes(memoryview(one).cast("B"))).footprints)
+        for name, one in stored.items()
+        if one is not None
+    }
 
 
 def difference(before: list[Footprint], after: list[Footprint]) -> float:
