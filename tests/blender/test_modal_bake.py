@@ -188,3 +188,41 @@ def test_a_bake_whose_prints_are_still_to_come_says_how_to_see_them(scene):
         scene.frame_set(frame)
         modal_bake.SOFTGROUND_OT_bake._show(operator, result)
     assert [text.endswith(". Press Play to see them") for text in told if "steps" in text] == [True, False]
+
+
+def click(tab, place=(50, 50), kind="LEFTMOUSE", *, ctrl=False):
+    """Whether a bake lets an event through to a sidebar that shows a tab."""
+    region = SimpleNamespace(type="UI", x=0, y=0, width=100, height=100, active_panel_category=tab)
+    screen = SimpleNamespace(areas=[SimpleNamespace(type="VIEW_3D", regions=[region])])
+    event = SimpleNamespace(type=kind, mouse_x=place[0], mouse_y=place[1], ctrl=ctrl)
+    return modal_bake._is_harmless(SimpleNamespace(screen=screen), event)
+
+
+def test_a_bake_lets_clicks_through_to_its_own_panels_alone():
+    assert click("SoftGround")
+    assert not click("SoftGround", (150, 50))
+    assert not click("Item")
+    assert not click("SoftGround", kind="G")
+
+
+def test_a_bake_lets_the_wheel_scroll_but_turn_no_values():
+    assert click("Item", kind="WHEELUPMOUSE")
+    assert not click("Item", kind="WHEELUPMOUSE", ctrl=True)
+
+
+@pytest.mark.parametrize("baking", [False, True])
+def test_another_window_is_held_while_a_bake_runs(monkeypatch, baking):
+    monkeypatch.setattr(modal_bake, "_running", ["a bake"] if baking else [])
+    context = SimpleNamespace(screen=None)
+
+    def answer(kind, value="PRESS"):
+        event = SimpleNamespace(type=kind, value=value, mouse_x=0, mouse_y=0, ctrl=False)
+        return modal_bake.SOFTGROUND_OT_hold_window.modal(None, context, event)
+
+    held, let_through = {"RUNNING_MODAL"}, {"PASS_THROUGH"} if baking else {"FINISHED", "PASS_THROUGH"}
+    assert answer("MOUSEMOVE", "NOTHING") == let_through
+    assert answer("X") == answer("LEFTMOUSE") == (held if baking else let_through)
+    assert not session.current().cancel_requested
+    answer("ESC")
+    assert session.current().cancel_requested == baking
+    session.current().cancel_requested = False

@@ -14,6 +14,7 @@ from ..characters.character_setup import characters_of
 from ..operator_base import reports_errors
 from ..reading import analysis
 from ..translation import iface_, rpt_
+from .panel_base import CATEGORY
 
 TICK = 0.02
 """Longest work between two looks at the user's events [s]; a single step of the bake may exceed it."""
@@ -93,6 +94,10 @@ class _Bake(bpy.types.Operator):
         self._show_status(0.0, iface_(STAGE_NAMES["sample"]))
         manager.modal_handler_add(self)
         _running.append(self)
+        for window in manager.windows:
+            if window != context.window:
+                with context.temp_override(window=window):
+                    bpy.ops.softground.hold_window("INVOKE_DEFAULT")
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -243,6 +248,25 @@ class SOFTGROUND_OT_sink_feet(_Bake):
         self.report({"INFO"}, left.format(gap=largest))
 
 
+class SOFTGROUND_OT_hold_window(bpy.types.Operator):
+    """Let nothing be changed from a window while a bake runs in another one"""
+
+    bl_idname = "softground.hold_window"
+    bl_label = "Wait for the Bake"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not _running:
+            return {"FINISHED", "PASS_THROUGH"}
+        if event.type == "ESC" and event.value == "PRESS":
+            session.current().cancel_requested = True
+        return {"PASS_THROUGH"} if _is_harmless(context, event) else {"RUNNING_MODAL"}
+
+
 class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
     """End the bake now; the scene stays as it was"""
 
@@ -304,9 +328,9 @@ def _check_still_there(needed: dict[int, str]) -> None:
 
 
 def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
-    """Whether an event neither edits, saves nor renders: it navigates, or clicks in the panel (it can cancel)."""
+    """Whether an event neither edits, saves nor renders: it navigates, or clicks in our panels, grey but for Cancel."""
     if event.type.startswith(_NAVIGATION):
-        return True
+        return not event.ctrl  # the wheel turns a field's value with it
     if event.type != "LEFTMOUSE":
         return False
     for area in context.screen.areas if context.screen else ():
@@ -314,6 +338,7 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
             if (
                 area.type in session.PANEL_AREAS
                 and region.type == "UI"
+                and region.active_panel_category == CATEGORY
                 and 0 <= event.mouse_x - region.x < region.width
                 and 0 <= event.mouse_y - region.y < region.height
             ):
@@ -321,4 +346,4 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     return False
 
 
-CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_sink_feet, SOFTGROUND_OT_cancel_bake)
+CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_sink_feet, SOFTGROUND_OT_hold_window, SOFTGROUND_OT_cancel_bake)
