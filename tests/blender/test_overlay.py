@@ -1,5 +1,8 @@
 """What the overlay draws, as far as it can be known without a window."""
 
+import gc
+import weakref
+
 import bpy
 import numpy as np
 import pytest
@@ -81,3 +84,13 @@ def test_the_directory_of_a_record_lies_in_its_tail(scene):
     bpy.ops.softground.bake()
     stored = bytes(baked_ground.stored_record(scene.softground.ground))
     assert stored.find(b"PK\x01\x02") > len(stored) - record.TAIL  # the first entry of the directory
+
+
+def test_a_shot_that_is_forgotten_is_not_kept_by_what_was_drawn_of_it(short_walk):
+    analysis.read(short_walk)
+    shown = overlay._footfalls(analysis.known(short_walk))
+    assert overlay._footfalls(analysis.known(short_walk)) is shown, "it is worked out once"
+    known = weakref.ref(analysis.known(short_walk))
+    analysis.forget()
+    gc.collect()
+    assert known() is None

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import bpy
 import numpy as np
@@ -20,6 +19,7 @@ from ..ground import baked_ground
 from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
+from ..reading.analysis import Analysis
 from . import overlay_shapes, prediction
 from .overlay_shapes import Cells, Outline
 
@@ -42,22 +42,14 @@ TEXT_SIZE = 13
 """Size of the numbers [px, before the interface's scale]."""
 
 
-@dataclass(frozen=True)
-class _ById:
-    """An analysis that is compared by identity, so that what was worked out for it can be kept."""
-
-    analysis: Any
-
-    def __hash__(self) -> int:
-        return id(self.analysis)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ById) and other.analysis is self.analysis
+_outlines: WeakKeyDictionary[Analysis, list[Outline]] = WeakKeyDictionary()
+"""The footfalls of each shot that was shown, as long as it is known."""
 
 
-@lru_cache(maxsize=2)
-def _footfalls(source: _ById) -> list[Outline]:
-    return overlay_shapes.footfalls(source.analysis.loads, source.analysis.shot.terrain)
+def _footfalls(known: Analysis) -> list[Outline]:
+    if known not in _outlines:
+        _outlines[known] = overlay_shapes.footfalls(known.loads, known.shot.terrain)
+    return _outlines[known]
 
 
 _bake: dict[tuple[int, bytes], tuple[Sequence[Footprint], float]] = {}
@@ -86,7 +78,7 @@ def draw_shapes() -> None:
             for cells, colour in ((contact, CONTACT), (rim, RIM)):
                 _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
         if state.show_footfalls:
-            for outline in _footfalls(_ById(known)):
+            for outline in _footfalls(known):
                 _line(_closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
         if state.show_soles:
             for outline in overlay_shapes.soles(known.loads, frame):
@@ -115,7 +107,7 @@ def draw_numbers() -> None:
     blf.size(0, TEXT_SIZE * context.preferences.system.ui_scale)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
-    for number, outline in enumerate(_footfalls(_ById(known)), start=1):
+    for number, outline in enumerate(_footfalls(known), start=1):
         place = location_3d_to_region_2d(context.region, context.region_data, Vector((outline.middle * metre).tolist()))
         if place is None:
             continue
@@ -248,7 +240,7 @@ def unregister() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
     if bpy.app.timers.is_registered(read_again):
         bpy.app.timers.unregister(read_again)
-    _footfalls.cache_clear()
+    _outlines.clear()
     _bake.clear()
 
 

@@ -36,9 +36,9 @@ _Source = tuple[Mapping[str, Any], Any]
 """Settings that decide what is read of a shot, and where its ground lies."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Analysis:
-    """A shot that was read.
+    """A shot that was read; each reading is its own.
 
     Attributes
     ----------
