@@ -113,13 +113,13 @@ class Playhead:
     def footprints(self) -> list[Footprint]:
         """The record of the ground that is shown, with the contacts that are under way as they are by now."""
         until_now = [_until(self.frame, character) for character in self._loads]
-        found = [footprint for result in self._press(until_now) for footprint in result.footprints]
-        return sorted(found, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
+        footprints = [footprint for result in self._press(until_now) for footprint in result.footprints]
+        return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
 
     def _advance(self) -> bool:
         """Go on to the shot's next frame; False if there is none."""
         ahead = self._changes[self._shown + 1 :]
-        if any(change.material != self.material for change in ahead):
+        if any(not change.material.presses_like(self.material) for change in ahead):
             del self._changes[self._shown + 1 :]
             self._results = self._press(self._loads)
             for _ in self._changes:

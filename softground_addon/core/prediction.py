@@ -20,7 +20,7 @@ from .ground.variation import Factors, Variation, layer_factors
 from .loads.estimate import CharacterLoads
 from .motion.props import posed
 from .numerics.intervals import runs
-from .pressing.contact_layout import descent
+from .pressing.contact_layout import landing_drop
 from .pressing.deformation import compress, compression_rate, sink, target_compression, touching_fraction
 from .pressing.ground_cells import UndisturbedCells
 from .pressing.indentation import Springs, stress
@@ -214,7 +214,7 @@ def _sole_loads(character: CharacterLoads, index: int, cells: UndisturbedCells) 
             factors=factors,
             tolerance=points.tolerance,
             step=motion.time_step,
-            landing_speed=descent(sole.sole, landing, normals[0]) / motion.time_step,
+            landing_speed=landing_drop(sole.sole, landing, normals[0]) / motion.time_step,
         )
 
 

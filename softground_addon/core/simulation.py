@@ -1,4 +1,4 @@
-"""The only composer: from a character's motion to its loads, and from loads to footprints in the ground."""
+"""From a character's motion to its loads, and from loads to footprints in the ground."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from .ground.soft_ground import SoftGround
 from .loads.estimate import CharacterLoads
 from .motion.motion import SoleMotion
 from .numerics.intervals import runs
-from .pressing.contact_layout import Stance, Steps
+from .pressing.contact_layout import ContactLayout, Steps
 from .pressing.ground_cells import Timing
+from .pressing.open_contact import OpenContact
 from .pressing.prop_layout import PropLayout
 from .pressing.sole_layout import SoleLayout
 from .pressing.sole_points import SolePoints, sole_points
-from .pressing.solver import Press
+from .pressing.solver import GroundSolver
 from .record.footprints import Footprint
 
 Array = NDArray[np.float64]
@@ -99,44 +100,44 @@ class Simulation:
     """
 
     def __init__(self, ground: SoftGround, state: HeightField) -> None:
-        self._press = Press(ground, state)
-        self._active: list[Stance] = []
+        self._solver = GroundSolver(ground, state)
+        self._open: list[OpenContact] = []
         self._step = 1
 
     @property
     def material(self) -> GroundMaterial:
         """What the ground is made of; a new one acts on all that is pressed from then on."""
-        return self._press.material
+        return self._solver.material
 
     @material.setter
     def material(self, material: GroundMaterial) -> None:
-        if material != self._press.material:
-            self._press.material = material
-            for stance in self._active:
-                stance.lay_out_anew(self._step)
+        if not material.presses_like(self._solver.material):
+            for contact in self._open:
+                contact.lay_out_anew(self._step)
+        self._solver.material = material
 
     def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press a motion; see `simulate`."""
         grid = _time_grid(loads)
         waiting = _Waiting(loads, grid)
-        active = self._active = []
+        contacts = self._open = []
         start = 1
         for end in grid.shown + 1:
-            active += waiting.due(int(end))
+            contacts += waiting.due(int(end))
             frame = float(grid.frames[end - 1])
-            changed = self._press.advance(active, start, int(end), frame, grid.timing)
+            changed = self._solver.advance(contacts, start, int(end), frame, grid.timing)
             last = end == grid.shown[-1] + 1
-            ended = [stance for stance in active if stance.end <= end or last]
-            for stance in ended:
-                active.remove(stance)
-                changed += self._press.settle(stance, frame)
+            ended = [contact for contact in contacts if contact.layout.end <= end or last]
+            for contact in ended:
+                contacts.remove(contact)
+                changed += self._solver.settle(contact, frame)
             self._step = start = int(end)
             yield FrameResult(
                 frame,
-                self._press.state,
+                self._solver.state,
                 changed,
-                tuple(self._press.contact),
-                tuple(stance.footprint() for stance in ended if stance.printed),
+                tuple(self._solver.contact),
+                tuple(contact.footprint() for contact in ended if contact.recorder),
                 *_state_at(loads, grid.offsets, start - 1),
             )
 
@@ -144,12 +145,12 @@ class Simulation:
 class _Waiting:
     """Contacts to come, by their first step, in the order of the scene where they start together.
 
-    Each becomes a stance when its time comes: its poses at all steps take memory.
+    Each is opened when its time comes: its poses at all steps take memory.
     """
 
     def __init__(self, loads: Sequence[CharacterLoads], grid: _TimeGrid) -> None:
         self._frames = grid.frames
-        self._latest: dict[tuple[int, int], Stance] = {}
+        self._latest: dict[tuple[int, int], OpenContact] = {}
         contacts = [
             contact
             for number, (character, offset) in enumerate(zip(loads, grid.offsets, strict=True))
@@ -158,16 +159,14 @@ class _Waiting:
         ]
         self._contacts = deque(sorted(contacts, key=lambda contact: contact.first))
 
-    def due(self, end: int) -> Iterator[Stance]:
-        """The stances that start before a step."""
+    def due(self, end: int) -> Iterator[OpenContact]:
+        """The contacts that start before a step."""
         while self._contacts and self._contacts[0].first < end:
             contact = self._contacts.popleft()
-            stance = contact.stance(self._frames)
             earlier = self._latest.get(contact.of)
-            if isinstance(stance, PropLayout) and earlier and earlier.end == contact.since:
-                stance.earlier = earlier
-            self._latest[contact.of] = stance
-            yield stance
+            goes_on = contact.points is None and earlier is not None and earlier.layout.end == contact.since
+            opened = self._latest[contact.of] = OpenContact(contact.layout(self._frames), earlier if goes_on else None)
+            yield opened
 
 
 @dataclass(frozen=True)
@@ -194,8 +193,8 @@ class _Contact:
     first: int
     points: SolePoints | None
 
-    def stance(self, frames: Array) -> Stance:
-        """The stance, at steps of the time grid that are at these scene frames."""
+    def layout(self, frames: Array) -> ContactLayout:
+        """How it is laid out, at steps of the time grid that are at these scene frames."""
         motion, contacts, forces = self.character.motion, self.character.contacts, self.character.forces
         index, during = self.of[1], self.during
         sole, poses = motion.soles[index].sole, motion.soles[index].transforms

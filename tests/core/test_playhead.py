@@ -10,7 +10,8 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.playhead import Playhead
 from softground_addon.core.record.footprints import recompose
-from softground_addon.core.simulation import simulate
+from softground_addon.core.simulation import Simulation, simulate
+from tests.core.pressing.test_prop_prints import rolling
 from tests.core.walkers import walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
@@ -95,3 +96,45 @@ def test_its_footprints_put_together_are_the_ground_that_it_shows(loads):
         ground = recompose(playhead.footprints(), cell_size=CELL)
         for place, tile in playhead.ground.tiles.items():
             assert ground.tiles.get(place, np.zeros_like(tile)) == pytest.approx(tile, abs=2e-9)
+
+
+def recorded(playhead):
+    """What the record says of each contact, beside its cells."""
+    return [
+        (*f.position.tolist(), f.heading, f.area_m2, f.peak_force_n, f.compressed_m3, f.rim_m3, f.unplaced_rim_m3)
+        for f in playhead.footprints()
+    ]
+
+
+def test_another_display_blur_changes_no_record_and_presses_nothing_anew(loads, monkeypatch):
+    undisturbed = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+    undisturbed.go_to(loads.motion.frames[-1])
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+    for frame in loads.motion.frames[::3]:
+        playhead.material = replace(SNOW, blur_sigma=0.001 * (1 + frame % 7))
+        playhead.go_to(frame)
+    playhead.go_to(loads.motion.frames[-1])
+    assert recorded(playhead) == recorded(undisturbed)
+    assert state(playhead.ground) == state(undisturbed.ground)
+    playhead.go_to(20.0)
+    playhead.material = replace(SNOW, blur_sigma=0.02)
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "run", lambda *_: pytest.fail("pressed anew"))
+        playhead.go_to(loads.motion.frames[-1])
+
+
+@pytest.mark.parametrize("bodies", ["feet", "wheel"])
+def test_what_is_laid_out_twice_is_counted_once(loads, bodies):
+    """A stiffness that changes by a millionth back and forth has every step laid out anew, and the same record."""
+    if bodies == "wheel":
+        loads = rolling(30.0)
+    frames = np.unique(np.floor(loads.motion.frames))
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+    for number, frame in enumerate(frames):
+        playhead.material = replace(SNOW, youngs_modulus=SNOW.youngs_modulus * (1 + 1e-6 * (number % 2)))
+        playhead.go_to(frame)
+    steady = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+    steady.go_to(frames[-1])
+    assert len(recorded(steady)) >= 1
+    for one, other in zip(recorded(playhead), recorded(steady), strict=True):
+        assert one == pytest.approx(other, rel=1e-5, abs=1e-6)

@@ -1,4 +1,4 @@
-"""One stance of a sole: when and how hard it presses which cells, laid out ahead of the pressing itself."""
+"""One contact of a sole: when and how hard it presses which cells, laid out ahead of the pressing itself."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import SparseGrid, Window
+from ..ground.heightfield import Window
 from ..motion.motion import Sole
-from ..record.footprints import Footprint, FootprintRecorder
-from .ground_cells import Bed, Imprints, Timing
+from .ground_cells import GroundCells, Imprints, Timing
 from .rim import lean_of_landing, leaning
 
 Array = NDArray[np.float64]
 
 STEPS_AT_ONCE = 128
-"""Steps of one stance that are laid out in one go: about one stance of a walk."""
+"""Steps of one contact that are laid out in one go: about one contact of a walk."""
 CELLS_AT_ONCE = 4_000_000
 """Fewer steps are laid out in one go where they would have more cells than this together: 50 MB."""
 LARGEST_SPREAD = 4
@@ -53,104 +52,79 @@ class Steps:
     centres: Array
 
 
-class Stance(ABC):
-    """One sole from touching down to leaving, and its footprint as it grows.
+class ContactLayout(ABC):
+    """One sole from touching down to leaving, as it is laid out on the cells of the ground.
+
+    It remembers nothing of what was laid out or pressed: the same steps on the same cells give the same imprints.
 
     Parameters
     ----------
     character : str
     sole : Sole
     steps : Steps
-        All of the stance.
+        All of the contact.
 
     Attributes
     ----------
-    earlier : Stance or None
-        The stance that this one goes on from without leaving the ground, where a long track is cut into several.
-    pressed : SparseGrid or None
-        What it compressed itself, kept where the ground hardens.
+    first, end : int
+        Number of the first step and of the one after the last.
+    force : (N,) float array
+        Normal force at each step [N].
     lean : (N, 2) float array
         Which way the rim leans at each step; see `rim.leaning`.
     """
 
     def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
-        self.character, self.sole = character, sole
+        self.character, self.sole, self.steps = character, sole, steps
         self.first, self.end = steps.first, steps.first + len(steps.frames)
-        self.compressed = self.raised = self.unplaced = 0.0
-        self.recorder: FootprintRecorder | None = None
-        self.pressed: SparseGrid | None = None
-        self.earlier: Stance | None = None
-        self._steps = steps
-        self._force = np.maximum(np.einsum("ni,ni->n", steps.forces, steps.normals), 0.0)
-        self._descent = descent(sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
+        self.force = np.maximum(np.einsum("ni,ni->n", steps.forces, steps.normals), 0.0)
+        self._landing_drop = landing_drop(sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
         approach = steps.approach if len(steps.approach) else steps.poses[:1]
         path = self._middles(np.concatenate([approach[-1:], steps.poses]))
         self.lean = leaning(path, self._length, lean_of_landing(path[:2], self._length))
-        self._area = self._sinkage = self._load = 0.0
-        self._moment = np.zeros(3)
-        self._imprints: Imprints | None = None
 
-    def imprints(self, start: int, end: int, bed: Bed, timing: Timing) -> Imprints:
-        """The imprints of these steps, laid out together with as many later ones as pays."""
-        if self._imprints is None or self._imprints.end < end:
-            per_frame = timing.steps_per_frame
-            last = min(self.end, end + per_frame * max(0, STEPS_AT_ONCE // per_frame - 1))
-            allowed = LARGEST_SPREAD * self._window(start, start + 1, bed).cells
-            window = self._window(start, last, bed)
-            most = CELLS_AT_ONCE // self._parts(start, last, bed)
-            while last > end and (window.cells > allowed or window.cells * (last - start) > most):
-                last = end + (last - end) // (2 * per_frame) * per_frame
-                window = self._window(start, last, bed)
-            self._imprints = self._lay_out(start, last, window, bed, timing.step)
-        return self._imprints
+    def lay_out(self, start: int, end: int, cells: GroundCells, timing: Timing, sinkage: float) -> Imprints:
+        """The imprints of the steps from start to before end, and of as many later ones as pays.
 
-    def lay_out_anew(self, start: int) -> None:
-        """Forget the imprints from a step on, as they were laid out on other terms."""
-        if self._imprints is not None and self._imprints.first <= start < self._imprints.end:
-            self._sinkage = float(self._imprints.sinkage[start - self._imprints.first])
-        self._imprints = None
+        Parameters
+        ----------
+        start, end : int
+        cells : GroundCells
+        timing : Timing
+        sinkage : float
+            How far the ground has given way under the sole's lowest point by then [m].
+        """
+        per_frame = timing.steps_per_frame
+        last = min(self.end, end + per_frame * max(0, STEPS_AT_ONCE // per_frame - 1))
+        allowed = LARGEST_SPREAD * self._window(start, start + 1, cells).cells
+        window = self._window(start, last, cells)
+        most = CELLS_AT_ONCE // self._parts(start, last, cells)
+        while last > end and (window.cells > allowed or window.cells * (last - start) > most):
+            last = end + (last - end) // (2 * per_frame) * per_frame
+            window = self._window(start, last, cells)
+        return self._lay_out(start, last, window, cells, timing.step, sinkage)
 
-    @property
-    def printed(self) -> bool:
-        """Whether it changed the ground."""
-        return self.recorder is not None
-
-    def footprint(self) -> Footprint:
-        """The record of what was pressed so far."""
-        if self.recorder is None:
-            raise ValueError("a stance that pressed nothing leaves no footprint")
-        frames, hardest = self._steps.frames, int(self._force.argmax())
-        return self.recorder.footprint(
-            character=self.character,
-            sole=self.sole.name,
-            start_frame=float(frames[0]),
-            end_frame=float(frames[-1]),
-            position=self._moment / self._load,
-            heading=float(np.arctan2(*self._toward(hardest)[::-1])),
-            area_m2=self._area,
-            peak_force_n=float(self._force[hardest]),
-            compressed_m3=self.compressed,
-            rim_m3=self.raised,
-            unplaced_rim_m3=self.unplaced,
-            load_frames=frames,
-            load_n=self._force,
-        )
+    def heading(self, step: int) -> float:
+        """Direction of the toes at a step of the contact, counter-clockwise from world x [rad]."""
+        return float(np.arctan2(*self._toward(step)[::-1]))
 
     @abstractmethod
-    def _window(self, start: int, end: int, bed: Bed) -> Window:
+    def _window(self, start: int, end: int, cells: GroundCells) -> Window:
         """The cells that may change in these steps."""
 
     @abstractmethod
-    def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
+    def _lay_out(
+        self, start: int, end: int, window: Window, cells: GroundCells, step: float, sinkage: float
+    ) -> Imprints:
         """The imprints of these steps."""
 
-    def _parts(self, _start: int, _end: int, _bed: Bed) -> int:
+    def _parts(self, _start: int, _end: int, _cells: GroundCells) -> int:
         """Number of parts in which each of these steps is laid out."""
         return 1
 
     def _toward(self, step: int) -> Array:
         """Horizontal direction of the toes at a step, (2,)."""
-        direction: Array = self._steps.poses[step, 0, :2, 0]
+        direction: Array = self.steps.poses[step, 0, :2, 0]
         return direction
 
     @property
@@ -163,7 +137,7 @@ class Stance(ABC):
         """Middle of what can touch at poses (N, P, 4, 4), (N, 3) [m]."""
 
 
-def descent(sole: Sole, poses: Array, normal: Array) -> float:
+def landing_drop(sole: Sole, poses: Array, normal: Array) -> float:
     """Furthest that the landmark which lands first came down between two of the last poses (K, P, 4, 4) [m]."""
     pose = poses[:, sole.landmark_patch]
     height = (np.einsum("klij,lj->kli", pose[..., :3, :3], sole.landmarks) + pose[..., :3, 3]) @ normal

@@ -196,7 +196,7 @@ def compress(
     rate: float,
     *,
     holds: Mask | bool = False,
-    found: Array | None = None,
+    compacted: Array | None = None,
     hardening: float = 0.0,
 ) -> Array:
     """Compression of each cell after one more step [m] (Eq. 11).
@@ -221,7 +221,7 @@ def compress(
         From `compression_rate`.
     holds : bool or bool array
         Cells whose crust carries the stress, if it is whole; one that was ever compressed is broken.
-    found : (rows, columns) float array, optional
+    compacted : (rows, columns) float array, optional
         Compression of each cell before this contact [m].
     hardening : float
         See above.
@@ -241,9 +241,9 @@ def compress(
     if holds is not False:
         aim[holds & (compression == 0)] = 0.0
     further = rate * aim
-    if found is not None and hardening:
-        stiffer = 1.0 + hardening * np.divide(found, aim, out=np.ones_like(aim), where=aim > found)
-        aim = found + (aim - found) / stiffer
+    if compacted is not None and hardening:
+        stiffer = 1.0 + hardening * np.divide(compacted, aim, out=np.ones_like(aim), where=aim > compacted)
+        aim = compacted + (aim - compacted) / stiffer
         further /= stiffer
     further += compression
     np.minimum(further, aim, out=further)

@@ -1,4 +1,4 @@
-"""What stances are laid out on: the ground in cells, the steps of time, and the cells that are pressed at each."""
+"""What contacts are laid out on: the ground in cells, the steps of time, and the cells that are pressed at each."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class UndisturbedCells:
         return self._variation.factors(window) if self._variation else None
 
 
-class Bed(UndisturbedCells):
+class GroundCells(UndisturbedCells):
     """The ground that soles are laid on, in cells, and how they press on it.
 
     Parameters
@@ -88,8 +88,27 @@ class Bed(UndisturbedCells):
 
 
 @dataclass(frozen=True)
+class Loads:
+    """How a sole loads the ground, at each of N steps or parts of them.
+
+    Attributes
+    ----------
+    force : (N,) float array
+        Normal force [N], 0 where the ground gives no way.
+    area : (N,) float array
+        Area of contact [m²].
+    middle : (N, 3) float array
+        Middle of the pressure, on the undisturbed ground [m].
+    """
+
+    force: Array
+    area: Array
+    middle: Array
+
+
+@dataclass(frozen=True)
 class Imprints:
-    """A stance over the cells, at each of N steps from `first` on, or at each of N parts of them.
+    """A contact over the cells, at each of N steps from `first` on, or at each of N parts of them.
 
     Attributes
     ----------
@@ -116,6 +135,9 @@ class Imprints:
         How the ground varies over the window.
     sinkage : (number of steps,) float array
         How far the ground had given way under the sole's lowest point when each step began [m].
+    reached : float
+        The same after the last step [m].
+    loads : Loads
     """
 
     first: int
@@ -130,6 +152,8 @@ class Imprints:
     holds: NDArray[np.bool_] | None
     factors: Factors | None
     sinkage: Array
+    reached: float
+    loads: Loads
 
     @property
     def end(self) -> int:

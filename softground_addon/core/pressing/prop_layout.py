@@ -1,4 +1,4 @@
-"""A stance of a rigid body: it presses by whatever faces down, as it rolls, slides, tips or rests."""
+"""A contact of a rigid body: it presses by whatever faces down, as it rolls, slides, tips or rests."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..ground.variation import Factors, layer_factors
 from ..motion.motion import Sole
 from ..motion.props import Prop
 from ..numerics.interpolation import turning
-from .contact_layout import Stance, Steps
+from .contact_layout import ContactLayout, Steps
 from .deformation import compression_rate
-from .ground_cells import Bed, Imprints
+from .ground_cells import GroundCells, Imprints, Loads
 from .indentation import stress
 from .prop_imprint import ground_under
 from .rim import in_contact, rim_weights, whole_reach
@@ -27,13 +27,13 @@ STRIDE = 1 / 32
 """A body that moves further than this in a step is laid out in parts of the step, in its sizes."""
 MOST_PARTS = 32
 """Parts of a step at most."""
-FIRST_REACH = 0.05
+FIRST_EXTENT = 0.05
 """Part of a body that is looked at before it is known how deep it sinks, in its sizes above its lowest point."""
 STANDSTILL = 1e-4
 """A body that moves less than this in a step, in its sizes, has no direction of travel."""
 
 
-class PropLayout(Stance):
+class PropLayout(ContactLayout):
     """A body on the ground, from touching it to leaving it.
 
     Parameters
@@ -42,77 +42,86 @@ class PropLayout(Stance):
     sole : Sole
         With a prop.
     steps : Steps
-        All of the stance.
+        All of the contact.
     """
 
     def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
         assert sole.prop is not None, sole.name
         self.prop: Prop = sole.prop
-        self._deepest = 0.0
         super().__init__(character, sole, steps)
         poses, outer = steps.poses[:, 0], self.prop.probes.T
-        reach = np.zeros((2, len(poses), 2))
+        extent = np.zeros((2, len(poses), 2))
         for k, pose in enumerate(poses):
             if k and (pose == poses[k - 1]).all():
-                reach[:, k] = reach[:, k - 1]
+                extent[:, k] = extent[:, k - 1]
             else:
                 place = pose[:2, :3] @ outer + pose[:2, 3:]
-                reach[:, k] = place.min(axis=1), place.max(axis=1)
-        self._reach = reach
+                extent[:, k] = place.min(axis=1), place.max(axis=1)
+        self._extent = extent
 
-    def _window(self, start: int, end: int, bed: Bed) -> Window:
-        low, high = self._reach[:, start - self.first : end - self.first]
-        half = bed.cell_size / 2
-        window = Window.around(low.min(axis=0) - half, high.max(axis=0) + half, bed.cell_size)
-        return window.expanded(whole_reach(bed.rim_reach))
+    def _window(self, start: int, end: int, cells: GroundCells) -> Window:
+        low, high = self._extent[:, start - self.first : end - self.first]
+        half = cells.cell_size / 2
+        window = Window.around(low.min(axis=0) - half, high.max(axis=0) + half, cells.cell_size)
+        return window.expanded(whole_reach(cells.rim_reach))
 
-    def _parts(self, start: int, end: int, bed: Bed) -> int:
+    def _parts(self, start: int, end: int, cells: GroundCells) -> int:
         path = self._between(start, end, 1, before=True)[:, :2, 3]
         furthest = float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0))
-        return max(1, min(MOST_PARTS, ceil(furthest / max(bed.cell_size, STRIDE * self.prop.size) - 1e-6)))
+        return max(1, min(MOST_PARTS, ceil(furthest / max(cells.cell_size, STRIDE * self.prop.size) - 1e-6)))
 
-    def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
-        steps, material, cells = slice(start - self.first, end - self.first), bed.material, bed.surface(window)
-        parts = self._parts(start, end, bed)
+    def _lay_out(
+        self, start: int, end: int, window: Window, cells: GroundCells, step: float, sinkage: float
+    ) -> Imprints:
+        steps, material, surface = slice(start - self.first, end - self.first), cells.material, cells.surface(window)
+        parts = self._parts(start, end, cells)
         poses = self._between(start, end, parts)
-        force = np.repeat(self._force[steps], parts)
-        upright = np.repeat(self._steps.normals[steps, 2], parts)
-        factors = bed.factors(window)
+        force = np.repeat(self.force[steps], parts)
+        upright = np.repeat(self.steps.normals[steps, 2], parts)
+        factors = cells.factors(window)
         coverage = np.zeros((len(poses), window.rows, window.columns), np.float32)
         target = np.zeros(coverage.shape)
-        sinkage, area = np.zeros(len(poses)), np.zeros(len(poses))
+        depth, area, middle = np.zeros(len(poses)), np.zeros(len(poses)), np.zeros((len(poses), 3))
+        reached = np.full(len(poses) + 1, sinkage)
         for k, pose in enumerate(poses):
             if k and force[k] == force[k - 1] and upright[k] == upright[k - 1] and (pose == poses[k - 1]).all():
-                coverage[k], target[k], sinkage[k], area[k] = (
-                    coverage[k - 1],
-                    target[k - 1],
-                    sinkage[k - 1],
-                    area[k - 1],
-                )
+                for values in (coverage, target, depth, area, middle):
+                    values[k] = values[k - 1]
             else:
-                hollow = self._hollow(pose, force[k], cells, material, factors)
-                coverage[k], target[k], sinkage[k] = hollow.coverage, hollow.compression, hollow.sinkage
-                area[k] = hollow.area / upright[k]
-            self._moment += force[k] * _middle(coverage[k] * target[k], cells)
-        pressing = sinkage > 0
-        load = force * pressing
-        self._load += float(load.sum())
-        self._area = max(self._area, float(area[load > 0].max(initial=0.0)))
+                indentation = self._indentation(pose, force[k], surface, material, factors, reached[k])
+                coverage[k], target[k], depth[k] = indentation.coverage, indentation.compression, indentation.sinkage
+                area[k] = indentation.area / upright[k]
+                middle[k] = _middle(coverage[k] * target[k], surface)
+            reached[k + 1] = depth[k] or reached[k]
+        pressing = depth > 0
         contact = in_contact(coverage)
         toward = material.rim_bias * self.lean[steps].repeat(parts, axis=0) if material.rim_bias else None
-        rim = rim_weights(coverage, contact, bed.rim_reach, cells.bears, toward)
-        rate = np.broadcast_to(compression_rate(step / parts, material, sinkage, self._descent / step), sinkage.shape)
+        rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
+        rate = np.broadcast_to(compression_rate(step / parts, material, depth, self._landing_drop / step), depth.shape)
         holds = None
         if material.crust_stress:
             holds = stress(target, material, **layer_factors(factors)) < material.crust_stress
         return Imprints(
-            start, parts, window, coverage, contact, rim, pressing, target, rate, holds, factors, sinkage[::parts]
+            start,
+            parts,
+            window,
+            coverage,
+            contact,
+            rim,
+            pressing,
+            target,
+            rate,
+            holds,
+            factors,
+            reached[:-1:parts],
+            float(reached[-1]),
+            Loads(np.where(pressing, force, 0.0), area, middle),
         )
 
     def _toward(self, step: int) -> Array:
         """The way that the body moves; of one that stands, its own x axis."""
-        pose = self._steps.poses[step, 0]
-        before = np.concatenate([self._steps.approach[-1:], self._steps.poses])[max(0, step)]
+        pose = self.steps.poses[step, 0]
+        before = np.concatenate([self.steps.approach[-1:], self.steps.poses])[max(0, step)]
         travel: Array = pose[:2, 3] - before[0, :2, 3]
         return travel if np.linalg.norm(travel) > STANDSTILL * self.prop.size else pose[:2, 0]
 
@@ -126,41 +135,46 @@ class PropLayout(Stance):
 
     def _between(self, start: int, end: int, parts: int, *, before: bool = False) -> Array:
         """Poses (N, 4, 4) of these steps, each in so many parts; with that of the step before, if asked."""
-        known = np.concatenate([self._steps.approach[-1:], self._steps.poses])[:, 0]
-        first = len(known) - len(self._steps.poses) + start - self.first  # where `start` is among them
+        known = np.concatenate([self.steps.approach[-1:], self.steps.poses])[:, 0]
+        first = len(known) - len(self.steps.poses) + start - self.first  # where `start` is among them
         at = first - 1 + np.arange(0 if before else 1, (end - start) * parts + 1) / parts
         return turning(known, np.maximum(at, 0.0))
 
-    def _hollow(
-        self, pose: Array, force: float, cells: Surface, material: GroundMaterial, factors: Factors | None
-    ) -> _Hollow:
-        """What the body presses at a pose, under a lasting force."""
+    def _indentation(
+        self,
+        pose: Array,
+        force: float,
+        cells: Surface,
+        material: GroundMaterial,
+        factors: Factors | None,
+        reached: float,
+    ) -> _Indentation:
+        """What the body presses at a pose, under a lasting force, after one under which it sank so far [m]."""
         shape = (cells.window.rows, cells.window.columns)
-        hollow = _Hollow(np.zeros(shape), np.zeros(shape), 0.0, 0.0)
+        indentation = _Indentation(np.zeros(shape), np.zeros(shape), 0.0, 0.0)
         deepest = material.layer_depth * (float(factors.depth.max()) if factors else 1.0)
-        reach = min(max(2 * self._deepest, FIRST_REACH * self.prop.size), deepest)
+        extent = min(max(2 * reached, FIRST_EXTENT * self.prop.size), deepest)
         while True:
-            under = ground_under(self.prop, pose, cells, reach, factors) if force > 0 else None
+            under = ground_under(self.prop, pose, cells, extent, factors) if force > 0 else None
             if under is None:
-                return hollow
+                return indentation
             sinkage = under.springs.sinkage(force, material)
-            if sinkage <= reach or reach >= deepest:
+            if sinkage <= extent or extent >= deepest:
                 break
-            reach = min(2 * sinkage, deepest)
-        self._deepest = sinkage
+            extent = min(2 * sinkage, deepest)
         compression = np.zeros(under.over.shape)
         compression[under.over] = under.springs.compression(sinkage, material)
         covered, mean = under.by_cell(compression > 0), under.by_cell(compression)
-        hollow.coverage[under.rows, under.columns] = covered
-        hollow.compression[under.rows, under.columns] = np.divide(
+        indentation.coverage[under.rows, under.columns] = covered
+        indentation.compression[under.rows, under.columns] = np.divide(
             mean, covered, out=np.zeros_like(mean), where=covered > 0
         )
         area = float((compression > 0).sum() * under.springs.area[0])
-        return _Hollow(hollow.coverage, hollow.compression, sinkage, area)
+        return _Indentation(indentation.coverage, indentation.compression, sinkage, area)
 
 
 @dataclass(frozen=True)
-class _Hollow:
+class _Indentation:
     """What a body presses into the cells of a window.
 
     Attributes

@@ -1,4 +1,4 @@
-"""A stance of a foot: patches that keep their underside press evenly, or so that the force acts where it should."""
+"""A contact of a foot: patches that keep their underside press evenly, or so that the force acts where it should."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ..ground.heightfield import Window
 from ..ground.variation import layer_factors
 from ..motion.motion import Sole
-from .contact_layout import Stance, Steps
+from .contact_layout import ContactLayout, Steps
 from .deformation import Sinking, compression_rate, sink, target_compression, touching_fraction
-from .ground_cells import Bed, Imprints
+from .ground_cells import GroundCells, Imprints, Loads
 from .pressure import pressure_field
 from .rim import in_contact, rim_weights, whole_reach
 from .sole_imprint import cell_coverage
@@ -19,15 +19,15 @@ from .sole_points import PointContact, SolePoints, centroid, contact_window, pla
 Array = NDArray[np.float64]
 
 
-class SoleLayout(Stance):
-    """A stance of a foot: patches that keep their underside, tilted a little at most.
+class SoleLayout(ContactLayout):
+    """A contact of a foot: patches that keep their underside, tilted a little at most.
 
     Parameters
     ----------
     character : str
     sole : Sole
     steps : Steps
-        All of the stance.
+        All of the contact.
     points : SolePoints
         Of that sole.
     """
@@ -36,34 +36,34 @@ class SoleLayout(Stance):
         self.points = points
         super().__init__(character, sole, steps)
 
-    def _window(self, start: int, end: int, bed: Bed) -> Window:
-        window = contact_window(self.points, self._steps.poses[start - self.first : end - self.first], bed.cell_size)
-        return window.expanded(whole_reach(bed.rim_reach))
+    def _window(self, start: int, end: int, cells: GroundCells) -> Window:
+        window = contact_window(self.points, self.steps.poses[start - self.first : end - self.first], cells.cell_size)
+        return window.expanded(whole_reach(cells.rim_reach))
 
-    def _lay_out(self, start: int, end: int, window: Window, bed: Bed, step: float) -> Imprints:
-        steps, points, material = slice(start - self.first, end - self.first), self.points, bed.material
-        poses = self._steps.poses[steps]
-        divisions = points.cell_divisions(bed.cell_size)
-        cells = bed.surface(window)
-        ground = bed.surface(window, divisions) if divisions > 1 else cells
+    def _lay_out(
+        self, start: int, end: int, window: Window, cells: GroundCells, step: float, sinkage: float
+    ) -> Imprints:
+        steps, points, material = slice(start - self.first, end - self.first), self.points, cells.material
+        poses = self.steps.poses[steps]
+        divisions = points.cell_divisions(cells.cell_size)
+        surface = cells.surface(window)
+        ground = cells.surface(window, divisions) if divisions > 1 else surface
         over_ground = point_contact(points, poses, ground)
-        area = over_ground.area / self._steps.normals[steps, 2, None]
-        factors = bed.factors(window)
-        landing_speed = self._descent / step
+        area = over_ground.area / self.steps.normals[steps, 2, None]
+        factors = cells.factors(window)
+        landing_speed = self._landing_drop / step
         sinking = sink(
             over_ground.clearance,
             area,
-            self._force[steps],
+            self.force[steps],
             tolerance=points.tolerance,
             step=step,
             material=material,
-            sinkage=self._sinkage,
+            sinkage=sinkage,
             landing_speed=landing_speed,
-            softness=factors.softness[window.cells_under(*places(points, poses), bed.cell_size)] if factors else None,
+            softness=factors.softness[window.cells_under(*places(points, poses), cells.cell_size)] if factors else None,
         )
-        self._sinkage = sinking.reached
         touching = area * touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
-        self._add_up(steps, over_ground, sinking, touching)
         coverage = cell_coverage(
             self.sole,
             poses,
@@ -75,9 +75,9 @@ class SoleLayout(Stance):
         )
         contact = in_contact(coverage)
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
-        rim = rim_weights(coverage, contact, bed.rim_reach, cells.bears, toward)
+        rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed)
-        stress = self._stress(steps, window, bed, sinking, touching)
+        stress = self._stress(steps, window, cells, sinking, touching)
         if factors and stress.ndim == 1:
             stress = stress[:, None, None]
         target = sinking.target
@@ -96,33 +96,32 @@ class SoleLayout(Stance):
             stress < material.crust_stress if material.crust_stress else None,
             factors,
             sinking.sinkage,
+            sinking.reached,
+            Loads(self._load_at(steps, sinking), sinking.area, self._middle(poses, over_ground, touching)),
         )
 
-    def _add_up(self, steps: slice, over_ground: PointContact, sinking: Sinking, touching: Array) -> None:
-        """Add what these steps press to the footprint: how large the contact is, and the middle of the load."""
-        load = self._load_at(steps, sinking)
-        middle = centroid(self.points, self._steps.poses[steps], touching)
+    def _middle(self, poses: Array, over_ground: PointContact, touching: Array) -> Array:
+        """Middle of the pressure at each step, on the undisturbed ground, (N, 3) [m]."""
+        middle = centroid(self.points, poses, touching)
         above = (touching * over_ground.clearance).sum(axis=1) / np.maximum(touching.sum(axis=1), 1e-300)
         middle[:, 2] -= over_ground.lowest + above
-        self._area = max(self._area, float(sinking.area[load > 0].max(initial=0.0)))
-        self._moment += load @ middle
-        self._load += float(load.sum())
+        return middle
 
-    def _stress(self, steps: slice, window: Window, bed: Bed, sinking: Sinking, touching: Array) -> Array:
+    def _stress(self, steps: slice, window: Window, cells: GroundCells, sinking: Sinking, touching: Array) -> Array:
         """Normal stress at each of N steps, (N,) [Pa]; where the pressure rolls, of each cell, (N, rows, columns)."""
         stress = np.divide(
             self._load_at(steps, sinking), sinking.area, out=np.zeros(len(sinking.area)), where=sinking.target > 0
         )
-        if bed.ground.pressure != "CENTRE_OF_PRESSURE":
+        if cells.ground.pressure != "CENTRE_OF_PRESSURE":
             return stress
-        x, y = places(self.points, self._steps.poses[steps])
-        field = pressure_field(x, y, touching, self._steps.centres[steps, :2], self.points.tolerance)
-        over_cells: Array = stress[:, None, None] * field.over(*window.centres(bed.cell_size))
+        x, y = places(self.points, self.steps.poses[steps])
+        field = pressure_field(x, y, touching, self.steps.centres[steps, :2], self.points.tolerance)
+        over_cells: Array = stress[:, None, None] * field.over(*window.centres(cells.cell_size))
         return over_cells
 
     def _load_at(self, steps: slice, sinking: Sinking) -> Array:
         """Force on the ground at these steps, (N,) [N]: none where it gives no way."""
-        load: Array = self._force[steps] * (sinking.target > 0)
+        load: Array = self.force[steps] * (sinking.target > 0)
         return load
 
     @property

@@ -1,4 +1,4 @@
-"""One stance after the other into one ground: the part of the simulation that works on cells."""
+"""One contact after the other into one ground: the part of the simulation that works on cells."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..ground.heightfield import HeightField, SparseGrid, Surface, Window
 from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..record.footprints import FootprintRecorder, quantised
-from .contact_layout import Stance
 from .deformation import compress
-from .ground_cells import Bed, Imprints, Timing
+from .ground_cells import GroundCells, Imprints, Timing
+from .open_contact import OpenContact
 from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
 from .rim import displaced_volume
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class Press:
+class GroundSolver:
     """A ground to be pressed, and on what terms.
 
     Parameters
@@ -37,16 +37,16 @@ class Press:
         self.state = state
         self.contact: list[tuple[Window, Mask]] = []
         """Cells that were in contact in the steps pressed last."""
-        self.bed = Bed(ground, state.cell_size)
+        self.cells = GroundCells(ground, state.cell_size)
 
     @property
     def material(self) -> GroundMaterial:
         """What the ground is made of."""
-        return self.bed.material
+        return self.cells.material
 
     @material.setter
     def material(self, material: GroundMaterial) -> None:
-        self.bed.ground = replace(self.bed.ground, material=material)
+        self.cells.ground = replace(self.cells.ground, material=material)
 
     @property
     def cell_size(self) -> float:
@@ -54,9 +54,9 @@ class Press:
         return self.state.cell_size
 
     def advance(
-        self, stances: Sequence[Stance], start: int, end: int, frame: float, timing: Timing
+        self, contacts: Sequence[OpenContact], start: int, end: int, frame: float, timing: Timing
     ) -> tuple[Window, ...]:
-        """Press the steps from start to before end; where stances share ground, all of them step by step.
+        """Press the steps from start to before end; where contacts share ground, all of them step by step.
 
         Returns
         -------
@@ -65,25 +65,25 @@ class Press:
         """
         parts = []
         self.contact = []
-        for stance in stances:
-            first, last = max(start, stance.first), min(end, stance.end)
+        for contact in contacts:
+            first, last = max(start, contact.layout.first), min(end, contact.layout.end)
             if first < last:
-                parts.append((stance, stance.imprints(first, last, self.bed, timing), first, last))
+                parts.append((contact, contact.imprints(first, last, self.cells, timing), first, last))
         windows = [imprints.window for _, imprints, _, _ in parts]
         spans = [(start, end)]
         if any(one.intersects(other) for one, other in combinations(windows, 2)):
             spans = [(step, step + 1) for step in range(start, end)]
         for begin, stop in spans:
-            for stance, imprints, first, last in parts:
+            for contact, imprints, first, last in parts:
                 if max(first, begin) < min(last, stop):
-                    windows += self._press(stance, imprints, max(first, begin), min(last, stop), frame, timing)
+                    windows += self._press(contact, imprints, max(first, begin), min(last, stop), frame, timing)
         return tuple(windows)
 
-    def settle(self, stance: Stance, frame: float) -> tuple[Window, ...]:
-        """Let slide what a stance that has ended left too steep; where the ground may have changed by that."""
-        if not self.material.repose_angle or stance.recorder is None:
+    def settle(self, contact: OpenContact, frame: float) -> tuple[Window, ...]:
+        """Let slide what a contact that has ended left too steep; where the ground may have changed by that."""
+        if not self.material.repose_angle or contact.recorder is None:
             return ()
-        window, surface = self._around(stance.recorder.window)
+        window, surface = self._around(contact.recorder.window)
         state = self.state.read(window)
         before = quantised(state)
         state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
@@ -91,11 +91,11 @@ class Press:
         if not change.any():
             return ()
         self.state.write(window, state)
-        stance.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
+        contact.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
         return (window,)
 
     def _press(
-        self, stance: Stance, imprints: Imprints, start: int, end: int, frame: float, timing: Timing
+        self, contact: OpenContact, imprints: Imprints, start: int, end: int, frame: float, timing: Timing
     ) -> list[Window]:
         first, last = ((step - imprints.first) * imprints.parts for step in (start, end))
         steps = first + np.flatnonzero(imprints.pressing[first:last])
@@ -108,7 +108,7 @@ class Press:
         before = quantised(whole)
         inside = _inside(window, imprints.window)
         state = whole[:, inside[0], inside[1]]
-        found = self._found(stance, imprints.window, state) if material.hardening else None
+        compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
         rim = imprints.rim[steps].reshape(len(steps), -1)
         for k, step in enumerate(steps):
@@ -118,7 +118,7 @@ class Press:
                 imprints.target[step],
                 imprints.rate[step],
                 holds=False if imprints.holds is None else imprints.holds[step],
-                found=found,
+                compacted=compacted,
                 hardening=material.hardening,
             )
             newly = compression - state[0]
@@ -137,34 +137,35 @@ class Press:
         if not surface:
             state[1] += rise.reshape(state[1].shape)
         self.state.write(window, whole)
-        if stance.pressed is not None and found is not None:
-            stance.pressed.write(imprints.window, (state[0] - found)[None])
+        if contact.compression is not None and compacted is not None:
+            contact.compression.write(imprints.window, (state[0] - compacted)[None])
+        contact.add_loads(imprints, first, last)
         cell_area = self.cell_size**2
-        stance.compressed += float(heights.sum()) * cell_area
-        stance.raised += float(rise.sum()) * cell_area
-        stance.unplaced += float(displaced[~rim.any(axis=1)].sum()) * cell_area
-        if stance.recorder is None:
-            stance.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
+        contact.compressed += float(heights.sum()) * cell_area
+        contact.raised += float(rise.sum()) * cell_area
+        contact.unplaced += float(displaced[~rim.any(axis=1)].sum()) * cell_area
+        if contact.recorder is None:
+            contact.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
         touched = np.zeros(whole.shape[1:], bool)
         touched[inside] = imprints.contact[steps].any(axis=0)
-        stance.recorder.add(frame, window, quantised(whole) - before, touched)
+        contact.recorder.add(frame, window, quantised(whole) - before, touched)
         self.contact.append((window, touched))
         return [window] if surface else []
 
-    def _found(self, stance: Stance, window: Window, state: Array) -> Array:
-        """Compression of a window that a stance found when it began: all but its own (rows, columns) [m]."""
-        if stance.pressed is None and stance.earlier is not None:
-            stance.pressed = stance.earlier.pressed
-        if stance.pressed is None:
-            stance.pressed = SparseGrid(self.cell_size, channels=1)
-        return np.maximum(state[0] - stance.pressed.read(window)[0], 0.0)
+    def _compacted_before(self, contact: OpenContact, window: Window, state: Array) -> Array:
+        """Compression of a window that a contact met when it began: all but its own (rows, columns) [m]."""
+        if contact.compression is None and contact.earlier is not None:
+            contact.compression = contact.earlier.compression
+        if contact.compression is None:
+            contact.compression = SparseGrid(self.cell_size, channels=1)
+        return np.maximum(state[0] - contact.compression.read(window)[0], 0.0)
 
     def _around(self, window: Window) -> tuple[Window, Surface]:
         """A window with the ground around it that may slide with it."""
         compression, rim = self.state.read(window)
         reach = slide_reach(rim, compression, self.material.repose_angle, self.cell_size)
         wider = window.expanded(reach)
-        return wider, self.bed.surface(wider)
+        return wider, self.cells.surface(wider)
 
     def _slid(self, state: Array, surface: Surface, fixed: NDArray[np.bool_], sweeps: int) -> Array:
         """The rim of a window after what is too steep has slid down."""

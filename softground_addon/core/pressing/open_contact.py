@@ -1,0 +1,88 @@
+"""A contact that goes on: the imprints to come, and the sums and the record of what was pressed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import SparseGrid
+from ..record.footprints import Footprint, FootprintRecorder
+from .contact_layout import ContactLayout
+from .ground_cells import GroundCells, Imprints, Timing
+
+Array = NDArray[np.float64]
+
+
+class OpenContact:
+    """One contact as the solver presses it.
+
+    Parameters
+    ----------
+    layout : ContactLayout
+    earlier : OpenContact, optional
+        The contact that this one goes on from without leaving the ground, where a long track is cut into several.
+
+    Attributes
+    ----------
+    recorder : FootprintRecorder or None
+        None until something is pressed.
+    compression : SparseGrid or None
+        What it compressed itself [m], kept where the ground hardens.
+    compressed, raised, unplaced : float
+        Volumes that it compressed and raised, and that found no place to rise [m³].
+    """
+
+    def __init__(self, layout: ContactLayout, earlier: OpenContact | None = None) -> None:
+        self.layout, self.earlier = layout, earlier
+        self.recorder: FootprintRecorder | None = None
+        self.compression: SparseGrid | None = None
+        self.compressed = self.raised = self.unplaced = 0.0
+        self._load = self._area = self._sinkage = 0.0
+        self._moment = np.zeros(3)
+        self._imprints: Imprints | None = None
+
+    def imprints(self, start: int, end: int, cells: GroundCells, timing: Timing) -> Imprints:
+        """The imprints of steps that follow those pressed last, among others."""
+        imprints = self._imprints
+        if imprints is None or imprints.end < end:
+            if imprints is not None:
+                self._sinkage = imprints.reached
+            imprints = self._imprints = self.layout.lay_out(start, end, cells, timing, self._sinkage)
+        return imprints
+
+    def lay_out_anew(self, start: int) -> None:
+        """Forget the imprints from a step on, as they were laid out on other terms."""
+        if self._imprints is not None and self._imprints.first <= start < self._imprints.end:
+            self._sinkage = float(self._imprints.sinkage[start - self._imprints.first])
+        elif self._imprints is not None:
+            self._sinkage = self._imprints.reached
+        self._imprints = None
+
+    def add_loads(self, imprints: Imprints, first: int, last: int) -> None:
+        """Add the loads of some of the imprints, which were pressed."""
+        force = imprints.loads.force[first:last]
+        self._load += float(force.sum())
+        self._moment += force @ imprints.loads.middle[first:last]
+        self._area = max(self._area, float(imprints.loads.area[first:last].max(initial=0.0, where=force > 0)))
+
+    def footprint(self) -> Footprint:
+        """The record of what was pressed so far."""
+        if self.recorder is None:
+            raise ValueError("a contact that pressed nothing leaves no footprint")
+        layout = self.layout
+        frames, hardest = layout.steps.frames, int(layout.force.argmax())
+        return self.recorder.footprint(
+            character=layout.character,
+            sole=layout.sole.name,
+            start_frame=float(frames[0]),
+            end_frame=float(frames[-1]),
+            position=self._moment / self._load,
+            heading=layout.heading(hardest),
+            area_m2=self._area,
+            peak_force_n=float(layout.force[hardest]),
+            compressed_m3=self.compressed,
+            rim_m3=self.raised,
+            unplaced_rim_m3=self.unplaced,
+            load_frames=frames,
+            load_n=layout.force,
+        )
