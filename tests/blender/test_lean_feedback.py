@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from softground_addon.blender.response import response_job
+from softground_addon.core.loads import estimate
 from tests.blender import responders, shots
 
 
@@ -31,3 +32,29 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
     assert 2 <= len(leans) < response_job.LEAN_PASSES, "a few passes are enough"
     pressed_by = leans[-2].leans[0]
     assert np.abs(last - pressed_by).max() < response_job.NOTICEABLE_LEAN
+
+
+def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, monkeypatch):
+    shots.walker(scene)
+    bpy.ops.softground.add_character()
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.2, location=(1, 1, 0.2))
+    bpy.ops.softground.add_character()
+    scene.softground.tilt.strength = 1.0
+    scene.softground.material.youngs_modulus = 6e4
+    passes, found = [], []
+    leaning, free_loads = response_job.leaning, estimate.free_loads
+
+    def watched(loads, motions, *others):
+        passes.append((yield from leaning(loads, motions, *others)))
+        assert passes[-1].motions[1] is motions[1]
+        return passes[-1]
+
+    def counted(motion, *others, **options):
+        found.append(motion.name)
+        return free_loads(motion, *others, **options)
+
+    monkeypatch.setattr(response_job, "leaning", watched)
+    monkeypatch.setattr(estimate, "free_loads", counted)
+    responders.bake(scene)
+    assert len(passes) > 1
+    assert found == ["Sphere"]

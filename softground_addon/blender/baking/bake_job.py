@@ -270,7 +270,8 @@ def _press(
         leaning = yield from response_job.leaning(loads, standing, shot.terrain, footprints, asked)
         if not response_job.leans_anew(leaning, before):
             break
-        loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions))
+        known = list(zip(before.motions if before else standing, loads, strict=True))
+        loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions), known)
         footprints, forces = yield from _simulate(wanted, shot, loads)
     check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
     answers = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)

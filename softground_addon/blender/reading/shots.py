@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -114,16 +114,28 @@ def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation)
 
 
-def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]:
+def estimate_shot(
+    wanted: BakeSettings, shot: Shot, known: Iterable[tuple[CharacterMotion, CharacterLoads]] = ()
+) -> Job[list[CharacterLoads]]:
     """The loads of all characters of a shot, with the masses and force models that are wanted.
+
+    Parameters
+    ----------
+    wanted : BakeSettings
+    shot : Shot
+    known : iterable of (CharacterMotion, CharacterLoads)
+        The loads of motions that were looked at before: where one of them is met again they are taken over.
 
     Raises
     ------
     InputError
         If nobody touches the ground.
     """
-    loads = []
+    loads, known_by = [], {id(motion): found for motion, found in known}
     for motion, character in zip(shot.motions, wanted.characters, strict=True):
+        if id(motion) in known_by:
+            loads.append(known_by[id(motion)])
+            continue
         moved = replace(motion, mass=character.mass_kg)
         work = estimate_loads.slices(moved, shot.terrain, force_model=character.force_model, material=wanted.material)
         loads.append((yield from meanwhile(Progress("sample", 1.0), work)))

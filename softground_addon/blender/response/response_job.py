@@ -115,6 +115,10 @@ def leaning(
     moved, leans = [], []
     if options is not None and options.tilt is not None:
         for of_character, motion in zip(loads, motions, strict=True):
+            if motion.centre is not None:
+                moved.append(motion)
+                leans.append(np.zeros((len(motion.frames), 2)))
+                continue
             touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
             work = respond.slices(motion, touching, terrain, footprints, tilt=options.tilt, grounding=None)
             response = yield from meanwhile(Progress("simulate", 1.0), work)

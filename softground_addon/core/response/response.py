@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import FlatTerrain, Terrain
-from ..loads.contacts import detect_contacts
+from ..loads.contacts import Contacts, detect_contacts
 from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
@@ -254,11 +254,13 @@ def stood_on(motion: CharacterMotion, terrain: Terrain) -> Slices[CharacterMotio
     are those with the level that it was made for; its feet keep the heights above the terrain that they had above the
     level, and hips and legs follow.
     """
-    level = _level_of(motion)
-    yield
-    if level is None or not _fits_better(motion, level, terrain):
+    if not _is_uneven(motion, terrain):
         return motion
-    made_for = detect_contacts(motion, FlatTerrain(level))
+    made_for = _contacts_with_level(motion)
+    yield
+    if made_for is None or not _fits_better(motion, made_for, detect_contacts(motion, terrain)):
+        return motion
+    yield
     ground = GroundHistory(terrain)
     placements = {}
     for side, sole in leg_soles(motion).items():
@@ -287,31 +289,27 @@ _SHORTER = 0.8
 """A motion touches the ground it was made for at least for so much of the time that it touches any level."""
 
 
-def _level_of(motion: CharacterMotion) -> float | None:
-    """Height of the level that the soles stand on [m]; None where they stand at no one height."""
-    lowest = [sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles]
-    low = float(np.median([np.percentile(height, 10.0) for height in lowest]))
-    offset = detect_contacts(motion, FlatTerrain(low)).offset
-    return low + float(np.median(offset)) if np.isfinite(offset).all() else None
-
-
-def _fits_better(motion: CharacterMotion, level: float, terrain: Terrain) -> bool:
-    """Whether the motion was made for one level rather than for the terrain."""
+def _is_uneven(motion: CharacterMotion, terrain: Terrain) -> bool:
+    """Whether the ground under the paths of the soles is anything but level."""
     paths = np.concatenate([sole.landmark_positions().reshape(-1, 3) for sole in motion.soles])
     heights = terrain.heights(paths[:, 0], paths[:, 1])
     heights = heights[np.isfinite(heights)]
-    if not len(heights) or np.ptp(heights) < _LEVEL * motion.leg_length:
-        return False
-    at_level, _ = _standing(motion, FlatTerrain(level))
-    on_terrain, spread = _standing(motion, terrain)
-    return bool(on_terrain < _SHORTER * at_level or spread > _SAME_GROUND * motion.leg_length)
+    return bool(len(heights) and np.ptp(heights) >= _LEVEL * motion.leg_length)
 
 
-def _standing(motion: CharacterMotion, terrain: Terrain) -> tuple[int, float]:
-    """How many samples of soles touch a terrain, and how much their clearance varies [m]."""
-    contacts = detect_contacts(motion, terrain)
-    clearance = contacts.clearance[contacts.touching]
-    return len(clearance), float(np.std(clearance)) if len(clearance) else 0.0
+def _contacts_with_level(motion: CharacterMotion) -> Contacts | None:
+    """Contacts with the level that the soles stand on; None where they stand at no one height."""
+    lowest = [sole.landmark_positions()[..., 2].min(axis=1) for sole in motion.soles]
+    low = float(np.median([np.percentile(height, 10.0) for height in lowest]))
+    contacts = detect_contacts(motion, FlatTerrain(low))  # which takes out what each sole floats above it
+    return contacts if np.isfinite(contacts.offset).all() else None
+
+
+def _fits_better(motion: CharacterMotion, level: Contacts, terrain: Contacts) -> bool:
+    """Whether the motion was made for one level rather than for the terrain, by its contacts with both."""
+    standing = terrain.clearance[terrain.touching]
+    spread = float(np.std(standing)) if len(standing) else 0.0
+    return bool(len(standing) < _SHORTER * level.touching.sum() or spread > _SAME_GROUND * motion.leg_length)
 
 
 def at_scene_frames(touching: Mask, frames: Array, motion: CharacterMotion) -> Mask:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion
+from softground_addon.core.response import response
 from softground_addon.core.response.foot_placement import ANKLE_PITCH, place_sole, posed_points, slide_offset
 from softground_addon.core.response.grounding import Response, leg_of, leg_soles, responding, settle
 from softground_addon.core.response.response import GroundingOptions, TiltOptions, respond, stood_on
@@ -290,6 +292,25 @@ def test_a_walk_made_for_level_ground_is_put_on_a_hill_and_one_made_for_the_hill
     gap = clearance(standing, Ground(GROUNDS["hill"]), touching)
     assert np.percentile(np.abs(gap), 90) < 0.01
     assert stood_on(standing, Hill()) is standing
+
+
+def test_contacts_are_looked_for_once_with_each_ground_that_a_walk_may_be_made_for(monkeypatch):
+    motion, _ = walk()
+    grounds = []
+
+    def counted(of, terrain):
+        grounds.append(terrain)
+        return detect_contacts(of, terrain)
+
+    class Hill:
+        def heights(self, x, y):
+            return GROUNDS["hill"](x, y, 0.0)
+
+    monkeypatch.setattr(response, "detect_contacts", counted)
+    stood_on(motion, FlatTerrain(0.0))
+    assert not grounds, "level ground asks nothing"
+    stood_on(motion, Hill())
+    assert [type(ground) for ground in grounds] == [FlatTerrain, Hill]
 
 
 def test_a_leg_stands_on_the_snowshoe_that_it_wears_and_no_hand_is_a_foot():
