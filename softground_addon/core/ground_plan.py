@@ -103,17 +103,22 @@ class GroundPlan:
         return cells_of(np.unique(cells_at(self.footfalls, side)[:, None] + disc)), level
 
 
+def extent(motions: Sequence[CharacterMotion]) -> tuple[Array, Array]:
+    """Lowest and highest x, y around all paths of the soles, with a margin [m]."""
+    soles = [sole for motion in motions for sole in motion.soles]
+    paths = [sole.landmark_positions()[..., :2] for sole in soles]
+    margin = MARGIN * max(sole.sole.length for sole in soles)
+    lower = np.min([path.min(axis=(0, 1)) for path in paths], axis=0)
+    upper = np.max([path.max(axis=(0, 1)) for path in paths], axis=0)
+    return lower - margin, upper + margin
+
+
 @sliced
 def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
     """The plane under the lowest positions of the soles, with a margin around all of their paths.
 
     It is level, unless the soles stand on a slope.
     """
-    soles = [(motion, sole) for motion in motions for sole in motion.soles]
-    paths = [sole.landmark_positions() for _, sole in soles]
-    lower = np.min([path[..., :2].min(axis=(0, 1)) for path in paths], axis=0)
-    upper = np.max([path[..., :2].max(axis=(0, 1)) for path in paths], axis=0)
-    lengths = [sole.sole.length for _, sole in soles]
     slope = _slope([motion for motion in motions if motion.centre is None])
     low = float(np.median([_standing_height(motion, sole, slope) for motion in motions for sole in _feet(motion)]))
     contacts = []
@@ -127,7 +132,7 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
         if motion.centre is None and any(sole is foot for foot in _feet(motion))
     ]
     height = low + (float(np.median(floats)) if floats else 0.0)
-    raster = min(lengths) / POINTS_ALONG_SOLE
+    raster = min(sole.sole.length for motion in motions for sole in motion.soles) / POINTS_ALONG_SOLE
     footfalls = []
     for motion, found in zip(motions, contacts, strict=True):
         for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True):
@@ -138,10 +143,8 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
                 footfalls.append(_places_under(sole, touching, _terrain(low + offset, slope), raster))
     yield
     missed = [(motion.name, missed_steps(motion, found)) for motion, found in zip(motions, contacts, strict=True)]
-    margin = MARGIN * max(lengths)
     return GroundPlan(
-        lower - margin,
-        upper + margin,
+        *extent(motions),
         _terrain(height, slope),
         np.concatenate(footfalls),
         raster,

@@ -2,10 +2,14 @@
 
 import bpy
 import numpy as np
+import pytest
 
 from softground_addon.blender.response import response_job
+from softground_addon.core import ground_plan
 from softground_addon.core.loads import estimate
+from softground_addon.core.loads.contacts import detect_contacts
 from tests.blender import responders, shots
+from tests.blender.grounds import plane
 
 
 def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monkeypatch):
@@ -32,6 +36,26 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
     assert 2 <= len(leans) < response_job.LEAN_PASSES, "a few passes are enough"
     pressed_by = leans[-2].leans[0]
     assert np.abs(last - pressed_by).max() < response_job.NOTICEABLE_LEAN
+
+
+@pytest.mark.parametrize(("given", "times"), [(True, 1), (False, 2)])
+def test_contacts_are_looked_for_once_with_a_ground_that_is_there(scene, monkeypatch, given, times):
+    """A ground that is made is laid out by the contacts with the plane that it is made of."""
+    shots.walker(scene, frames=24)
+    bpy.ops.softground.add_character()
+    scene.softground.frame_end = 24
+    scene.softground.ground = plane(scene) if given else None
+    bpy.context.view_layer.update()
+    found = []
+
+    def counted(motion, terrain):
+        found.append(motion.name)
+        return detect_contacts(motion, terrain)
+
+    monkeypatch.setattr(estimate, "detect_contacts", counted)
+    monkeypatch.setattr(ground_plan, "detect_contacts", counted)
+    bpy.ops.softground.bake()
+    assert len(found) == times
 
 
 def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, monkeypatch):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.files import report
+from ...core.ground_plan import GroundPlan
 from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
@@ -188,7 +189,8 @@ def _write(
         del pressed
         warnings: list[str] = []
         if shot.surface is None:
-            place = yield from _created(drafts, scene, wanted, shot, trail)
+            assert shot.plan is not None
+            place = yield from _created(drafts, scene, wanted, shot.plan, trail)
             about["inputs"]["ground"] = place.carrier.name
         else:
             place, warnings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
@@ -201,12 +203,12 @@ def _write(
 
 
 def _created(
-    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, trail: Trail
+    drafts: ExitStack, scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan, trail: Trail
 ) -> Job[baked_ground.Place]:
     """A draft of a ground that fits the walk, as the place for a bake."""
     reach = created_ground.reach_of(wanted.material)
     yield Progress("write", 0.2)
-    layout = created_ground.lay_out(shot.plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
+    layout = created_ground.lay_out(plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.ground.heightfield import Window
+from ...core.ground_plan import plan_ground
 from ...core.meshing.refinement import refine
 from ...core.numerics.cell_keys import cells_at, keys_at
 from ...core.playhead import Playhead
@@ -59,6 +60,7 @@ class LiveMode:
         wanted = settings_of(scene)
         known = analysis.read(scene)
         if wanted.ground is None:
+            assert known.shot.plan is not None
             with analysis.own_changes(scene):
                 ground = create_ground(scene, wanted, known.shot.plan)
             wanted = replace(wanted, ground=settings.name_of(ground))
@@ -169,8 +171,9 @@ def _carrier(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
     ground, shot = settings.found(wanted.ground), known.shot
     unit_scale, cell_size, detail = wanted.unit_scale_m, wanted.cell_size_m, wanted.detail
     vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
-    if shot.plan.footfalls is not None:
-        footfalls = cells_at(shot.plan.footfalls, cell_size)
+    plan = shot.plan or plan_ground(shot.motions)
+    if plan.footfalls is not None:
+        footfalls = cells_at(plan.footfalls, cell_size)
         cover = coverage(vertices, slice(None), footfalls, cell_size)
         under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
         if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(

@@ -82,7 +82,7 @@ class LiveGround:
     def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
         self._uid = ground.session_uid
         x, y, z = vertices.T
-        near = ((vertices[:, :2] >= shot.plan.lower) & (vertices[:, :2] <= shot.plan.upper)).all(axis=1)
+        near = ((vertices[:, :2] >= shot.lower) & (vertices[:, :2] <= shot.upper)).all(axis=1)
         near = np.flatnonzero(near)
         on_top = np.abs(z[near] - shot.terrain.heights(x[near], y[near])) < ground_mesh.ON_SURFACE
         self._vertices = near[on_top]

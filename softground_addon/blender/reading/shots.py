@@ -14,7 +14,7 @@ from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
-from ...core.ground_plan import GroundPlan, plan_ground
+from ...core.ground_plan import GroundPlan, extent, plan_ground
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
@@ -37,8 +37,10 @@ class Shot:
     ----------
     motions : tuple of CharacterMotion
         At scene frames.
-    plan : GroundPlan
-        Where the walk goes, and the ground that fits it.
+    lower, upper : (2,) float arrays
+        Around all paths of the soles [m].
+    plan : GroundPlan or None
+        The ground that fits the walk, where the scene has none.
     surface : GroundSurface or None
         The scene's ground, if it has one.
     terrain : Terrain
@@ -46,7 +48,9 @@ class Shot:
     """
 
     motions: tuple[CharacterMotion, ...]
-    plan: GroundPlan
+    lower: Array
+    upper: Array
+    plan: GroundPlan | None
     surface: GroundSurface | None
     terrain: Terrain
 
@@ -97,16 +101,17 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
         If a character or the ground cannot be used; names it and the remedy.
     """
     motions = yield from sample_characters(scene, wanted)
-    plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
+    lower, upper = extent(motions)
     if wanted.ground is None:
-        return Shot(tuple(motions), plan, None, plan.terrain)
+        plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
+        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
     surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
     yield Progress("sample", 1.0)
-    work = ground_mesh.terrain_of.slices(surface, np.stack([plan.lower, plan.upper]))
+    work = ground_mesh.terrain_of.slices(surface, np.stack([lower, upper]))
     terrain = yield from meanwhile(Progress("sample", 1.0), work)
-    return Shot(tuple(motions), plan, surface, terrain)
+    return Shot(tuple(motions), lower, upper, None, surface, terrain)
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
