@@ -16,7 +16,7 @@ from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, ground_mesh, playback, trail_detail
 from softground_addon.blender.output import exports
-from tests.blender import shots
+from tests.blender import point_caches, shots
 
 pytestmark = pytest.mark.benchmark
 
@@ -190,7 +190,7 @@ def test_a_uniform_grid_plays_near_the_bare_frame_and_faster_than_dynamic_paint(
     if count == 512:
         alone(baked)
         exports.export_point_cache(scene, baked, tmp_path / "ground.pc2", 1, FRAMES)
-        exports.use_point_cache(baked, tmp_path / "ground.pc2", 1)
+        point_caches.play(baked, tmp_path / "ground.pc2", 1)
         rows["Mesh Cache (PC2)"] = cost(scene, baked)
     bare_frame = rows["bare"].frame
     table(f"uniform grid of {count}²", rows, bare_frame)

@@ -5,15 +5,14 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import jobs
-from softground_addon.blender.baking import bake_job, bake_report
+from softground_addon.blender.baking import bake_job
 from softground_addon.blender.compat import action_curves
-from softground_addon.blender.ground import baked_ground, ground_mesh, playback
+from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.output import exports, image_exports
 from softground_addon.core.errors import InputError
-from softground_addon.core.files import point_cache
 from softground_addon.core.playback.ramps import TOLERANCE
 from softground_addon.core.record.pressed_ground import PressedGround
-from tests.blender import shots
+from tests.blender import point_caches, shots
 from tests.blender.grounds import plane
 
 FRAMES = (10, 40)
@@ -69,7 +68,7 @@ def assert_stands_as_recorded(ground, frame, world, tolerance=TOLERANCE):
 def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
     exports.export_point_cache(scene, ground, path, *FRAMES)
-    start, samples = point_cache.read(path)
+    start, samples = point_caches.read(path)
     assert (start, len(samples)) == (FRAMES[0], FRAMES[1] - FRAMES[0] + 1)
     for frame in (10, 25, 40):
         assert_stands_as_recorded(ground, frame, samples[frame - FRAMES[0]])
@@ -87,7 +86,7 @@ def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapp
     exports.export_point_cache(scene, ground, tmp_path / "ground.pc2", *frames)
     for cached in (False, True):
         if cached:
-            exports.use_point_cache(ground, tmp_path / "ground.pc2", frames[0], remapped[0] / remapped[1])
+            point_caches.play(ground, tmp_path / "ground.pc2", frames[0], remapped[0] / remapped[1])
         for frame in np.linspace(*frames, 6).round().astype(int).tolist()[1:]:
             world = played(ground, frame)
             sample = recorded(ground, frame, *world[:, :2].T.astype(float))
@@ -100,30 +99,9 @@ def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, groun
     exports.export_point_cache(scene, ground, path, *FRAMES)
     carrier = baked_ground.carrier_of(ground)
     native = {frame: played(carrier, frame) for frame in (25, 40)}
-    exports.use_point_cache(ground, path, FRAMES[0])
-    assert not playback.modifier_of(carrier).show_viewport
+    point_caches.play(ground, path, FRAMES[0])
     for frame in (25, 40):
         np.testing.assert_allclose(played(carrier, frame), native[frame], atol=2e-6)
-
-
-def test_a_cache_that_plays_on_the_ground_leaves_the_bake_up_to_date_and_goes_with_it(scene, tmp_path):
-    shots.walker(scene, frames=30)
-    bpy.ops.softground.add_character()
-    scene.softground.cell_size = 0.02
-    field = scene.softground.ground = plane(scene, vertices=150, size=5.0)
-    bpy.context.view_layer.update()
-    flat = played(field, 30)
-    bpy.ops.softground.bake()
-    deep = played(field, 30)[:, 2].min()
-    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2", use_cache=True)
-    assert bake_report.stale_reasons(scene) == ()
-    scene.softground.material.youngs_modulus *= 3
-    assert not jobs.run(bake_job.bake(scene)).report["warnings"]
-    assert deep < 2 * played(field, 30)[:, 2].min() < -0.01, "the new bake, and not the cache of the old one"
-    bpy.ops.softground.export(filepath=str(tmp_path / "field.pc2"), format="PC2", use_cache=True)
-    bpy.ops.softground.clear_bake()
-    assert not field.modifiers
-    assert np.array_equal(played(field, 30), flat)
 
 
 def import_and_select(operator, path, **options):
@@ -349,14 +327,3 @@ def test_a_shorter_bake_leaves_nothing_of_the_longer_record(scene, ground):
     shorter, _ = baked_ground.load(ground)
     assert 0 < len(shorter) < len(longer)
     assert max(print_.end_frame for print_ in shorter) <= 30
-
-
-def test_a_point_cache_that_is_cut_short_is_refused(tmp_path):
-    path = tmp_path / "cut.pc2"
-    point_cache.write(path, [np.zeros((4, 3))] * 3, start_frame=1, points=4, count=3)
-    path.write_bytes(path.read_bytes()[:-5])
-    with pytest.raises(InputError, match="cut short"):
-        point_cache.read(path)
-    (tmp_path / "no.pc2").write_bytes(b"nothing")
-    with pytest.raises(InputError, match="no PC2"):
-        point_cache.read(tmp_path / "no.pc2")

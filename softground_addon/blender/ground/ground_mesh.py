@@ -43,9 +43,6 @@ WARNINGS = "softground_warnings"
 PROPERTIES = (RECORD, SUMMARY, WARNINGS, "softground_fingerprints")
 """Properties of a mesh that carries a bake."""
 
-CACHE = "SoftGround Cache"
-"""Modifier that plays an exported cache of a bake in place of the native playback."""
-
 _BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
 """Ways in which an object hangs on a part of its parent, which may lie elsewhere than the parent."""
 
@@ -111,15 +108,10 @@ def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
     return cast("bpy.types.Mesh", ground.data)
 
 
-def own_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """What plays a bake on the ground: the native playback, and a cache in its place."""
-    return [item for item in (playback.modifier_of(ground), ground.modifiers.get(CACHE)) if item]
-
-
 def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """All other modifiers of the ground."""
-    own = own_modifiers(ground)
-    return [item for item in ground.modifiers if item not in own]
+    """The modifiers of the ground that play no bake."""
+    own = playback.modifier_of(ground)
+    return [item for item in ground.modifiers if item != own]
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
@@ -234,7 +226,7 @@ def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> It
             copy.modifiers.clear()
         else:
             copy.data = mesh
-            for own in own_modifiers(copy):
+            if own := playback.modifier_of(copy):
                 copy.modifiers.remove(own)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
@@ -294,7 +286,6 @@ def write(
     shape_keys : bool
         Blender evaluates shape keys on the whole mesh at each frame that is played, which a dense ground feels.
     """
-    _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
     kept = _attribute(mesh, REST, "FLOAT_VECTOR")
@@ -359,7 +350,6 @@ def restore(ground: bpy.types.Object) -> None:
     """
     if not has_remains(ground):
         return
-    _take_off_cache(ground)
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
     playback.remove(ground)
@@ -370,12 +360,6 @@ def restore(ground: bpy.types.Object) -> None:
     for key in PROPERTIES:
         mesh.pop(key, None)
     write_positions(mesh, rest)
-
-
-def _take_off_cache(ground: bpy.types.Object) -> None:
-    """Let no cache of an earlier bake play on the ground any more."""
-    if cache := ground.modifiers.get(CACHE):
-        ground.modifiers.remove(cache)
 
 
 def discard(ground: bpy.types.Object) -> None:

@@ -13,7 +13,6 @@ from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
 from ..response import response_job
-from ..translation import iface_
 
 
 def draw(layout: Any, options: Any, summary: Any) -> None:
@@ -44,7 +43,7 @@ def _result(layout: Any, summary: Any) -> None:
 def _warnings(layout: Any, warnings: Sequence[str]) -> None:
     """How many things a bake has warned of; they are long, and shown when asked for."""
     if warnings:
-        text = iface_("{count} Warnings" if len(warnings) > 1 else "1 Warning").format(count=len(warnings))
+        text = f"{len(warnings)} Warnings" if len(warnings) > 1 else "1 Warning"
         layout.operator("softground.show_warnings", text=text, icon="ERROR", translate=False)
 
 
@@ -54,7 +53,7 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
         return
     box = layout.box().column(align=True)
-    box.label(text=iface_("Feet float up to {gap} mm").format(gap=f"{floating:.0f}"), icon="INFO", translate=False)
+    box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)
     box.label(text="above their prints", icon="BLANK1")
     box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
 

@@ -13,7 +13,6 @@ from ..baking import bake_job, sink_feet
 from ..characters.character_setup import characters_of
 from ..operator_base import reports_errors
 from ..reading import analysis
-from ..translation import iface_, rpt_
 from .panel_base import CATEGORY
 
 TICK = 0.02
@@ -91,7 +90,7 @@ class _Bake(bpy.types.Operator):
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
         manager.progress_begin(0.0, 1.0)
-        self._show_status(0.0, iface_(STAGE_NAMES["sample"]))
+        self._show_status(0.0, STAGE_NAMES["sample"])
         manager.modal_handler_add(self)
         _running.append(self)
         for window in manager.windows:
@@ -105,7 +104,7 @@ class _Bake(bpy.types.Operator):
             return {"CANCELLED"}  # ended by `stop`
         if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
             self._end()
-            self.report({"INFO"}, rpt_("Bake cancelled: nothing was changed"))
+            self.report({"INFO"}, "Bake cancelled: nothing was changed")
             return {"CANCELLED"}
         if event.type == "TIMER":
             try:
@@ -125,7 +124,7 @@ class _Bake(bpy.types.Operator):
             self._started += waited
             if now > self._show_at:
                 self._show_at = now + SHOWN_FOR
-                self._show_status(session.current().progress, iface_("Waiting for the render"))
+                self._show_status(session.current().progress, "Waiting for the render")
             return {"PASS_THROUGH"}
         self._gave_way = waited > LONG_DRAWING and not self._gave_way
         if self._gave_way:  # to the events that have come while Blender drew: they wait for its drawing or a tick
@@ -177,12 +176,10 @@ class _Bake(bpy.types.Operator):
         passed = time.perf_counter() - self._started
         left = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
-        status = iface_("{stage}: {seconds} s left")
-        self._show_status(done, status.format(stage=iface_(STAGE_NAMES[progress.stage]), seconds=max(1, round(left))))
+        self._show_status(done, f"{STAGE_NAMES[progress.stage]}: {max(1, round(left))} s left")
 
     def _show_status(self, progress: float, status: str) -> None:
-        label, way_out = iface_("Bake Footprints"), iface_("Cancel")
-        self._write_status_bar(f"{label} {progress:.0%}  |  {status}  |  [Esc] {way_out}")
+        self._write_status_bar(f"Bake Footprints {progress:.0%}  |  {status}  |  [Esc] Cancel")
         session.show_bake(progress, status)
 
     def _write_status_bar(self, text: str | None) -> None:
@@ -218,13 +215,11 @@ class SOFTGROUND_OT_bake(_Bake):
 
     def _show(self, result: bake_job.BakeResult) -> None:
         totals: Any = result.report["totals"]
-        text = rpt_("{steps} steps, deepest print {depth:.1f} cm").format(
-            steps=totals["steps"], depth=totals["max_depth_m"] * 100
-        )
+        text = f"{totals['steps']} steps, deepest print {totals['max_depth_m'] * 100:.1f} cm"
         steps: Any = result.report["steps"]
         now = settings.scene_of(bpy.context).frame_current
         if steps and all(now < step["frame_start"] for step in steps):  # the ground looks as it did before
-            text += rpt_(". Press Play to see them")
+            text += ". Press Play to see them"
         self.report({"INFO"}, text)
         warnings: Any = result.report["warnings"]
         for warning in warnings:  # the status bar shows the last that is told
@@ -243,9 +238,8 @@ class SOFTGROUND_OT_sink_feet(_Bake):
 
     def _show(self, result: bake_job.BakeResult) -> None:
         gaps: Any = result.report["gaps_mm"]
-        left = rpt_("Feet stand on their prints; the largest gap left is {gap:.1f} mm")
         largest = max(gap["max"] for of_one in gaps["after"].values() for gap in of_one.values())
-        self.report({"INFO"}, left.format(gap=largest))
+        self.report({"INFO"}, f"Feet stand on their prints; the largest gap left is {largest:.1f} mm")
 
 
 class SOFTGROUND_OT_hold_window(bpy.types.Operator):

@@ -19,7 +19,6 @@ from ..ground.created_ground import create_ground
 from ..operator_base import reports_errors
 from ..reading import analysis, shots
 from ..response import response_job
-from ..translation import rpt_
 
 
 class SOFTGROUND_OT_add_character(bpy.types.Operator):
@@ -145,7 +144,7 @@ class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = bake_command(settings.scene_of(context))
-        self.report({"INFO"}, rpt_("Copied the command that bakes this shot"))
+        self.report({"INFO"}, "Copied the command that bakes this shot")
         return {"FINISHED"}
 
 

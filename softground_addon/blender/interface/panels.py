@@ -11,7 +11,6 @@ from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
-from ..translation import iface_
 from . import bake_result, prediction
 from .character_editing import active_character, active_sole
 from .panel_base import SidebarPanel
@@ -160,8 +159,7 @@ _END_WIDTH = 3.1
 def _joint_label(joint: str) -> str:
     """`ankle_l` as people write it."""
     name, _, side = joint.partition("_")
-    label = iface_(name.capitalize())
-    return f"{label} {side.upper()}" if side else label
+    return f"{name.capitalize()} {side.upper()}".rstrip()
 
 
 class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
@@ -198,7 +196,7 @@ class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         material = scene.softground.material
         row = layout.row(align=True)
-        row.menu("SOFTGROUND_MT_presets", text=material.preset or iface_("Presets"), translate=False)
+        row.menu("SOFTGROUND_MT_presets", text=material.preset or "Presets", translate=False)
         row.operator("softground.save_preset", text="", icon="ADD")
         row.operator("softground.remove_preset", text="", icon="REMOVE")
         column = layout.column()
@@ -319,8 +317,8 @@ def _changing_ground(layout: Any, options: Any) -> None:
     modifier = still_ground.changes_with_time(options.ground)
     if modifier:
         box = layout.box().column(align=True)
-        box.label(text=iface_("'{modifier}' changes its shape").format(modifier=modifier), icon="INFO", translate=False)
-        taken = iface_("Taken as it is at frame {frame}").format(frame=options.frame_start)
+        box.label(text=f"'{modifier}' changes its shape", icon="INFO", translate=False)
+        taken = f"Taken as it is at frame {options.frame_start}"
         box.label(text=taken, icon="BLANK1", translate=False)
 
 
@@ -334,8 +332,7 @@ def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:
 def _estimate(area: float, cell_size: float) -> str:
     """Cells that soles cover an area [m²] with, and the memory that a bake takes for them."""
     cells = area / cell_size**2
-    text = iface_("About {cells} cells printed, {megabytes} MB")
-    return text.format(cells=f"{rounded(cells):,.0f}", megabytes=f"{rounded(cells * BYTES_PER_CELL / 1e6):,.0f}")
+    return f"About {rounded(cells):,.0f} cells printed, {rounded(cells * BYTES_PER_CELL / 1e6):,.0f} MB"
 
 
 def rounded(value: float) -> float:

@@ -16,7 +16,6 @@ from ..characters.character_setup import characters_of, title_of
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..settings import user_folder
-from ..translation import iface_, rpt_
 
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
@@ -69,8 +68,7 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         depth = analysis.expected_depth(settings.scene_of(context), preset.material)
         if depth is not None:
             who = ", ".join(title_of(c) for c in characters_of(settings.scene_of(context)))
-            text = iface_("Deepest print to expect for {who}: {depth:.1f} cm")
-            lines.append(text.format(who=who, depth=depth * 100))
+            lines.append(f"Deepest print to expect for {who}: {depth * 100:.1f} cm")
         return "\n".join(lines)
 
     @reports_errors
@@ -110,7 +108,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_text(path, presets.dump(preset))
         scene.softground.material.preset = name
-        self.report({"INFO"}, rpt_("Saved preset '{name}'").format(name=name))
+        self.report({"INFO"}, f"Saved preset '{name}'")
         return {"FINISHED"}
 
 
@@ -149,7 +147,7 @@ class SOFTGROUND_OT_predict_depth(OnShot, bpy.types.Operator):
         analysis.forget()
         analysis.read(settings.scene_of(context))
         depth = analysis.expected_depth(settings.scene_of(context)) or 0.0
-        self.report({"INFO"}, rpt_("Deepest print to expect: {depth:.1f} cm").format(depth=depth * 100))
+        self.report({"INFO"}, f"Deepest print to expect: {depth * 100:.1f} cm")
         return {"FINISHED"}
 
 

@@ -12,7 +12,6 @@ from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, bod
 from .. import settings
 from ..animation_layer import nla_layer
 from ..response import response_job
-from ..translation import iface_
 from .character_editing import active_character
 from .panel_base import SidebarPanel
 
@@ -139,12 +138,11 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row.label(text=notes.get(response_job.CARRIER, ""), translate=False)
     speed = f"{float(notes.get(response_job.SPEED, '1')):.0%}"
     row = box.split(factor=0.72)
-    row.label(text=iface_("Suggested Speed {speed}").format(speed=speed), icon="TIME", translate=False)
+    row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
     for gap in json.loads(notes.get(response_job.WORST, "[]"))[:_SHOWN]:
         if abs(gap["gap_mm"]) >= response_job.NOTICEABLE_GAP_MM:
-            text = iface_("Frame {frame}: {gap} mm under {sole}")
-            shown = text.format(frame=f"{gap['frame']:g}", gap=f"{gap['gap_mm']:.1f}", sole=gap["contact"])
+            shown = f"Frame {gap['frame']:g}: {gap['gap_mm']:.1f} mm under {gap['contact']}"
             box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = gap["frame"]
 
 

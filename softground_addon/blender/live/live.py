@@ -35,7 +35,6 @@ from ..ground.modified_prints import are_undone
 from ..operator_base import reports_errors
 from ..reading import analysis, staleness
 from ..reading.shots import ground_of, settings_of
-from ..translation import rpt_
 from .live_ground import LiveGround
 
 Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
@@ -283,10 +282,10 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """What the button does at the moment."""
         if not is_on():
-            return rpt_("Press prints while the timeline plays; sliders act at once on what follows")
+            return "Press prints while the timeline plays; sliders act at once on what follows"
         if properties.keep:
-            return rpt_("End live mode and leave the prints on the ground, as a bake up to the frame that is shown")
-        return rpt_("End live mode and leave the ground as it was before")
+            return "End live mode and leave the prints on the ground, as a bake up to the frame that is shown"
+        return "End live mode and leave the ground as it was before"
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -15,7 +15,6 @@ from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
 from ..operator_base import OnBake, beside_file, reports_errors
-from ..translation import rpt_
 from . import exports, image_exports
 
 LARGEST_IMAGE = 16384
@@ -172,10 +171,6 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         subtype="PIXEL",
     )  # fmt: skip
     uv_map: StringProperty(name="UV Map", description="UV map of the images; the one that is rendered if empty")
-    use_cache: BoolProperty(
-        name="Play It Here",
-        description="Let a Mesh Cache modifier play the file on the ground, in place of the native playback",
-    )
     outdated: BoolProperty(
         name="Even If Outdated", description="Export the bake also where it no longer fits what it was made from"
     )
@@ -212,8 +207,6 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
             column.active = False
             for kind in (image_exports.DISPLACEMENT, image_exports.MASK):
                 column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
-        if self.format == "PC2":
-            layout.prop(self, "use_cache")
         layout.prop(self, "outdated")
 
     @reports_errors
@@ -227,13 +220,8 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         written = export(
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
         )
-        if self.format == "PC2" and self.use_cache:
-            exports.use_point_cache(options.ground, path, start, settings.time_stretch_of(scene))
-        if len(written) == 1:
-            self.report({"INFO"}, rpt_("Wrote {path}").format(path=written[0]))
-        else:
-            text = rpt_("Wrote {count} images to {folder}")
-            self.report({"INFO"}, text.format(count=len(written), folder=path.parent))
+        what = str(written[0]) if len(written) == 1 else f"{len(written)} images to {path.parent}"
+        self.report({"INFO"}, f"Wrote {what}")
         return {"FINISHED"}
 
 
@@ -248,7 +236,7 @@ class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
         still = exports.final_mesh(scene, scene.softground.ground)
-        self.report({"INFO"}, rpt_("Added '{name}'").format(name=still.name))
+        self.report({"INFO"}, f"Added '{still.name}'")
         return {"FINISHED"}
 
 

@@ -46,34 +46,6 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     point_cache.write(path, samples(), start_frame=start, points=len(rest), count=end - start + 1)
 
 
-def use_point_cache(ground: bpy.types.Object, path: Path, start: int, time_stretch: float = 1.0) -> bpy.types.Modifier:
-    """Let the ground that carries the bake play a PC2 cache in place of its native playback.
-
-    The cache counts the scene's frames, its modifier the animation's; see `settings.time_stretch_of`.
-    """
-    carrier = baked_ground.carrier_of(ground)
-    modifier: Any = carrier.modifiers.get(ground_mesh.CACHE) or carrier.modifiers.new(ground_mesh.CACHE, "MESH_CACHE")
-    modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", _from_here(path), start
-    modifier.frame_scale = 1 / time_stretch
-    modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"
-    modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"
-    carrier.modifiers.move(list(carrier.modifiers).index(modifier), 0)
-    played = playback.modifier_of(carrier)
-    if played:
-        played.show_viewport = played.show_render = False
-    return modifier
-
-
-def _from_here(path: Path) -> str:
-    """A path as Blender keeps it: relative to the open file where that can be, so that both can be moved together."""
-    if not bpy.data.filepath:
-        return str(path)
-    try:
-        return bpy.path.relpath(str(path))
-    except ValueError:  # another drive of Windows
-        return str(path)
-
-
 def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
     """Write the ground that carries the bake as Alembic, with Blender's exporter.
 

@@ -18,7 +18,6 @@ from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
-from ..translation import rpt_
 
 Array = NDArray[np.float64]
 
@@ -149,7 +148,7 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         empties = write_curves(settings.scene_of(context), *_baked(context))
         names = ", ".join(f"'{empty.name}'" for empty in empties)
-        self.report({"INFO"}, rpt_("The forces are on {names}").format(names=names))
+        self.report({"INFO"}, f"The forces are on {names}")
         return {"FINISHED"}
 
 
@@ -174,7 +173,7 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         footprints, frames = _baked(context)
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
         files.write_text(path, table(footprints, frames, settings.frame_rate_of(settings.scene_of(context))))
-        self.report({"INFO"}, rpt_("Wrote {path}").format(path=path))
+        self.report({"INFO"}, f"Wrote {path}")
         return {"FINISHED"}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.props import FloatProperty
 
 
 def is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
@@ -12,8 +13,12 @@ def is_mesh(_group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> boo
     return candidate.type == "MESH"
 
 
-def in_unit(field: str, unit: float) -> dict[str, Any]:
-    """What shows a field in another unit, given in the field's own: the same number, kept once."""
+def in_unit(field: str, unit: float, name: str, description: str, **limits: Any) -> Any:
+    """A property that shows a field in another unit, given in the field's own: the same number, kept once.
+
+    Blender's own units would not do: they multiply what is shown by the scene's unit scale, and lengths here are metres
+    whatever that is.
+    """
 
     def shown(group: Any) -> float:
         return float(getattr(group, field)) / unit
@@ -21,4 +26,4 @@ def in_unit(field: str, unit: float) -> dict[str, Any]:
     def set_to(group: Any, value: float) -> None:
         setattr(group, field, value * unit)
 
-    return {"get": shown, "set": set_to, "options": {"SKIP_SAVE"}}
+    return FloatProperty(name=name, description=description, get=shown, set=set_to, options={"SKIP_SAVE"}, **limits)

@@ -17,6 +17,20 @@ def _limits(field: str) -> dict[str, float]:
     return {"min": low, "max": high}
 
 
+_STIFFNESS = (
+    "Stiffness of the loose layer: prints are half as deep at twice the value. An effective modulus for compaction, "
+    "far below the elastic one from textbooks"
+)
+_LAYER = "Thickness of the loose layer. No print is deeper"
+_RIM_REACH = "How far around the foot the displaced ground rises"
+_SMOOTHING = "Width of the blur that the shown ground gets. Forces and depths do not see it"
+_CRUST = (
+    "Pressure at which the crust on untouched ground breaks; what presses less leaves no print. A person stands with "
+    "about 20 kPa, walks with 40. 0 is no crust"
+)
+_FIRM_BELOW = "Depth of compression below which the ground is ten times stiffer. 0 is loose all through"
+
+
 class SoftGroundMaterial(bpy.types.PropertyGroup):
     """The ground's physics; see `core.ground.material.GroundMaterial`."""
 
@@ -29,10 +43,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     youngs_modulus: FloatProperty(
         name="Young's Modulus (Pa)",
-        description=(
-            "Stiffness of the loose layer, in pascals: prints are half as deep at twice the value. An effective "
-            "modulus for compaction, far below the elastic one from textbooks"
-        ),
+        description=_STIFFNESS,
         default=375e3,
         precision=0,
         step=1000000,
@@ -55,7 +66,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     layer_depth: FloatProperty(
         name="Layer Depth (m)",
-        description="Thickness of the loose layer, in meters. No print is deeper",
+        description=_LAYER,
         default=0.3,
         precision=3,
         soft_max=2.0,
@@ -63,7 +74,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     rim_reach: FloatProperty(
         name="Rim Reach (m)",
-        description="How far around the foot the displaced ground rises, in meters",
+        description=_RIM_REACH,
         default=0.04,
         precision=3,
         soft_max=0.5,
@@ -71,7 +82,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     blur_sigma: FloatProperty(
         name="Smoothing (m)",
-        description="Width of the blur that the shown ground gets, in meters. Forces and depths do not see it",
+        description=_SMOOTHING,
         default=0.005,
         precision=4,
         soft_max=0.05,
@@ -113,8 +124,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     crust_stress: FloatProperty(
         name="Crust (Pa)",
-        description="Pressure at which the crust on untouched ground breaks, in pascals; what presses less leaves no "
-        "print. A person stands with about 20 kPa, walks with 40. 0 is no crust",
+        description=_CRUST,
         default=0.0,
         precision=0,
         soft_max=100e3,
@@ -123,69 +133,21 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     firm_depth: FloatProperty(
         name="Firm Below (m)",
-        description="Depth of compression below which the ground is ten times stiffer, in meters. 0 is loose all "
-        "through",
+        description=_FIRM_BELOW,
         default=0.0,
         precision=3,
         soft_max=0.3,
         **_limits("firm_depth"),
     )
 
-    stiffness_mpa: FloatProperty(
-        name="Stiffness (MPa)",
-        description=(
-            "Young's modulus of the loose layer, in megapascals: prints are half as deep at twice the value. An "
-            "effective modulus for compaction, far below the elastic one from textbooks"
-        ),
-        min=1e-3,
-        soft_min=0.02,
-        soft_max=5.0,
-        precision=3,
-        step=1,
-        **in_unit("youngs_modulus", 1e6),
+    stiffness_mpa: in_unit(
+        "youngs_modulus", 1e6, "Stiffness (MPa)", _STIFFNESS, min=1e-3, soft_min=0.02, soft_max=5.0, precision=3, step=1
     )
-    layer_depth_cm: FloatProperty(
-        name="Layer (cm)",
-        description="Thickness of the loose layer, in centimeters. No print is deeper",
-        min=0.1,
-        soft_max=100.0,
-        precision=1,
-        **in_unit("layer_depth", 0.01),
-    )
-    rim_reach_cm: FloatProperty(
-        name="Rim Reach (cm)",
-        description="How far around the foot the displaced ground rises, in centimeters",
-        min=0.0,
-        soft_max=20.0,
-        precision=1,
-        **in_unit("rim_reach", 0.01),
-    )
-    blur_sigma_cm: FloatProperty(
-        name="Smoothing (cm)",
-        description="Width of the blur that the shown ground gets, in centimeters. Forces and depths do not see it",
-        min=0.0,
-        soft_max=5.0,
-        precision=2,
-        **in_unit("blur_sigma", 0.01),
-    )
-    crust_stress_kpa: FloatProperty(
-        name="Crust (kPa)",
-        description="Pressure at which the crust on untouched ground breaks, in kilopascals; what presses less leaves "
-        "no print. A person stands with about 20 kPa, walks with 40. 0 is no crust",
-        min=0.0,
-        soft_max=100.0,
-        precision=1,
-        **in_unit("crust_stress", 1e3),
-    )
-    firm_depth_cm: FloatProperty(
-        name="Firm Below (cm)",
-        description="Depth of compression below which the ground is ten times stiffer, in centimeters. 0 is loose all "
-        "through",
-        min=0.0,
-        soft_max=30.0,
-        precision=1,
-        **in_unit("firm_depth", 0.01),
-    )
+    layer_depth_cm: in_unit("layer_depth", 0.01, "Layer (cm)", _LAYER, min=0.1, soft_max=100.0, precision=1)
+    rim_reach_cm: in_unit("rim_reach", 0.01, "Rim Reach (cm)", _RIM_REACH, min=0.0, soft_max=20.0, precision=1)
+    blur_sigma_cm: in_unit("blur_sigma", 0.01, "Smoothing (cm)", _SMOOTHING, min=0.0, soft_max=5.0, precision=2)
+    crust_stress_kpa: in_unit("crust_stress", 1e3, "Crust (kPa)", _CRUST, min=0.0, soft_max=100.0, precision=1)
+    firm_depth_cm: in_unit("firm_depth", 0.01, "Firm Below (cm)", _FIRM_BELOW, min=0.0, soft_max=30.0, precision=1)
 
 
 def _paintable(painted: SoftGroundPainted, _context: bpy.types.Context, _typed: str) -> list[str]:

@@ -22,6 +22,16 @@ DEFAULT_CELL_SIZE = 0.01
 """Fine enough for the edge of a human print [m]."""
 
 
+_CELL_SIZE = (
+    "Size of the cells in which the ground is computed. Half the size takes four times the memory; the depth of the "
+    "prints does not depend on it"
+)
+_TREAD = (
+    "Depth of the bars of shoe soles that the ground's render material shows in prints. "
+    "0 for bare feet, paws and things"
+)
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
@@ -33,7 +43,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     material: PointerProperty(name="Material", type=SoftGroundMaterial)
     cell_size: FloatProperty(
         name="Cell Size (m)",
-        description="Size of the cells in which the ground is computed, in meters",
+        description=_CELL_SIZE,
         default=DEFAULT_CELL_SIZE,
         min=1e-4,
         max=1.0,
@@ -41,16 +51,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_max=0.05,
         precision=4,
     )
-    cell_size_cm: FloatProperty(
-        name="Cell Size (cm)",
-        description="Size of the cells in which the ground is computed, in centimeters. Half the size takes four times "
-        "the memory; the depth of the prints does not depend on it",
-        min=0.01,
-        max=100.0,
-        soft_min=0.2,
-        soft_max=5.0,
-        precision=2,
-        **in_unit("cell_size", 0.01),
+    cell_size_cm: in_unit(
+        "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
     shape_keys: BoolProperty(
         name="Shape Keys",
@@ -96,23 +98,14 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     tread: FloatProperty(
         name="Tread (m)",
-        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in meters. 0 "
-        "for bare feet, paws and things",
+        description=_TREAD,
         default=0.0,
         min=0.0,
         max=0.1,
         soft_max=0.005,
         precision=4,
     )
-    tread_mm: FloatProperty(
-        name="Tread (mm)",
-        description="Depth of the bars of shoe soles that the ground's render material shows in prints, in "
-        "millimeters. 0 for bare feet, paws and things",
-        min=0.0,
-        soft_max=5.0,
-        precision=1,
-        **in_unit("tread", 1e-3),
-    )
+    tread_mm: in_unit("tread", 1e-3, "Tread (mm)", _TREAD, min=0.0, soft_max=5.0, precision=1)
     tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)

@@ -161,9 +161,9 @@ def _of_standing(ground: bpy.types.Object) -> str:
 
 
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:
-    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, as a cache may play."""
-    own, played = ground_mesh.own_modifiers(ground), playback.modifier_of(ground)
-    return [item.type for item in ground.modifiers if item == played or (item.show_viewport and item not in own)]
+    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown."""
+    played = playback.modifier_of(ground)
+    return [item.type for item in ground.modifiers if item == played or item.show_viewport]
 
 
 def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from .files import replacing
 
 _HEADER = struct.Struct("<12siiffi")
@@ -39,21 +38,3 @@ def write(path: Path, samples: Iterable[NDArray[np.float32]], *, start_frame: fl
         cache.write(_HEADER.pack(_MAGIC, _VERSION, points, start_frame, 1.0, count))
         for sample in samples:
             cache.write(np.ascontiguousarray(sample, dtype="<f4").tobytes())
-
-
-def read(path: Path) -> tuple[float, NDArray[np.float32]]:
-    """First frame, and positions (samples, points, 3), of a cache.
-
-    Raises
-    ------
-    InputError
-        If the file is no PC2 cache or is cut short.
-    """
-    content = path.read_bytes()
-    if len(content) < _HEADER.size or not content.startswith(_MAGIC):
-        raise InputError(f"'{path}' is no PC2 point cache.")
-    _, _, points, start, _, count = _HEADER.unpack_from(content)
-    if len(content) != _HEADER.size + count * points * 12:
-        raise InputError(f"'{path}' is cut short: export it again.")
-    positions = np.frombuffer(content, dtype="<f4", offset=_HEADER.size)
-    return float(start), positions.reshape(count, points, 3)
