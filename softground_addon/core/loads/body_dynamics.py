@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -21,6 +22,8 @@ CUTOFF = 16.0
 """Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, as is usual for
 gait (Winter 2009, "Biomechanics and Motor Control of Human Movement", chapter 3: 6 Hz and more). It holds where the
 motion itself does not tell better."""
+SLOW_CUTOFF = 5.0
+"""Cut-off that shows how a body leans while it stands, in the same unit (2.5 Hz)."""
 CUTOFF_RANGE = 2.0
 """How far the motion may move the cut-off from there, down or up [octaves]."""
 CUTOFF_STEP = 0.25
@@ -56,6 +59,8 @@ class BodyDynamics:
         The body that this holds for, at the scene frames among the steps.
     cutoff : float
         Cut-off of the low-pass that suits the motion [Hz].
+    slow : BodyDynamics, optional
+        What remains of it at `SLOW_CUTOFF`.
     """
 
     centre: Array
@@ -63,6 +68,7 @@ class BodyDynamics:
     moment: Array
     points: MassPoints
     cutoff: float
+    slow: BodyDynamics | None = None
 
     def point_of_action(self, ground: Array, steps: slice | NDArray[np.intp] = slice(None)) -> Array:
         """Where the total force meets the level `ground` (...,) [m] at steps (...,): the zero moment point.
@@ -111,7 +117,8 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
     if flying.any():
         cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
-    return body
+    slow = smoothed(min(SLOW_CUTOFF / (2 * np.pi * motion.pendulum_time), body.cutoff))
+    return dataclasses.replace(body, slow=slow)
 
 
 def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
@@ -132,7 +139,7 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     )
     force = acceleration / fall + (0.0, 0.0, 1.0)
     force[flying] = 0.0
-    return BodyDynamics(centre, force, body.moment, points, cutoff)
+    return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 
 
 def _usual_cutoff(motion: CharacterMotion) -> float:

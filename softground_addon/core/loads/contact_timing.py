@@ -25,10 +25,12 @@ Array = NDArray[np.float64]
 
 SEARCH = 0.33
 """How far the forces may move heel strike and toe-off, in sqrt(leg length/gravity) (0.1 s for an adult)."""
-TIMING_DEVIATION = 0.1
-"""Standard deviation of the times found from heights and speeds, in the same unit (30 ms)."""
+TIMING_DEVIATION = 0.08
+"""Standard deviation of the times found from heights and speeds, in the same unit (25 ms)."""
 SHARE_DEVIATION = 0.07
 """Least standard deviation of the leading foot's share as the point of action tells it."""
+WANDER = 2.0
+"""How far the point of action wanders under a foot that rolls from heel to toes, in its `extents`."""
 SURE = 2.0
 """How far from the times found the other foot is surely off the ground, in `TIMING_DEVIATION`."""
 SHARE_MEMORY = 0.25
@@ -297,7 +299,7 @@ def _shares_told(
     share = np.clip(share, 0.0, 1.0)
     # The point of action wanders under each sole as far as that can press: so much less it tells about the shares.
     wander = (1 - share) * extent[within, trailing] ** 2 + share * extent[within, leading] ** 2
-    wander /= np.maximum(length, 1e-12)
+    wander *= WANDER**2 / np.maximum(length, 1e-12)
     off = np.select([before, after], [share, 1 - share], 0.0) ** 2
     beyond = np.maximum(off - wander, 0.0).sum(axis=1, keepdims=True)
     beyond /= np.maximum((before | after).sum(axis=1, keepdims=True), 1)

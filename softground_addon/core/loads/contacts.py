@@ -52,6 +52,19 @@ EDGE_SEARCH = 0.2
 EDGE_CUTOFF = 24.0
 """Cut-off of the low-pass before a sole's acceleration is taken, in pendulum frequencies sqrt(gravity/leg
 length)/(2·pi) (12 Hz for an adult)."""
+STRIKE_SPEED = 0.17
+"""A foot that comes down beside one that bears takes load once its lowest point moves along the ground more slowly
+than this, in sqrt(gravity·leg length) (0.5 m/s for an adult)."""
+TOE_OFF_SPEED = 0.5
+"""A foot has left its load to another one when its last point moves faster than this, in sqrt(gravity·leg length)
+(1.5 m/s for an adult)..."""
+TOE_OFF_SHARE = 0.35
+"""...or than this part of its fastest in the swing that follows: slow motion has slow toes."""
+BESIDE = 0.33
+"""How long another foot must have borne before, or must bear after, for a foot to land or leave beside it, and how much
+later it then may, in sqrt(leg length/gravity) (0.1 s)."""
+SWING = 2.0
+"""Time in which a swinging foot has been at its fastest, in the same unit (0.6 s)."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 
@@ -86,7 +99,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
 
     A contact starts when the sole has come down to where it will stand, and ends when its last landmark accelerates
     upward most (Hreljac and Marshall 2000, "Algorithms to determine event timing during normal walking using
-    kinematic data", J. Biomechanics 33(6)).
+    kinematic data", J. Biomechanics 33(6)). In double support both are told better by the sole's speed.
 
     Parameters
     ----------
@@ -108,10 +121,14 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
         _detect(track, drift, limit, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
         for track, sole in zip(tracks, motion.soles, strict=True)
     ]
-    touching, offset = zip(*found, strict=True)
+    sharp, offset = (np.array(values) for values in zip(*found, strict=True))
+    touching = [
+        _beside(sharp[index], np.delete(sharp, index, axis=0).any(axis=0), track.velocity - drift, motion)
+        for index, track in enumerate(tracks)
+    ]
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
-    return Contacts(np.stack(touching, axis=1), np.array(offset), normal, clearance)
+    return Contacts(np.stack(touching, axis=1), offset, normal, clearance)
 
 
 def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:
@@ -250,6 +267,31 @@ def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
             end = begin + int(np.argmax(acceleration[begin : last + max(search, 1), landmark]))
         sharp[start:end] = True
     return sharp
+
+
+def _beside(touching: Mask, others: Mask, velocity: Array, motion: CharacterMotion) -> Mask:
+    """One sole's contacts (N,), their ends dated by its `velocity` (N, 3) [m/s] where `others` (N,) bear meanwhile.
+
+    Beside a foot that bears, the other one comes down flat and gently and touches while it still moves on; it leaves
+    long after it has begun to rise, as its toes speed away.
+    """
+    unit = motion.pendulum_time / motion.time_step
+    overlap, beside, swing = (round(time * unit) for time in (SHORTEST_CONTACT, BESIDE, SWING))
+    along, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
+    dated = touching.copy()
+    for first, last in zip(*runs(touching), strict=True):
+        if first > 0 and others[max(first - beside, 0) : first + overlap].all():
+            stop = min(first + beside, last)
+            late = along[first:stop] > STRIKE_SPEED * motion.froude_speed
+            dated[first : first + int((~late).argmax())] = False
+        if last < len(touching) and others[max(last - overlap, 0) : last + beside].all():
+            limit = min(TOE_OFF_SPEED * motion.froude_speed, TOE_OFF_SHARE * float(speed[last : last + swing].max()))
+            begin = max(last - overlap, first + 1)
+            fast = speed[begin : last + beside] > limit
+            if fast.any():
+                end = begin + int(fast.argmax())
+                dated[min(end, last) : max(end, last)] = end > last
+    return dated
 
 
 def _float(height: Array, speed: Array, limit: float) -> float:

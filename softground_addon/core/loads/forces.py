@@ -120,7 +120,7 @@ def whole_body_forces(
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
     lowest = lowest_points(motion)
     share = whole_body_shares(motion, lowest, contacts.touching, body)
-    target = point_of_action(lowest, contacts.touching, body)
+    target = point_of_action(motion, lowest, contacts.touching, body)
     pressure = centres_of_pressure(motion, lowest, share, target, np.clip(total[:, 2], 0.0, 1.0))
     forces = body_weight * share[..., None] * total[:, None]
     if crisp_landings:

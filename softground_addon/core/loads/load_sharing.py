@@ -22,6 +22,9 @@ POINT_DEVIATION = 0.03
 """Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
 LONGEST_RAMP = 1.0
 """Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
+LONG_OVERLAP = 1.2
+"""Soles that bear together for longer than this stand: the body sways over them slowly, and what seems to be faster is
+error, in the same unit (0.36 s)."""
 
 
 def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
@@ -31,17 +34,22 @@ def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, bo
     """
     return share_through_transitions(
         lowest[..., :2],
-        point_of_action(lowest, touching, body),
+        point_of_action(motion, lowest, touching, body),
         touching,
         deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
         longest=max(1, round(LONGEST_RAMP * motion.pendulum_time / motion.time_step)),
     )
 
 
-def point_of_action(lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
+def point_of_action(motion: CharacterMotion, lowest: Array, touching: Mask, body: BodyDynamics) -> Array:
     """Where the total force meets the level of the soles that touch, (N, 2) [m]."""
-    height = lowest[..., 2]
-    return body.point_of_action((height * touching).sum(axis=1) / np.maximum(touching.sum(axis=1), 1))
+    count = touching.sum(axis=1)
+    ground = (lowest[..., 2] * touching).sum(axis=1) / np.maximum(count, 1)
+    point = body.point_of_action(ground)
+    for first, last in zip(*runs(count > 1), strict=True):
+        if body.slow and last - first > LONG_OVERLAP * motion.pendulum_time / motion.time_step:
+            point[first:last] = body.slow.point_of_action(ground[first:last], slice(first, last))
+    return point
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:
@@ -108,15 +116,19 @@ def share_through_transitions(points: Array, target: Array, touching: Mask, *, d
 
 
 def _ramps(touching: Mask, longest: int) -> Array:
-    """How far each contact is from its ends: 0 at an end that others bridge, 1 away from it, (N, S)."""
+    """How far each contact is from its ends: 0 at an end that others bridge, 1 away from it, (N, S).
+
+    A ramp lasts while the others bear too, and no longer than they bear without this sole: two feet that land just
+    after one another do not hand over for long.
+    """
     count, soles = touching.shape
     ramps = touching.astype(float)
     contacts = [np.stack(runs(touching[:, sole])) for sole in range(soles)]
     for sole, (first, last) in enumerate(contacts):
         start, end = np.concatenate([np.zeros((2, 0), int), *contacts[:sole], *contacts[sole + 1 :]], axis=1)
-        # Each ramp lasts while the others that bridge the end do; infinite where none does.
-        rises = np.where(_within(first, start, end), end, np.inf).min(axis=1, initial=np.inf) - first
-        falls = last - np.where(_within(last, start, end), start, -np.inf).max(axis=1, initial=-np.inf)
+        # What stands at an end of the motion has stood, or will stand, for long.
+        rises = _ramp_lengths(first, last, np.where(start > 0, start, -np.inf), end)
+        falls = _ramp_lengths(-last[::-1], -first[::-1], np.where(end < count, -end, -np.inf), -start)[::-1]
         for begin, stop, rise, fall in zip(first, last, rises, falls, strict=True):
             most = min(stop - begin, longest)
             if begin > 0 and np.isfinite(rise):
@@ -128,7 +140,15 @@ def _ramps(touching: Mask, longest: int) -> Array:
     return ramps
 
 
-def _within(step: NDArray[np.intp], start: NDArray[np.intp], end: NDArray[np.intp]) -> Mask:
+def _ramp_lengths(first: NDArray[np.intp], last: NDArray[np.intp], start: Array, end: NDArray[np.intp]) -> Array:
+    """Longest ramps [steps] at which a sole's contacts (I,) may begin while others (J,) bear; infinite beside none."""
+    bridging = _within(first, start, end)
+    together = np.where(bridging, end, np.inf).min(axis=1, initial=np.inf) - first
+    before = np.maximum(np.where(bridging, start, np.inf).min(axis=1, initial=np.inf), np.append(-np.inf, last[:-1]))
+    return np.where(bridging.any(axis=1), np.minimum(together, first - before), np.inf)
+
+
+def _within(step: NDArray[np.intp], start: Array, end: NDArray[np.intp]) -> Mask:
     """Which intervals (J,) hold which steps (I,) inside, (I, J)."""
     return (start < step[:, None]) & (step[:, None] < end)
 

@@ -89,6 +89,25 @@ def test_one_frame_and_no_motion_at_all_are_no_errors():
     assert detect_contacts(character([flat_sole(np.zeros((1, 3)))]), Slope()).touching.tolist() == [[True]]
 
 
+def step_beside():
+    """A foot that comes in flat beside one that stands, and stops within 0.2 s; the other then leaves gently."""
+    time = np.arange(360) / RATE
+    arrival = np.clip((time - 0.8) / 0.2, 0.0, 1.0)
+    speed = np.where(time < 0.8, 3.0, 3.0 * (1 - arrival) ** 2)
+    along = np.cumsum(speed) / RATE
+    leaving = np.maximum(time - 1.2, 0.0)
+    front = np.stack([along - along[-1] + 0.6, 0 * time, 0.15 * (1 - np.clip(time / 0.8, 0, 1)) ** 2], axis=1)
+    back = np.stack([5.0 * leaving**2, 0 * time, 3.0 * leaving**2], axis=1)
+    soles = [flat_sole(path, landmarks=((0, 0, 0),)) for path in (back, front)]
+    return detect_contacts(character(soles, hips=(0.3, 0.0, 0.9), rate=RATE), Slope()).touching
+
+
+def test_beside_a_foot_that_bears_one_lands_as_it_slows_and_leaves_as_it_speeds_away():
+    back, front = step_beside().T
+    assert runs(front)[0][0] / RATE == pytest.approx(0.92, abs=0.04)  # 0.5 m/s
+    assert runs(back)[1][0] / RATE == pytest.approx(1.33, abs=0.04)  # 1.5 m/s
+
+
 def test_hysteresis_keeps_its_state_between_the_thresholds():
     start = np.array([0, 1, 0, 0, 0, 0, 1, 0], dtype=bool)
     stop = np.array([0, 0, 0, 1, 0, 1, 0, 0], dtype=bool)

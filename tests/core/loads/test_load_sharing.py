@@ -6,7 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from softground_addon.core.loads.load_sharing import share_by_moment, solve_non_negative
+from softground_addon.core.loads.body_dynamics import body_dynamics
+from softground_addon.core.loads.centre_of_pressure import lowest_points
+from softground_addon.core.loads.load_sharing import (
+    share_by_moment,
+    share_through_transitions,
+    solve_non_negative,
+    whole_body_shares,
+)
+from tests.core.character import standing
 
 FEET = np.array([[[0.0, 0.1], [0.6, -0.1]]])
 
@@ -56,3 +64,34 @@ def test_shares_change_continuously_as_the_centre_of_mass_moves():
     corners = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 0.4], [1.1, 0.5]], (2000, 1, 1))
     shares = share_by_moment(corners, path, np.ones((2000, 4), dtype=bool))
     assert np.abs(np.diff(shares, axis=0)).max() < 0.05
+
+
+def test_feet_that_land_just_after_one_another_do_not_hand_over_for_long():
+    """The second lands 3 steps after the first, the body midway between them: soon each bears a half."""
+    step = np.arange(200)
+    first, second = (step >= 50) & (step < 150), (step >= 53) & (step < 147)
+    touching = np.stack([first, second], axis=1)
+    points = np.repeat(FEET, 200, axis=0)
+    shares = share_through_transitions(points, points.mean(axis=1), touching, deviation=np.full(200, 0.1), longest=40)
+    assert shares[60:140] == pytest.approx(np.full((80, 2), 0.5), abs=0.01)
+    assert shares.sum(axis=1) == pytest.approx(touching.any(axis=1).astype(float))
+
+
+def test_a_foot_that_took_over_from_a_step_hands_over_as_long_as_before():
+    """In a walk each foot bears alone for longer than both do."""
+    step = np.arange(300)
+    touching = np.stack([(step < 120) | (step >= 180), (step >= 90) & (step < 210)], axis=1)
+    points = np.repeat(FEET, 300, axis=0)
+    shares = share_through_transitions(points, points.mean(axis=1), touching, deviation=np.full(300, 10.0), longest=40)
+    assert shares[105, 1] == pytest.approx(0.5, abs=0.05)
+    assert np.diff(shares[90:120, 1]).min() > 0
+
+
+def test_who_stands_on_both_feet_bears_evenly_however_the_markers_shake():
+    random = np.random.default_rng(1)
+    hips = (0.0, 0.0, 0.9) + 0.002 * random.normal(size=(600, 3))
+    motion = standing(600, hips=hips, rate=100.0)
+    touching = np.ones((600, 2), dtype=bool)
+    shares = whole_body_shares(motion, lowest_points(motion), touching, body_dynamics(motion))
+    assert shares[60:-60].std(axis=0).max() < 0.03
+    assert shares.mean(axis=0) == pytest.approx([0.5, 0.5], abs=0.02)
