@@ -39,6 +39,8 @@ TRUE_FALL = 0.2
 """A flight whose fall differs from gravity by less shows the error of the body's mass, not another time scale."""
 RATES_OF_FALL = (0.5, 3.0)
 """Slowest and fastest fall that is taken for a flight, in gravities."""
+MOST_ROUNDS = 12
+"""Rounds in which a body comes to fall freely where it would be pulled down."""
 STEADY_ENDS = 0.01
 """How much a force of 1 body weight is expected at both ends of the action, where half of the evidence is missing."""
 
@@ -122,23 +124,36 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
 
 
 def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
-    """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,).
+    """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,), and nothing ever pulls.
 
     In flight the force is 0: the body's mass is fitted to that, and the low-pass is the one that shows it best. Where
     the motion is nowhere near free fall while nothing touches, it stays as it was.
+
+    A body on its feet that the motion asks to be pulled down, as when it bobs too fast by hand, falls freely there too:
+    cutting the force off instead would leave it more than its weight on average.
     """
     flying = _flights(airborne, body.force[:, 2])
-    if not flying.any():
+    pulled = ~airborne & (body.force[:, 2] < 0)
+    if not (flying.any() or pulled.any()):
         return body
-    points, cutoff, fall = _falling_freely(motion, body, flying)
+    points, cutoff, fall = body.points, body.cutoff, motion.gravity
+    if flying.any():
+        points, cutoff, fall = _falling_freely(motion, body, flying)
     sampled = motion.on_frames
     path = np.zeros((len(sampled), 3))
     path[sampled] = points.centre
-    centre, _, acceleration = smooth_path(
-        path, motion.time_step, cutoff, sampled=sampled, falling=_inner(flying), fall=fall, steady_ends=STEADY_ENDS
-    )
-    force = acceleration / fall + (0.0, 0.0, 1.0)
-    force[flying] = 0.0
+    # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
+    for _ in range(MOST_ROUNDS):
+        falling = _inner(flying) | pulled
+        centre, _, acceleration = smooth_path(
+            path, motion.time_step, cutoff, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
+        )
+        force = acceleration / fall + (0.0, 0.0, 1.0)
+        pulling = ~airborne & (force[:, 2] < 0)
+        if (pulling == pulled).all():
+            break
+        pulled = pulling
+    force[flying | pulled] = 0.0
     return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 
 

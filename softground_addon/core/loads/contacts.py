@@ -123,7 +123,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     ]
     sharp, offset = (np.array(values) for values in zip(*found, strict=True))
     touching = [
-        _beside(sharp[index], np.delete(sharp, index, axis=0).any(axis=0), track.velocity - drift, motion)
+        _beside(sharp[index], np.delete(sharp, index, axis=0), track.velocity - drift, motion)
         for index, track in enumerate(tracks)
     ]
     normal = np.stack([track.normal for track in tracks], axis=1)
@@ -270,7 +270,7 @@ def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:
 
 
 def _beside(touching: Mask, others: Mask, velocity: Array, motion: CharacterMotion) -> Mask:
-    """One sole's contacts (N,), their ends dated by its `velocity` (N, 3) [m/s] where `others` (N,) bear meanwhile.
+    """One sole's contacts (N,), their ends dated by its `velocity` (N, 3) [m/s] where one of `others` (K, N) bears on.
 
     Beside a foot that bears, the other one comes down flat and gently and touches while it still moves on; it leaves
     long after it has begun to rise, as its toes speed away.
@@ -280,11 +280,11 @@ def _beside(touching: Mask, others: Mask, velocity: Array, motion: CharacterMoti
     along, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
     dated = touching.copy()
     for first, last in zip(*runs(touching), strict=True):
-        if first > 0 and others[max(first - beside, 0) : first + overlap].all():
+        if first > 0 and others[:, max(first - beside, 0) : first + overlap].all(axis=1).any():
             stop = min(first + beside, last)
             late = along[first:stop] > STRIKE_SPEED * motion.froude_speed
             dated[first : first + int((~late).argmax())] = False
-        if last < len(touching) and others[max(last - overlap, 0) : last + beside].all():
+        if last < len(touching) and others[:, max(last - overlap, 0) : last + beside].all(axis=1).any():
             limit = min(TOE_OFF_SPEED * motion.froude_speed, TOE_OFF_SHARE * float(speed[last : last + swing].max()))
             begin = max(last - overlap, first + 1)
             fast = speed[begin : last + beside] > limit

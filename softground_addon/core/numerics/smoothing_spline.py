@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 _ORDER = 3
 """The penalty is on the third derivative, so the bandwidth of the normal equations is 3."""
-_FALL_WEIGHT = 1e4
+_FALL_WEIGHT = 1e5
 """How much more a known fall counts than the samples near the cut-off frequency."""
 
 

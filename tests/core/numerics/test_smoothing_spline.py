@@ -44,7 +44,7 @@ def test_the_banded_solution_is_the_dense_one():
     smooth, _, _ = smooth_path(path, 1 / RATE, 8.0, sampled=sampled, falling=falling, fall=9.81)
     scale, weight = 2 * np.sin(np.pi * 8.0 / RATE), np.diag(sampled.astype(float))
     third, second = np.diff(np.eye(101), 3, axis=0), np.diff(np.eye(101), 2, axis=0)[39:59]
-    fall = 1e4 * sampled.mean() / scale**4
+    fall = 1e5 * sampled.mean() / scale**4
     system = weight + sampled.mean() / scale**6 * third.T @ third + fall * second.T @ second
     right = weight @ path
     right[:, -1] -= fall * 9.81 / RATE**2 * second.sum(axis=0)
