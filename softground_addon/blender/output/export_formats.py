@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,41 +23,13 @@ LARGEST_IMAGE = 16384
 
 
 @dataclass(frozen=True)
-class Format:
-    """A kind of file that a bake can be written to.
-
-    Attributes
-    ----------
-    suffix : str
-        Of its files.
-    label, description : str
-        For the user.
-    """
-
-    suffix: str
-    label: str
-    description: str
-
-
-FORMATS = {
-    "ALEMBIC": Format(".abc", "Alembic", "The moving ground"),
-    "USD": Format(".usdc", "USD", "The moving ground with its shading attributes"),
-    "PC2": Format(".pc2", "Point Cache (PC2)", "Positions of the ground's vertices, for a mesh cache"),
-    "EXR": Format(
-        ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map"
-    ),
-    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step"),
-}
-
-
-@dataclass(frozen=True)
 class Options:
     """How a bake is written.
 
     Attributes
     ----------
     format : str
-        One of `FORMATS`.
+        Key of one of `FORMATS`.
     path : Path
         The file; of image sequences its folder and what their names begin with.
     start, end : int
@@ -78,6 +51,74 @@ class Options:
     outdated: bool = False
 
 
+Writer = Callable[[bpy.types.Scene, bpy.types.Object, Options], list[Path]]
+
+
+def _images(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+    return image_exports.export_images(
+        scene,
+        ground,
+        options.path.parent,
+        options.start,
+        options.end,
+        resolution=options.resolution,
+        uv_map=options.uv_map,
+        name=options.path.stem,
+    )
+
+
+def _moving(write: Callable[[bpy.types.Scene, bpy.types.Object, Path, int, int], None]) -> Writer:
+    """A writer of one file that holds all frames."""
+
+    def writer(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+        write(scene, ground, options.path, options.start, options.end)
+        return [options.path]
+
+    return writer
+
+
+def _still(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+    exports.export_final(scene, ground, options.path)
+    return [options.path]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file that a bake can be written to.
+
+    Attributes
+    ----------
+    suffix : str
+        Of its files.
+    label, description : str
+        For the user.
+    write : callable
+        Writes a scene's baked ground as `Options` say; returns the files.
+    """
+
+    suffix: str
+    label: str
+    description: str
+    write: Writer
+
+
+FORMATS = {
+    "ALEMBIC": Format(".abc", "Alembic", "The moving ground", _moving(exports.export_alembic)),
+    "USD": Format(".usdc", "USD", "The moving ground with its shading attributes", _moving(exports.export_usd)),
+    "PC2": Format(
+        ".pc2",
+        "Point Cache (PC2)",
+        "Positions of the ground's vertices, for a mesh cache",
+        _moving(exports.export_point_cache),
+    ),
+    "EXR": Format(
+        ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map", _images
+    ),
+    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step", _still),
+}
+"""All formats: a further one is a row here."""
+
+
 def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     """Write the bake on the scene's ground; returns the files.
 
@@ -97,24 +138,7 @@ def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     is_open = scene == bpy.context.scene  # the one that Blender's exporters write
     there = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
     with there:
-        return _write(scene, ground, options)
-
-
-def _write(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
-    path, span = options.path, (options.start, options.end)
-    if options.format == "EXR":
-        return image_exports.export_images(
-            scene, ground, path.parent, *span, resolution=options.resolution, uv_map=options.uv_map, name=path.stem
-        )
-    if options.format == "ALEMBIC":
-        exports.export_alembic(scene, ground, path, *span)
-    elif options.format == "USD":
-        exports.export_usd(scene, ground, path, *span)
-    elif options.format == "PC2":
-        exports.export_point_cache(scene, ground, path, *span)
-    else:
-        exports.export_final(scene, ground, path)
-    return [path]
+        return FORMATS[options.format].write(scene, ground, options)
 
 
 def with_suffix(path: Path, kind: str) -> Path:
