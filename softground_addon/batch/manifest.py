@@ -36,6 +36,9 @@ LONGEST_NAME = 150
 LARGEST = 2**24
 """Size of a manifest that is read [bytes]: a hundred thousand shots."""
 
+DEEPEST = 10
+"""Most tables within each other below `set`; settings lie three deep."""
+
 FRAME_LIMIT = 1_048_574
 """Largest frame number that Blender takes, and minus the smallest."""
 
@@ -382,6 +385,8 @@ def _flat(table: object, where: str, prefix: str = "") -> Iterator[tuple[str, st
     for key, value in table.items():
         path = _text(f"{prefix}{key}", where).strip()
         if isinstance(value, dict):
+            if path.count(".") >= DEEPEST:
+                raise InputError(f"{where}: '{path}' is a table within more than {DEEPEST} others.")
             yield from _flat(value, where, f"{path}.")
         elif isinstance(value, bool):
             yield path, str(value).lower()

@@ -113,6 +113,7 @@ def test_a_pattern_is_a_shot_for_each_file(tmp_path):
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = 1", "must be a table"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = inf }", "'a' is inf"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = [1] }", r"'a' is \[1\]"),
+        (f"[[shots]]\nfile = 'a.blend'\nin_place = true\nset.{'a.' * 3000}b = 1", "within more than 10 others"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = 'a/b'", "without slashes"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '..'", "without slashes"),
         (f"[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '{'ä' * 76}'", "150 bytes"),

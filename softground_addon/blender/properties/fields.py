@@ -27,3 +27,8 @@ def in_unit(field: str, unit: float, name: str, description: str, **limits: Any)
         setattr(group, field, value * unit)
 
     return FloatProperty(name=name, description=description, get=shown, set=set_to, options={"SKIP_SAVE"}, **limits)
+
+
+def share(name: str, description: str, default: float = 0.0, most: float = 1.0) -> Any:
+    """A property that says how much of something is wanted: none at 0, all of it at 1."""
+    return FloatProperty(name=name, description=description, default=default, min=0.0, max=most, subtype="FACTOR")

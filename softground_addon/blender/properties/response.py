@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
+from .fields import share
+
 
 class SoftGroundTilt(bpy.types.PropertyGroup):
     """How bodies lean on sloping and yielding ground; see `core.response.tilt`."""
@@ -35,22 +37,10 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
         soft_max=1.5,
         precision=2,
     )
-    strength: FloatProperty(
-        name="Strength",
-        description="How much of a slope the body leans by: 1 by as much as the ground rises",
-        default=0.5,
-        min=0.0,
-        max=2.0,
-        subtype="FACTOR",
+    strength: share(
+        "Strength", "How much of a slope the body leans by: 1 by as much as the ground rises", default=0.5, most=2.0
     )
-    lateral: FloatProperty(
-        name="Sideways",
-        description="How much of that it also leans on slopes across its way",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
+    lateral: share("Sideways", "How much of that it also leans on slopes across its way", default=1.0)
 
 
 class SoftGroundGrounding(bpy.types.PropertyGroup):
@@ -62,51 +52,11 @@ class SoftGroundGrounding(bpy.types.PropertyGroup):
         "match, as a layer of keys above the animation",
         default=False,
     )
-    align: FloatProperty(
-        name="Align Feet",
-        description="How much of the ground's slope the feet take on, within what an ankle can bend",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
+    align: share(
+        "Align Feet", "How much of the ground's slope the feet take on, within what an ankle can bend", default=1.0
     )
-    lock: FloatProperty(
-        name="Lock Slides",
-        description="How much of the animation's sliding is taken out of feet that stand",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
-    knee_lift: FloatProperty(
-        name="Lift Knees",
-        description="Lift swinging feet higher, at 1 by as much as they had sunk",
-        default=0.0,
-        min=0.0,
-        max=2.0,
-        subtype="FACTOR",
-    )
-    hold: FloatProperty(
-        name="Hold Feet",
-        description="Let feet stay longer in deep ground and catch up in their swing",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
-    crouch: FloatProperty(
-        name="Bend Knees",
-        description="Bring the hips down in deep ground, at 1 by half the sinkage",
-        default=0.0,
-        min=0.0,
-        max=2.0,
-        subtype="FACTOR",
-    )
-    arms: FloatProperty(
-        name="Arms Out",
-        description="Raise the arms sideways for balance in deep ground",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
+    lock: share("Lock Slides", "How much of the animation's sliding is taken out of feet that stand")
+    knee_lift: share("Lift Knees", "Lift swinging feet higher, at 1 by as much as they had sunk", most=2.0)
+    hold: share("Hold Feet", "Let feet stay longer in deep ground and catch up in their swing")
+    crouch: share("Bend Knees", "Bring the hips down in deep ground, at 1 by half the sinkage", most=2.0)
+    arms: share("Arms Out", "Raise the arms sideways for balance in deep ground")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import stat
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
@@ -17,6 +18,9 @@ FOLDER = Path(__file__).parents[2] / "presets"
 """Where the presets that come with the add-on are."""
 
 SCHEMA_VERSION = 1
+
+LARGEST = 2**20
+"""Size of a preset that is read [bytes]."""
 
 
 SURFACES = ("snow", "sand", "wet_sand", "mud", "soil")
@@ -104,6 +108,9 @@ def load(path: Path) -> Preset:
         If the file cannot be read or is no valid preset.
     """
     try:
+        about = path.stat()
+        if not stat.S_ISREG(about.st_mode) or about.st_size > LARGEST:
+            raise OSError(f"it is no regular file of up to {LARGEST} bytes")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"Preset '{path}' cannot be read: {error}") from None

@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import os
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,3 +127,13 @@ def test_an_unknown_name_lists_the_known_ones():
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"gone\.json"):
         presets.load(tmp_path / "gone.json")
+
+
+@pytest.mark.timeout(20)
+def test_a_preset_that_never_ends_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.json")
+    (tmp_path / "huge.json").touch()
+    os.truncate(tmp_path / "huge.json", 2**40)
+    for path in (tmp_path / "pipe.json", tmp_path / "huge.json", Path("/dev/zero")):
+        with pytest.raises(InputError, match=r"cannot be read.*no regular file"):
+            presets.load(path)
