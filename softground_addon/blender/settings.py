@@ -201,6 +201,14 @@ def name_of(thing: bpy.types.Object) -> ObjectName:
     return ObjectName(thing.name, thing.session_uid)
 
 
+def find(name: ObjectName) -> bpy.types.Object | None:
+    """The object of a name, whatever it is called by now; None if it was deleted."""
+    thing = bpy.data.objects.get(name.name)
+    if thing is None or thing.session_uid != name.uid:
+        thing = next((other for other in bpy.data.objects if other.session_uid == name.uid), None)
+    return thing
+
+
 def found(name: ObjectName) -> bpy.types.Object:
     """The object of a name, whatever it is called by now.
 
@@ -209,9 +217,7 @@ def found(name: ObjectName) -> bpy.types.Object:
     InputError
         If it was deleted.
     """
-    thing = bpy.data.objects.get(name.name)
-    if thing is None or thing.session_uid != name.uid:
-        thing = next((other for other in bpy.data.objects if other.session_uid == name.uid), None)
+    thing = find(name)
     if thing is None:
         raise InputError(f"'{name.name}' was deleted: choose another object, or take it out of the settings.")
     return thing

@@ -126,6 +126,63 @@ def test_what_was_deleted_under_a_bake_is_named(scene):
         modal_bake._check_still_there(needed)
 
 
+def remove_characters(options):
+    options.characters.clear()
+
+
+def add_characters(options):
+    for _ in range(100):  # more than the list has room for where it is
+        options.characters.add()
+
+
+def delete_rig(options):
+    bpy.data.objects.remove(options.characters[0].armature)
+
+
+def delete_ground(options):
+    bpy.data.objects.remove(options.ground)
+
+
+def purge(_options):
+    bpy.ops.outliner.orphans_purge(do_recursive=True)
+
+
+MOMENTS = {"sample": 0.0, "simulate": 0.5, "write": 0.6}
+"""Progress of the stages at which a bake is disturbed."""
+
+
+def end_of(scene, stage, disturb):
+    """The error with which a bake ends that is disturbed in a stage, None if it is finished."""
+    prepare(scene, "coarse")
+    scene.softground.tilt.use = scene.softground.grounding.use = True
+    job, undisturbed = bake_job.bake(scene), True
+    try:
+        for progress in job:
+            if undisturbed and progress.stage == stage and progress.fraction >= MOMENTS[stage]:
+                undisturbed = False
+                disturb(scene.softground)
+    except InputError as error:
+        return str(error)
+    assert not undisturbed
+    return None
+
+
+@pytest.mark.parametrize("stage", MOMENTS)
+@pytest.mark.parametrize("disturb", [remove_characters, add_characters])
+def test_a_bake_goes_on_whatever_becomes_of_the_list_of_characters(scene, stage, disturb):
+    assert end_of(scene, stage, disturb) is None
+
+
+@pytest.mark.parametrize("stage", MOMENTS)
+@pytest.mark.parametrize(("disturb", "gone"), [(delete_rig, "Walker"), (delete_ground, "Plane")])
+def test_a_bake_whose_parts_go_names_what_is_gone(scene, stage, disturb, gone):
+    assert end_of(scene, stage, disturb).startswith((f"'{gone}' was deleted", f"Object '{gone}' is gone"))
+
+
+def test_a_bake_whose_draft_is_purged_says_so(scene):
+    assert end_of(scene, "write", purge).startswith("'Plane Trail' was deleted")
+
+
 def works_after(bake, seconds):
     """Whether a tick works that comes some time after the last one [s]."""
     before = bake.worked

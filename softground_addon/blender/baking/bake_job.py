@@ -81,8 +81,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     """
     wanted = wanted or settings_of(scene)
     started = time.perf_counter()
-    given = settings.found(wanted.ground) if wanted.ground else None
-    moving = bake_report.ground_warnings(given, wanted.frames[0])
+    moving = bake_report.ground_warnings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
     movers = staleness.of_movers(scene, wanted)
     surface = shot.surface
@@ -212,9 +211,9 @@ def _created(
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)
-    ground = drafts.enter_context(created_ground.draft(layout))
+    name = settings.name_of(drafts.enter_context(created_ground.draft(layout)))
     yield Progress("write", 0.3)
-    return baked_ground.on_created(scene, ground, layout, trail, wanted.surface)
+    return baked_ground.on_created(scene, settings.found(name), layout, trail, wanted.surface)
 
 
 def _given(
@@ -227,12 +226,13 @@ def _given(
 ) -> Job[tuple[baked_ground.Place, list[str]]]:
     """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; warnings."""
     assert wanted.ground is not None
-    ground, vertices = settings.found(wanted.ground), surface.vertices
+    name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
     index = yield from meanwhile(
         Progress("write", 0.2), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
     )
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
+    ground = settings.found(name)
     warnings = coverage_warnings(ground, cover, detail, cell_size)
     if not wants_detail(ground, cover, detail, cell_size, sole_length):
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
@@ -242,13 +242,14 @@ def _given(
     refinement = yield from meanwhile(
         Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), cell_size)
     )
-    draft = drafts.enter_context(trail_detail.draft(ground, coarse, refinement))
+    drafted_name = settings.name_of(drafts.enter_context(trail_detail.draft(settings.found(name), coarse, refinement)))
     yield Progress("write", 0.4)
     vertices = refinement.at_vertices(coarse, coarse.vertices)
     del refinement
     index = yield from meanwhile(
         Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
     )
+    ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*warnings, *copy_warnings(ground)]
 
 

@@ -17,6 +17,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
 from ...core.settings import BakeSettings
+from .. import settings
 from ..ground import baked_ground, ground_mesh, playback
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
@@ -68,7 +69,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
     )
     spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
-        table = drafts.enter_context(playback.keyframe_tables(lines))
+        table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines)))
         del lines  # they are large, and all is in the table
         yield Progress("write", 0.8)
         marks = _tread(footprints, place.position, made_with.tread_m)
@@ -83,12 +84,12 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             shape_keys=made_with.shape_keys,
         )
         ground_mesh.write_soles(carrier, place.index, marks)
-        error, show = spans.error, place.publish if place.is_draft else None
+        name, error, show = place.carrier, spans.error, place.publish if place.is_draft else None
         del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
         if show:
             yield Progress("write", 0.9)
             show()
-    return Published(carrier, error)
+    return Published(settings.found(name), error)
 
 
 def sign(

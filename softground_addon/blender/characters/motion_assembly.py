@@ -120,7 +120,7 @@ def assemble_motion(
         [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
     )
     yield len(recording.frames)
-    meshes = find_foot_meshes(scene, armature, sources, rest.world)
+    meshes = find_foot_meshes(scene, rest.armature, sources, rest.world)
     yield len(recording.frames)
     flats = _flat_feet(feet, planted, rest, facing=rest.facing(mapping), leg=leg, modelled=meshes.keys())
     sizes = [
@@ -137,14 +137,14 @@ def assemble_motion(
     motions.update(carried)
 
     return CharacterMotion(
-        name=armature.name,
+        name=rest.armature.name,
         mass=mass,
         leg_length=leg + (float(np.mean([size.ankle_height for size in sizes])) if sizes else 0.0),
         frames=recording.frames,
         frame_rate=frame_rate,
         soles=tuple(motions[source.name] for source in mapping.soles),
         joints={
-            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else armature.data.bones[bone].length)
+            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else rest.armature.data.bones[bone].length)
             for joint, (bone, end) in mapping.joints.items()
         },
         gravity=gravity,

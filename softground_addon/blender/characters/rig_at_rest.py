@@ -9,7 +9,9 @@ import numpy as np
 
 from ...core.motion.motion import Array
 from ...core.numerics.rigid import rotation, turn_between, unit
+from ...core.settings import ObjectName
 from ...core.soles.foot_attitude import UP
+from ..settings import found, name_of
 from .rig_mapping import RigMapping
 
 _ACROSS, _ALONG = 0.6, 0.7
@@ -28,14 +30,15 @@ class RestPose:
 
     Attributes
     ----------
-    armature : bpy.types.Object
+    rig : ObjectName
+        The armature.
     world : (4, 4) float array
         Armature space to world [m].
     tilts : (F, 3, 3) float array
         Rotations from upright to how the armature's own upward axis lies in each frame.
     """
 
-    armature: bpy.types.Object
+    rig: ObjectName
     world: Array
     tilts: Array
 
@@ -46,7 +49,11 @@ class RestPose:
         tilts = rotation(turn_between(np.broadcast_to(UP, ups.shape), ups))
         world = placed[0].copy()
         world[:3, :3] = tilts[0].T @ world[:3, :3]
-        return cls(armature, world, tilts)
+        return cls(name_of(armature), world, tilts)
+
+    @property
+    def armature(self) -> bpy.types.Object:
+        return found(self.rig)
 
     @property
     def is_mirrored(self) -> bool:

@@ -18,7 +18,7 @@ from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
-from ..settings import frame_rate_of, gravity_of, time_stretch_of
+from ..settings import found, frame_rate_of, gravity_of, name_of, time_stretch_of
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .motion_assembly import Recording, assemble_motion
 from .prop_extraction import check_things, prop_motion
@@ -87,12 +87,14 @@ def sample_character(
     _check_frames(frames)
     bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
     things = dict.fromkeys(source.object for source in mapping.soles if source.object)
+    rig = name_of(armature)
     with without_layer(armature):
         keyed = not things and is_moved_by_keys_alone(armature, bones)
     if keyed:
         recording = yield from _read_keys(scene, armature.name_full, frames, list(bones))
     else:
         recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
+    armature = found(rig)
     _check_recording(armature.name, recording)
     carried = {
         source.name: prop_motion(scene, source, recording.things[source.object])[0]

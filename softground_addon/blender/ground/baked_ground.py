@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import bpy
@@ -17,7 +16,9 @@ from ...core.record import record
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample, Trail
+from ...core.settings import ObjectName
 from ..jobs import Job, Progress
+from ..settings import found, name_of
 from . import created_ground, ground_checks, ground_mesh, hidden_ground, playback, trail_detail
 from .created_ground import Layout
 
@@ -45,7 +46,7 @@ class Place:
 
     index: Indices
     position: Array
-    carrier: bpy.types.Object
+    carrier: ObjectName
     publish: Callable[[], object]
     is_draft: bool = False
 
@@ -82,32 +83,37 @@ def clear(ground: bpy.types.Object) -> None:
 def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, trail: Trail, surface: str) -> Place:
     """A ground that is not in the scene yet."""
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
-    return Place(
-        index, layout.vertices[index], draft, partial(created_ground.publish, scene, draft, surface), is_draft=True
-    )
+    name = name_of(draft)
+
+    def publish() -> None:
+        created_ground.publish(scene, found(name), surface)
+
+    return Place(index, layout.vertices[index], name, publish, is_draft=True)
 
 
 def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """A draft of the ground refined along the trail; a bake that lies on the ground itself is taken off."""
+    below, above = name_of(ground), name_of(draft)
 
     def publish() -> None:
-        ground_mesh.restore(ground)
-        trail_detail.publish(ground, draft)
+        ground_mesh.restore(found(below))
+        trail_detail.publish(found(below), found(above))
 
     there = trail_detail.detail_of(ground)
-    return Place(index, vertices[index], there or draft, publish, is_draft=there is None)
+    return Place(index, vertices[index], name_of(there or draft), publish, is_draft=there is None)
 
 
 def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """The ground itself; a detail that stood in for it is taken away."""
-    return Place(index, vertices[index], ground, partial(trail_detail.remove, ground))
+    name = name_of(ground)
+    return Place(index, vertices[index], name, lambda: trail_detail.remove(found(name)))
 
 
 def write(
     place: Place,
     sample: GroundSample,
     spans: Spans,
-    table: bpy.types.Object,
+    table: ObjectName,
     stored: bytes,
     *,
     unit_scale: float,
@@ -134,15 +140,17 @@ def write(
     shape_keys : bool
         See `ground_mesh.write`.
     """
+    found(table)  # or nothing is written
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
-    up = ground_mesh.up_of(place.carrier, unit_scale)
+    up = ground_mesh.up_of(found(place.carrier), unit_scale)
     if not place.is_draft:
         place.publish()
-    ground_mesh.write(place.carrier, place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+    ground_mesh.write(found(place.carrier), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
     if place.is_draft:
         yield Progress("write", 0.9)
-    playback.attach(place.carrier, place.index[spans.point], spans, table, up=up)
-    return place.carrier
+    carrier = found(place.carrier)
+    playback.attach(carrier, place.index[spans.point], spans, found(table), up=up)
+    return carrier
 
 
 def stored_record(ground: bpy.types.Object) -> memoryview:

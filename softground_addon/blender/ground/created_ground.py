@@ -14,6 +14,7 @@ from ...core.ground.material import GroundMaterial
 from ...core.ground_plan import GroundPlan
 from ...core.meshing.graded_grid import GradedGrid, graded_grid
 from ...core.settings import BakeSettings
+from ..settings import find, name_of
 from .ground_mesh import discard, mesh_of, write_positions
 from .materials import ensure_material
 
@@ -107,11 +108,13 @@ def draft(layout: Layout) -> Iterator[bpy.types.Object]:
     layer.uv.foreach_set("vector", (uv / uv.max())[layout.corner_vertex].ravel())
     ground = bpy.data.objects.new("SoftGround", mesh)
     ground.location = layout.location.tolist()
+    name = name_of(ground)
+    del mesh, layer
     try:
         yield ground
     finally:
-        if not ground.users_collection:
-            discard(ground)
+        if (left := find(name)) is not None and not left.users_collection:
+            discard(left)
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:

@@ -167,16 +167,17 @@ def ensure_material(surface: str) -> bpy.types.Material:
 
 
 @contextmanager
-def drafted(surface: str) -> Iterator[bpy.types.Material]:
+def drafted(surface: str) -> Iterator[None]:
     """The same; one that is made now and that nothing has come to use at the end is taken away."""
-    known = set(bpy.data.materials)
-    material = ensure_material(surface)
-    is_new = material not in known
+    known = {material.session_uid for material in bpy.data.materials}
+    uid = ensure_material(surface).session_uid
     try:
-        yield material
+        yield
     finally:
-        if is_new and not material.users:
-            bpy.data.materials.remove(material)
+        for material in bpy.data.materials:
+            if material.session_uid == uid and uid not in known and not material.users:
+                bpy.data.materials.remove(material)
+                break
 
 
 def ensure_blend(surface: str, other: str) -> bpy.types.Material:

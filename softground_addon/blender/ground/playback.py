@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...core.playback.keyframe_tables import NO_VISIT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
+from ..settings import find, found, name_of
 from . import playback_nodes as nodes
 
 Array = NDArray[np.float64]
@@ -41,12 +42,12 @@ FEW = 1 / 64
 @contextmanager
 def keyframe_tables(lines: PlaybackCurves) -> Iterator[bpy.types.Object]:
     """An object that holds keyframe tables as splines in no scene; taken away if nothing comes to use it."""
-    table = _table_object(lines)
+    name = name_of(_table_object(lines))
     del lines  # they are large, and all is in the table
     try:
-        yield table
+        yield found(name)
     finally:
-        if not table.users:
+        if (table := find(name)) is not None and not table.users:
             _remove_table(table)
 
 

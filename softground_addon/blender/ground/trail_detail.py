@@ -18,7 +18,7 @@ from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
 from ...core.meshing.region import Region
 from ...core.numerics.cell_keys import Keys, keys_of
-from ..settings import exists
+from ..settings import exists, find, name_of
 from . import ground_mesh, playback, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
 
@@ -95,11 +95,12 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
     show_again(detail)
     for name in (DETAIL, DETAIL_OF, NAMED):
         detail.pop(name, None)  # of a hidden ground, or of one that is a duplicate of such a copy
+    drafted = name_of(detail)
     try:
         yield detail
     finally:
-        if DETAIL_OF not in detail.keys():  # noqa: SIM118  (an ID is no mapping)
-            ground_mesh.discard(detail)
+        if (left := find(drafted)) is not None and DETAIL_OF not in left.keys():  # noqa: SIM118  (an ID is no mapping)
+            ground_mesh.discard(left)
 
 
 def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:

@@ -15,7 +15,7 @@ from ...core.numerics.rigid import carried, rotation, unit
 from ...core.response.grounding import Response
 from ..animation_layer.layer_curves import LayerCurve
 from ..characters.rig_mapping import RigMapping
-from ..settings import time_stretch_of
+from ..settings import found, name_of, time_stretch_of
 from .pose_sampling import BonePoses, RigPoses, sample_poses
 from .rig_controls import BODY, Control, RigControls, find_controls
 
@@ -56,9 +56,10 @@ def response_curves(
     InputError
         If the rig has no bone that carries the body.
     """
-    controls = controls_of(scene, armature, mapping)
+    rig, controls = name_of(armature), controls_of(scene, armature, mapping)
     frames = [round(frame) for frame in motion.frames]
     poses = yield from sample_poses(scene, armature, frames, controls.bones)
+    armature = found(rig)
     moved = _parts_in_armature(response, motion, poses, scene.unit_settings.scale_length)
     curves: list[LayerCurve] = []
     times = motion.frames * time_stretch_of(scene)
