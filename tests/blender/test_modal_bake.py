@@ -8,7 +8,8 @@ import pytest
 
 from softground_addon.blender import jobs, session
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.interface import modal_bake
+from softground_addon.blender.interface import modal_bake, operators
+from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
 from tests.blender.shots import walker
@@ -228,7 +229,7 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
         yield jobs.Progress("write", 1.0)
         return "written"
 
-    bake = SimpleNamespace(_scene=scene.session_uid, _job=job(), _progress=None)
+    bake = SimpleNamespace(_scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes)
     forever = time.perf_counter() + 1e6
     assert modal_bake._Bake._work(bake, forever) is None
     assert bake._progress.fraction == 0.2
@@ -283,3 +284,40 @@ def test_another_window_is_held_while_a_bake_runs(monkeypatch, baking):
     answer("ESC")
     assert session.current().cancel_requested == baking
     session.current().cancel_requested = False
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_character_whose_reading_was_left_is_not_half_there(scene, others):
+    for number in range(others):
+        walker(scene, frames=40 + number)
+        bpy.ops.softground.add_character()
+    armature = walker(scene, frames=80)
+    bpy.context.view_layer.update()
+
+    def settings_now():
+        options = scene.softground
+        names = [character.name for character in options.characters]
+        return names, options.active_character, options.frame_start, options.frame_end
+
+    before = settings_now()
+    job = operators._added(scene, armature, [armature])
+    next(job)
+    assert settings_now() != before
+    job.close()
+    assert settings_now() == before
+
+
+def test_a_shot_is_read_in_steps_and_leaves_no_trace_where_that_ends(scene):
+    walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    before = fingerprints.of_file()
+    steps = len(list(analysis.reading(scene)))
+    assert steps > 30
+    for end in range(0, steps, 7):
+        analysis.forget()
+        job = analysis.reading(scene)
+        for _ in range(end):
+            next(job)
+        job.close()
+        assert fingerprints.of_file() == before
+        assert analysis.known(scene) is None

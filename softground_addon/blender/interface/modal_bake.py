@@ -1,9 +1,10 @@
-"""The bake as the user runs it: in small steps between events, with progress, time left, and a way out."""
+"""The bake and other jobs as the user runs them: in steps between events, with progress, time left, and a way out."""
 
 from __future__ import annotations
 
 import time
-from typing import Any
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, ClassVar
 
 import bpy
 
@@ -32,6 +33,9 @@ WORK_PER_DRAWING = 4.0
 
 STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
 
+BUSY = "A bake is running, or an animation is being read"
+"""Why no other job begins."""
+
 _NAVIGATION = (
     "MOUSEMOVE",
     "INBETWEEN_MOUSEMOVE",
@@ -46,27 +50,28 @@ _NAVIGATION = (
 )
 """Events that change nothing in the file (first parts of their names): they go on to Blender during a bake."""
 
-_running: list[_Bake] = []
-"""The operator that is baking, for the handlers that have to end it before its scene goes away; at most one."""
+_running: list[ModalJob] = []
+"""The operator whose job runs, for the handlers that have to end it before its scene goes away; at most one."""
 
 
-class _Bake(bpy.types.Operator):
-    """What operators that bake have in common: blocking in a script, modal for the user."""
+class ModalJob(bpy.types.Operator):
+    """What operators with a job have in common: blocking in a script, modal for the user."""
 
     bl_options = {"REGISTER", "UNDO"}
 
+    cancelled: ClassVar[str]
+    """What to say when the user has left the job."""
+
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is something to bake; otherwise the button says what is missing."""
-        reason = _why_not(context)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Whether no other job runs."""
+        cls.poll_message_set(BUSY)
+        return not session.current().is_baking
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        with analysis.own_changes(scene):
+        with self._changing(scene):
             result = jobs.run(self._job_of(scene))
         self._show(result)
         return {"FINISHED"}
@@ -75,17 +80,26 @@ class _Bake(bpy.types.Operator):
         run = self.execute if bpy.app.background else self._start  # a modal operator gets no events in background
         return run(context)
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Any]:
         raise NotImplementedError
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        """What the scene's analysis makes of what the job changes."""
+        raise NotImplementedError
+
+    def _done(self, progress: jobs.Progress) -> float:
+        """The finished part of the job."""
+        return progress.overall
 
     @reports_errors
     def _start(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        self._job, self._scene, self._needed = self._job_of(scene), scene.session_uid, _read_by_bake(scene)
+        self._job, self._scene = self._job_of(scene), scene.session_uid
         self._started = self._ticked = self._show_at = time.perf_counter()
         self._gave_way = False
         self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
+        self._needed = _read_by_bake(scene)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
@@ -104,7 +118,7 @@ class _Bake(bpy.types.Operator):
             return {"CANCELLED"}  # ended by `stop`
         if (event.type == "ESC" and event.value == "PRESS") or session.current().cancel_requested:
             self._end()
-            self.report({"INFO"}, "Bake cancelled: nothing was changed")
+            self.report({"INFO"}, self.cancelled)
             return {"CANCELLED"}
         if event.type == "TIMER":
             try:
@@ -150,8 +164,8 @@ class _Bake(bpy.types.Operator):
         self._show(result)
         return {"FINISHED"}
 
-    def _work(self, until: float) -> bake_job.BakeResult | None:
-        """Go on with the bake until a time; the result if it is done by then."""
+    def _work(self, until: float) -> Any | None:
+        """Go on with the job until a time; the result if it is done by then."""
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
         blocks = _count_of_blocks()
 
@@ -161,25 +175,24 @@ class _Bake(bpy.types.Operator):
             drawn_anew = _count_of_blocks() != blocks  # the whole window, as soon as the tick ends
             return time.perf_counter() < until and not drawn_anew
 
-        with analysis.own_changes(scene):
+        with self._changing(scene):
             try:
                 self._progress = next(self._job)
                 while goes_on():
                     self._progress = next(self._job)
             except StopIteration as finished:
-                result: bake_job.BakeResult = finished.value
-                return result
+                return finished.value
         return None
 
     def _show_progress(self, progress: jobs.Progress) -> None:
-        done = max(session.current().progress, progress.overall)
+        done = max(session.current().progress, self._done(progress))
         passed = time.perf_counter() - self._started
         left = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
         self._show_status(done, f"{STAGE_NAMES[progress.stage]}: {max(1, round(left))} s left")
 
     def _show_status(self, progress: float, status: str) -> None:
-        self._write_status_bar(f"Bake Footprints {progress:.0%}  |  {status}  |  [Esc] Cancel")
+        self._write_status_bar(f"{self.bl_label} {progress:.0%}  |  {status}  |  [Esc] Cancel")
         session.show_bake(progress, status)
 
     def _write_status_bar(self, text: str | None) -> None:
@@ -200,8 +213,35 @@ class _Bake(bpy.types.Operator):
         session.current().cancel_requested = False
         session.show_no_bake()
 
-    def _show(self, result: bake_job.BakeResult) -> None:
+    def _show(self, result: Any) -> None:
         raise NotImplementedError
+
+
+class Reading(ModalJob):
+    """What operators that read the shot for its prediction have in common."""
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def _done(self, progress: jobs.Progress) -> float:
+        return progress.fraction
+
+
+class _Bake(ModalJob):
+    """What operators that bake have in common."""
+
+    cancelled = "Bake cancelled: nothing was changed"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is something to bake; otherwise the button says what is missing."""
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        return analysis.own_changes(scene)
 
 
 class SOFTGROUND_OT_bake(_Bake):
@@ -289,7 +329,7 @@ def _why_not(context: bpy.types.Context) -> str:
     """What keeps a bake from starting, or an empty text."""
     state = session.current()
     if state.is_baking:
-        return "A bake is running"
+        return BUSY
     if session.is_rendering():
         return "A render is running: wait until it has ended"
     if state.is_live:

@@ -19,34 +19,51 @@ from ..ground.created_ground import create_ground
 from ..operator_base import reports_errors
 from ..reading import analysis, shots
 from ..response import response_job
+from .modal_bake import Reading
 
 
-class SOFTGROUND_OT_add_character(bpy.types.Operator):
+class SOFTGROUND_OT_add_character(Reading):
     """Add the active armature: its feet, hips and limbs are recognized by their names or by the rest pose. Without an
-    armature, add the selected mesh objects as things that fall, roll or slide"""
+    armature, add the selected mesh objects as things that fall, roll or slide. Its animation is read; Esc cancels"""
 
     bl_idname = "softground.add_character"
     bl_label = "Add Character"
-    bl_options = {"REGISTER", "UNDO"}
+    cancelled = "Add Character cancelled: nothing was changed"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = settings.scene_of(context)
-        armature = _armature_of(context.active_object)
-        if armature is not None and armature.type == "MESH":
-            selected = [
-                thing for thing in context.selected_objects if thing.type == "MESH" and not thing.find_armature()
-            ]
-            added = character_setup.add_things(scene, dict.fromkeys([armature, *selected]))
-            self.report({"INFO"}, "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added))
-        else:
-            character = character_setup.add_character(scene, armature)
-            names = ", ".join(sole.name for sole in character.soles)
-            self.report({"INFO"}, f"Added '{character.name}' with {names}")
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[str]:
+        return _added(scene, bpy.context.active_object, list(bpy.context.selected_objects))
+
+    def _show(self, result: str) -> None:
+        self.report({"INFO"}, result)
+
+
+def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> jobs.Job[str]:
+    """Add the active armature or the selected objects, and read the shot for its prediction; what to say of it."""
+    options = scene.softground
+    before = len(options.characters), options.active_character, options.frame_start, options.frame_end
+    text, stays = _add(scene, active, selected), False
+    try:
+        yield jobs.Progress("sample", 0.0)
         if not bpy.app.background:
             with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-                analysis.read(scene)
-        return {"FINISHED"}
+                yield from analysis.reading(scene)
+        stays = True
+    finally:
+        if not stays:
+            while len(options.characters) > before[0]:
+                options.characters.remove(len(options.characters) - 1)
+            options.active_character, options.frame_start, options.frame_end = before[1:]
+    return text
+
+
+def _add(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> str:
+    armature = _armature_of(active)
+    if armature is None or armature.type != "MESH":
+        character = character_setup.add_character(scene, armature)
+        return f"Added '{character.name}' with " + ", ".join(sole.name for sole in character.soles)
+    things = [thing for thing in selected if thing.type == "MESH" and not thing.find_armature()]
+    added = character_setup.add_things(scene, dict.fromkeys([armature, *things]))
+    return "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)
 
 
 def _armature_of(thing: bpy.types.Object | None) -> bpy.types.Object | None:

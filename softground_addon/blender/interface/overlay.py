@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -14,13 +15,14 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.record import record
 from ...core.record.footprints import Footprint
-from .. import session, settings
+from .. import jobs, session, settings
 from ..ground import baked_ground
 from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..reading.analysis import Analysis
 from . import overlay_shapes, prediction
+from .modal_bake import Reading
 from .overlay_shapes import Cells, Outline
 
 Array = NDArray[np.float64]
@@ -38,6 +40,8 @@ LINE, BOLD_LINE = 1.5, 3.0
 """Widths of lines [px, before the interface's scale]."""
 HEAD = 0.15
 """Length of an arrow's head, in lengths of the arrow."""
+PATIENCE = 0.5
+"""Time from when the overlay cannot be read anew, as a bake runs, until it is tried again [s]."""
 TEXT_SIZE = 13
 """Size of the numbers [px, before the interface's scale]."""
 
@@ -212,15 +216,38 @@ class SOFTGROUND_OT_overlay(OnShot, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def read_again() -> None:
-    """Predict anew after an edit, for a timer."""
-    scene = bpy.context.window_manager.windows[0].scene if bpy.context.window_manager.windows else None
-    if scene is not None and session.current().show_overlay:
-        try:
-            analysis.read(scene)
-        except InputError:
-            return
+class SOFTGROUND_OT_read_again(Reading):
+    """Read the animation for the overlay, after an edit. Esc cancels"""
+
+    bl_idname = "softground.read_again"
+    bl_label = "Read Animation"
+    bl_options = {"INTERNAL"}
+    cancelled = "The overlay shows nothing until the next edit"
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bool]:
+        return _read_if_possible(scene)
+
+    def _show(self, _result: bool) -> None:
         session.redraw(region_type="WINDOW")
+
+
+def _read_if_possible(scene: bpy.types.Scene) -> jobs.Job[bool]:
+    yield jobs.Progress("sample", 0.0)
+    with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+        yield from analysis.reading(scene)
+    return analysis.known(scene) is not None
+
+
+def read_again() -> float | None:
+    """Predict anew after an edit, for a timer."""
+    windows = bpy.context.window_manager.windows
+    if not session.current().show_overlay or not windows:
+        return None
+    if not bpy.ops.softground.read_again.poll():
+        return PATIENCE
+    with bpy.context.temp_override(window=windows[0]):
+        bpy.ops.softground.read_again("INVOKE_DEFAULT")
+    return None
 
 
 _handles: list[Any] = []
@@ -244,4 +271,4 @@ def unregister() -> None:
     _bake.clear()
 
 
-CLASSES = (SOFTGROUND_OT_overlay,)
+CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again)

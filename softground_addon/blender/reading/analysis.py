@@ -107,7 +107,7 @@ def current(scene: bpy.types.Scene) -> Analysis | None:
     if analysis is None or analysis.terms == _terms(wanted):
         return analysis
     try:
-        return _keep(scene, wanted, analysis.shot, analysis.sources, analysis.hashes)
+        return jobs.run(_keep(scene, wanted, analysis.shot, analysis.sources, analysis.hashes))
     except InputError:
         del _known[scene.session_uid]
         return None
@@ -121,11 +121,17 @@ def read(scene: bpy.types.Scene) -> Analysis:
     InputError
         If the shot could not be baked either; names what is wrong and the remedy.
     """
+    return jobs.run(reading(scene))
+
+
+def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
+    """What `read` does, in steps."""
     analysis = current(scene)
     if analysis is None:
         wanted = settings_of(scene)
-        shot = jobs.run(read_shot(scene, wanted))
-        analysis = _keep(scene, wanted, shot, (_source(scene, wanted),), frozenset([_hash_of(scene)]))
+        shot = yield from read_shot(scene, wanted)
+        source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
+        analysis = yield from _keep(scene, wanted, shot, (source,), hashes)
     return analysis
 
 
@@ -204,9 +210,9 @@ def _simulated_depth(wanted: BakeSettings, analysis: Analysis) -> float:
 
 def _keep(
     scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
-) -> Analysis:
+) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on."""
-    loads = jobs.run(estimate_shot(wanted, shot))
+    loads = yield from estimate_shot(wanted, shot)
     stances = stance_loads(loads, shot.terrain, wanted.cell_size_m, shot.variation)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, stances, pressed_area(loads))
     _known[scene.session_uid] = analysis

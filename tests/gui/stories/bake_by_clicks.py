@@ -22,6 +22,8 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.picture("panel_start", of="UI", in_docs=False)
 
     yield from hand.press_button("softground.add_character")
+    yield 0.2
+    yield from hand.wait_for(lambda: not session().is_baking, 60)
     facts["characters"] = [character.name for character in scene().softground.characters]
     facts["soles"] = [sole.name for sole in scene().softground.characters[0].soles]
     yield from hand.move(*hand.middle())  # the panels move to their places as events come

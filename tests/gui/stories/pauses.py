@@ -25,6 +25,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.frame_all()
     run(hand, bpy.ops.softground.add_character)
     yield 1.0
+    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     facts["window"] = (hand.window.width, hand.window.height)
     facts["drawing the window"], facts["bakes"] = [], []
     for _ in range(BAKES):

@@ -14,6 +14,8 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     open_walk(96)
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.add_character")
+    yield 0.2
+    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield from hand.press_button("softground.create_ground")
     yield 0.3
     facts["ground"] = scene().softground.ground.name
