@@ -1,20 +1,31 @@
 """Whatever is in a preset, a manifest, a record or a command line: a result or a clear error, and no changed file."""
 
+import contextlib
 import io
 import json
 import string
+import struct
+import tracemalloc
+import warnings
 import zipfile
+from unittest.mock import MagicMock
 
 import bpy
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from softground_addon.batch import manifest
+from softground_addon.blender import handlers, jobs
+from softground_addon.blender.baking import bake_job, bake_report
 from softground_addon.blender.command_line import cli
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.interface import panels, response_panel
+from softground_addon.blender.response import response_job
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
+from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record import record
 from tests.blender import shots
 
@@ -126,6 +137,215 @@ def test_no_record_makes_a_traceback(count, stored):
         assert all(footprint.max_depth_m >= 0 for footprint in loaded.footprints)
 
     each(mutated(stored) | inside, count, check)
+
+
+NUMBERS = (0.0, -1.0, 1e-300, 1e300, 2.0**31 - 1, -(2.0**31), 2.0**53, float("nan"), float("inf"), 1e9)
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+
+
+def numbers_of(member):
+    """The numbers of an array of the record, and its header."""
+    start = 10 + int.from_bytes(member[8:10], "little")
+    kind = np.int32 if b"<i4" in member[:start] else np.float64
+    return np.frombuffer(member, kind, offset=start).copy(), member[:start]
+
+
+def forged_array(member):
+    """The array with some of its numbers replaced, all of them, or fewer or more of them than it says."""
+    values, header = numbers_of(member)
+
+    def with_number(at_and_value):
+        at, value = at_and_value
+        changed = values.copy()
+        with np.errstate(invalid="ignore"):
+            changed[at] = np.float64(value).astype(values.dtype)
+        return header + changed.tobytes()
+
+    where = st.integers(0, max(0, len(values) - 1)).map(lambda at: slice(at, at + 1)) | st.just(slice(None))
+    numbers = st.sampled_from(NUMBERS) | st.floats() | st.integers(-10, 10).map(float)
+    kinds = st.sampled_from(["<f8", "<i4", "<c16", "|O", "<M8[s]", "|S8", "<f2", "|b1", "<U2", "<u8"])
+    return st.one_of(
+        st.tuples(where, numbers).map(with_number),
+        kinds.map(lambda kind: header.replace(b"<f8", kind.encode()).replace(b"<i4", kind.encode()) + values.tobytes()),
+        st.integers(0, 64).map(lambda count: header + bytes(count)),
+    )
+
+
+def forged_text(member):
+    """The record's text with a value anywhere in it replaced, or taken away."""
+    odd = st.sampled_from([None, True, -1, 1e300, "", "x", [], {}, [[]], {"a": 1}, 10**400, "\ud800"])
+    text = json.loads(member)
+
+    def places(value, path=()):
+        yield path
+        for key, inner in (
+            value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        ):
+            yield from places(inner, (*path, key))
+
+    def replaced(at_and_value):
+        (*path, last), value, gone = at_and_value
+        changed = inner = json.loads(member)
+        for key in path:
+            inner = inner[key]
+        if gone:
+            del inner[last]
+        else:
+            inner[last] = value
+        return json.dumps(changed).encode()
+
+    somewhere = st.sampled_from([path for path in places(text) if path])
+    return st.tuples(somewhere, odd, st.booleans()).map(replaced) | odd.map(lambda value: json.dumps(value).encode())
+
+
+def forged_by_member(stored):
+    """Records of which one part is forged, compressed in some way, beside another one that no record has."""
+    with zipfile.ZipFile(io.BytesIO(stored)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+
+    def put_together(parts):
+        name, change, method, extra, copies = parts
+        buffer = io.BytesIO()
+        with warnings.catch_warnings(), zipfile.ZipFile(buffer, "w", method) as target:
+            warnings.simplefilter("ignore")  # two parts of one name
+            for member, content in members.items():
+                for _ in range(copies if member == name else 1):
+                    target.writestr(member, change if member == name else content)
+            for one in extra:
+                target.writestr(one, bytes(1000))
+        return buffer.getvalue()
+
+    changed = st.sampled_from(sorted(members)).flatmap(
+        lambda name: st.tuples(
+            st.just(name),
+            forged_array(members[name]) if name.endswith(".npy") else forged_text(members[name]),
+            st.sampled_from((*METHODS[1:2] * 6, *METHODS)),
+            st.sampled_from([(), (), (), ("extra.npy",), ("../../x",)]),
+            st.sampled_from([1, 1, 1, 0, 2]),
+        )
+    )
+    return changed.map(put_together)
+
+
+@counts(20_000)
+@pytest.mark.timeout(3600)
+def test_a_record_forged_by_member_is_read_within_its_bounds_or_refused(count, stored):
+    def check(content):
+        try:
+            loaded = record.load(content)
+        except InputError:
+            return
+        footprints, about = loaded.footprints, loaded.about
+        vertex_histories(footprints, np.zeros(1), np.zeros(1), blur_sigma=0.005)
+        for footprint in footprints:
+            assert 1e-5 <= footprint.cell_size <= 10
+            assert footprint.frame_step >= 1e-3
+        with contextlib.suppress(InputError):
+            assert 0.0 <= baked_ground.baked_with(about, "blur_sigma") <= 1.0
+
+    each(forged_by_member(stored), count, check)
+
+
+def bomb(stored, method, announced=None):
+    """The record with a part more, of a gigabyte of zeros in little space, which may announce another size."""
+    buffer = io.BytesIO(stored)
+    with zipfile.ZipFile(buffer, "a", method) as archive, archive.open("more.npy", "w", force_zip64=True) as member:
+        for _ in range(64):
+            member.write(bytes(2**24))
+    content = buffer.getvalue()
+    size = struct.pack("<I", 2**30)
+    assert size in content
+    return content if announced is None else content.replace(size, struct.pack("<I", announced))
+
+
+@pytest.mark.parametrize("announced", [None, 1000])
+def test_an_unused_part_that_unpacks_to_a_gigabyte_takes_no_memory(stored, announced):
+    content = bomb(stored, zipfile.ZIP_DEFLATED, announced)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="clear the bake"):
+            record.load(content)
+        assert tracemalloc.get_traced_memory()[1] < 5e7
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("method", METHODS[2:])
+def test_parts_compressed_in_other_ways_are_refused(stored, method):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(stored)) as source, zipfile.ZipFile(buffer, "w", method) as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+    content = bytearray(buffer.getvalue())
+    content[80] ^= 0xFF  # which lzma says in its own way
+    for forged in (buffer.getvalue(), bytes(content)):
+        with pytest.raises(InputError, match="damaged"):
+            record.load(forged)
+
+
+@pytest.fixture
+def forgeable(scene):
+    """A bake on a ground and a response on its character, with all that keeps them apart from the meshes."""
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size, scene.softground.grounding.use = 0.05, True
+    jobs.run(bake_job.bake(scene))
+    mesh = scene.softground.ground.data
+    armature = scene.softground.characters[0].armature
+    strip = next(strip for track in armature.animation_data.nla_tracks for strip in track.strips if strip.action)
+    return scene, mesh, strip.action
+
+
+PROPERTY_VALUES = st.one_of(
+    st.sampled_from([0, -1, 2**31 - 1, 1e300, float("nan"), "", "x", "[]", "{}", '{"?:x": "1"}', "[[", "[" * 5000]),
+    st.sampled_from([[1, 2], [0.5], {}, {"steps": "many"}, {"steps": 1, "max_depth_m": float("inf")}, True, b"x"]),
+    st.sampled_from(
+        ['{"settings": []}', '{"version": "4.5", "future:Walker": "9"}', '[{"frame": null}]', '["gap_mm"]']
+    ),
+    st.text(max_size=8).filter(lambda text: "\0" not in text),
+)
+
+
+@counts(5000)
+@pytest.mark.timeout(3600)
+def test_no_stored_property_makes_a_traceback(count, forgeable):
+    scene, mesh, action = forgeable
+    names = [(mesh, name) for name in ground_mesh.PROPERTIES]
+    names += [(action, name) for name in (response_job.CARRIER, response_job.SPEED, response_job.WORST)]
+    kept = {(owner.name, name): owner[name] for owner, name in names if owner.get(name) is not None}
+    kept = {
+        key: value
+        if isinstance(value, str | float)
+        else value.to_dict()
+        if hasattr(value, "to_dict")
+        else value.to_list()
+        for key, value in kept.items()
+    }
+
+    def check(forged):
+        (owner, name), value = forged
+        before = kept.get((owner.name, name))
+        owner[name] = value
+        try:
+            assert isinstance(bake_report.stale_reasons(scene), tuple)
+            assert handlers.compare_bake() is None
+            for panel in (panels.SOFTGROUND_PT_bake, response_panel.SOFTGROUND_PT_response):
+                panel.draw(drawn(), bpy.context)
+            with contextlib.suppress(InputError):
+                baked_ground.load(scene.softground.ground)
+        finally:
+            del owner[name]
+            if before is not None:
+                owner[name] = before
+
+    each(st.tuples(st.sampled_from(names), PROPERTY_VALUES), count, check)
+
+
+def drawn():
+    """A panel whose layout takes whatever is drawn."""
+    panel = MagicMock()
+    panel.layout.operator.return_value = MagicMock()
+    return panel
 
 
 OPTIONS = (

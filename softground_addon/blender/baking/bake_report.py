@@ -14,7 +14,7 @@ from ...core.loads.missed_steps import advice, missed_steps
 from ...core.loads.sliding import treadmill_speed
 from ...core.record.footprints import Footprint
 from .. import properties, settings
-from ..ground import still_ground
+from ..ground import ground_mesh, still_ground
 from ..jobs import STAGES
 from ..reading import staleness
 from ..response import response_job
@@ -100,7 +100,7 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
     """What the panel shows of a bake."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
-    shown = {key: totals[key] for key in ("steps", "max_depth_m", "peak_force_n")}
+    shown = {key: totals[key] for key in ground_mesh.SHOWN}
     return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"])}
 
 

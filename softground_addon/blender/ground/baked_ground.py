@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.ground.material import MATERIAL_RANGES
 from ...core.playback.playback_curves import Spans
 from ...core.record import record
 from ...core.record.edits import StepEdit
@@ -199,11 +200,13 @@ def baked_with(about: dict[str, Any], value: str) -> float:
     Raises
     ------
     InputError
-        If the record does not say.
+        If the record does not say, or says what no material has.
     """
+    least, most = MATERIAL_RANGES[value]
     try:
-        return float(about["inputs"]["material"][value])
-    except (KeyError, TypeError, ValueError):
-        raise InputError(
-            "The stored record of the footprints lacks its material: clear the bake and bake again."
-        ) from None
+        number = float(about["inputs"]["material"][value])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        number = float("nan")
+    if not least <= number <= most:
+        raise InputError(f"The stored record of the footprints lacks its {value}: clear the bake and bake again.")
+    return number

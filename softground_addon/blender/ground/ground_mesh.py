@@ -7,6 +7,7 @@ footprints (`mesh["softground_record"]`). `restore` takes all of it away again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,6 +40,8 @@ SOLE = "softground_sole"
 """Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
 RECORD = "softground_record"
 SUMMARY = "softground_summary"
+SHOWN = ("steps", "max_depth_m", "peak_force_n")
+"""Numbers that every summary has."""
 WARNINGS = "softground_warnings"
 PROPERTIES = (RECORD, SUMMARY, WARNINGS, "softground_fingerprints")
 """Properties of a mesh that carries a bake."""
@@ -127,7 +130,9 @@ def has_remains(ground: bpy.types.Object) -> bool:
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
     """What the bake that is on this ground came to, for display; empty if there is none, or something else there."""
     summary = mesh_of(ground).get(SUMMARY) if ground.type == "MESH" else None
-    return summary.to_dict() if hasattr(summary, "to_dict") else {}
+    values = summary.to_dict() if hasattr(summary, "to_dict") else {}
+    numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in values.values())
+    return values if numbers and values.keys() >= set(SHOWN) else {}
 
 
 def note_warnings(ground: bpy.types.Object, warnings: Sequence[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import bpy
@@ -87,7 +86,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
         scene = settings.scene_of(context)
         character = active_character(scene)
         assert character is not None
-        settings.slow_down(scene, float(nla_layer.notes_of(character.armature).get(response_job.SPEED, "1")))
+        settings.slow_down(scene, response_job.speed_in(nla_layer.notes_of(character.armature)))
         return {"FINISHED"}
 
 
@@ -136,14 +135,14 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")
     row.label(text=notes.get(response_job.CARRIER, ""), translate=False)
-    speed = f"{float(notes.get(response_job.SPEED, '1')):.0%}"
+    speed = f"{response_job.speed_in(notes):.0%}"
     row = box.split(factor=0.72)
     row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
-    for gap in json.loads(notes.get(response_job.WORST, "[]"))[:_SHOWN]:
-        if abs(gap["gap_mm"]) >= response_job.NOTICEABLE_GAP_MM:
-            shown = f"Frame {gap['frame']:g}: {gap['gap_mm']:.1f} mm under {gap['contact']}"
-            box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = gap["frame"]
+    for frame, gap_mm, sole in response_job.worst_gaps_in(notes)[:_SHOWN]:
+        if abs(gap_mm) >= response_job.NOTICEABLE_GAP_MM:
+            shown = f"Frame {frame:g}: {gap_mm:.1f} mm under {sole}"
+            box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = frame
 
 
 CLASSES = (

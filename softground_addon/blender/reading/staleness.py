@@ -33,6 +33,8 @@ _WRITING = "writing"
 _OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
+_UNKNOWN = "The bake does not say what it was made from"
+
 _OF_0_1 = (
     *("ground", "characters", "preset", "material", "pressure", "painted", "cell_size_m", "frames"),
     *("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "response"),
@@ -84,8 +86,8 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         left_out = (VERSION,) if then.get(VERSION) == SERIES else _OF_VERSION
         told = (key for key in then if key.partition(":")[0] not in left_out)  # earlier bakes tell of less
         changed = [key for key in told if then[key] != now.get(key)]
-    except (KeyError, TypeError, ValueError, AttributeError):
-        return ("The bake does not say what it was made from",)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
+        return (_UNKNOWN,)
     texts = {
         SETTINGS: "The settings have changed",
         _WRITING: "The settings have changed",
@@ -101,7 +103,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     }
     kinds = (key.partition(":") for key in changed)
     return tuple(
-        dict.fromkeys(texts[kind] if kind in texts else of_things[kind].format(name) for kind, _, name in kinds)
+        dict.fromkeys(texts.get(kind) or of_things.get(kind, _UNKNOWN).format(name) for kind, _, name in kinds)
     )
 
 

@@ -180,6 +180,24 @@ WORST = "softground_worst_gaps"
 """Note of the frames where a gap is left, as JSON."""
 
 
+def speed_in(notes: Mapping[str, str]) -> float:
+    """The suggested speed in the notes of a layer; 1 where none is noted, or something else."""
+    try:
+        speed = float(notes[SPEED])
+    except (KeyError, ValueError):
+        return 1.0
+    return speed if 0.01 <= speed <= 10.0 else 1.0
+
+
+def worst_gaps_in(notes: Mapping[str, str]) -> list[tuple[float, float, str]]:
+    """Frame, gap [mm] and sole of what is noted with a layer as left; nothing where something else is noted."""
+    try:
+        gaps = json.loads(notes[WORST])
+        return [(float(gap["frame"]), float(gap["gap_mm"]), str(gap["contact"])) for gap in gaps]
+    except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
+        return []
+
+
 def _notes(carrier: str, answer: CharacterResponse) -> dict[str, str]:
     return {
         CARRIER: carrier,

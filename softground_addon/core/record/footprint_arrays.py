@@ -40,6 +40,18 @@ _SERIES = {
         for name in ("frames", "first", "cells", "amounts")
     },
 }
+ARRAYS = ("numbers", *_VECTORS, *_SERIES, *(f"{key}.count" for key in _SERIES))
+"""Names of the arrays that a record is stored as."""
+
+_RANGES = {
+    "cell_size": (1e-5, 10.0),  # [m], around what can be set
+    "frame_step": (1e-3, 1e3),
+    "start_frame": (-1e7, 1e7),  # beyond the 1,048,574 frames that Blender counts
+    "end_frame": (-1e7, 1e7),
+    "area_m2": (0.0, 1e9),
+    "peak_force_n": (0.0, 1e15),
+}
+"""Between what a footprint's numbers are: what is far from it would only fill the memory."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +141,7 @@ def _sized(arrays: Mapping[str, Any], key: str, size: int, kind: type) -> NDArra
     values = np.ravel(arrays[key])
     if len(values) != size:
         raise ValueError(f"{key} has {len(values)} values where {size} are announced")
-    if not np.isfinite(values).all() or (values.astype(kind) != values).any():
+    if values.dtype != kind or not np.isfinite(values).all():
         raise ValueError(f"{key} holds what is no number of its kind")
     return values.astype(kind)
 
@@ -146,12 +158,15 @@ def _footprint(name: Mapping[str, str], values: Mapping[str, NDArray[Any]]) -> F
 SPARSEST = 1000
 SPARE_CELLS = 2**20
 """Most cells of a window for each change in it, and on top of that: windows beyond would only fill the memory."""
+LONGEST_PAUSE = 10
+"""Most recorded frames that a footprint's changes span, for each that has a change or a load."""
 
 
 def _check(footprint: Footprint) -> None:
     """Raise ValueError where the parts of a footprint contradict each other."""
+    _check_ranges(footprint)
     cells = footprint.window.cells
-    if footprint.window.columns < 1 or footprint.window.rows < 1 or footprint.cell_size <= 0:
+    if footprint.window.columns < 1 or footprint.window.rows < 1:
         raise ValueError("a footprint has no cells")
     recorded = sum(map(len, (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells)))
     if cells > SPARSEST * recorded + SPARE_CELLS:
@@ -172,3 +187,14 @@ def _check(footprint: Footprint) -> None:
     contacts = footprint.contact_cells
     if len(contacts) and not 0 <= contacts.min() <= contacts.max() < cells:
         raise ValueError("a contact lies outside its window")
+
+
+def _check_ranges(footprint: Footprint) -> None:
+    """Raise ValueError where a footprint's numbers, or its frames, are far from what they can be."""
+    for name, (least, most) in _RANGES.items():
+        if not least <= getattr(footprint, name) <= most:
+            raise ValueError(f"{name} is {getattr(footprint, name):g}")
+    frames = np.concatenate([footprint.compression.frames, footprint.rim.frames])
+    longest = LONGEST_PAUSE * (len(frames) + len(footprint.load_frames)) * footprint.frame_step
+    if len(frames) and np.ptp(frames) > longest:
+        raise ValueError("frames are too far apart")

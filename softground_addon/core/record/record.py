@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..numerics.slices import Slices, sliced
+from . import archive as members
 from . import edits as step_edits
-from .footprint_arrays import from_arrays, to_parts
+from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
 
 FORMAT = 2
@@ -36,7 +37,14 @@ MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout
 
 _TEXT = "record.json"
 _DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError),  # of the archive: also "encrypted"
+    *(
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        RuntimeError,
+        OverflowError,
+    ),  # of the archive: "encrypted" too
     *(KeyError, ValueError, TypeError),  # of the text; too deep a nesting is a RuntimeError
     *(SyntaxError, tokenize.TokenError, MemoryError),  # of an array's header: what numpy cannot read, and absurd sizes
 )
@@ -110,18 +118,17 @@ def load(content: bytes) -> BakeRecord:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            text = json.loads(archive.read(_TEXT))
+            members.check_directory(archive, len(content))
+            text = json.loads(members.read(archive, _TEXT, members.LARGEST_TEXT))
             version = text["format"]
             if version != FORMAT and version not in MIGRATIONS:
                 raise InputError(
                     f"The stored record of the footprints is of version {version}; this SoftGround reads versions up "
                     f"to {FORMAT}: bake again, or update SoftGround."
                 )
-            arrays = {
-                name.removesuffix(".npy"): np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
-                for name in archive.namelist()
-                if name.endswith(".npy")
-            }
+            if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
+                raise ValueError("it has parts that no record has")
+            arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in ARRAYS}
         for older in range(version, FORMAT):
             text, arrays = MIGRATIONS[older](text, arrays)
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
