@@ -82,8 +82,8 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             stored,
             unit_scale=made_with.unit_scale_m,
             shape_keys=made_with.shape_keys,
+            marks=marks,
         )
-        ground_mesh.write_soles(carrier, place.index, marks)
         name, error, show = place.carrier, spans.error, place.publish if place.is_draft else None
         del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
         if show:

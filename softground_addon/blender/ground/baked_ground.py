@@ -119,6 +119,7 @@ def write(
     *,
     unit_scale: float,
     shape_keys: bool = True,
+    marks: Array | None = None,
 ) -> Job[bpy.types.Object]:
     """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
 
@@ -140,17 +141,26 @@ def write(
         Metres per Blender unit.
     shape_keys : bool
         See `ground_mesh.write`.
+    marks : (K, 3) float array, optional
+        See `ground_mesh.write_soles`.
     """
     found(table)  # or nothing is written
+    ground_checks.check_playable(found(place.carrier))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
     up = ground_mesh.up_of(found(place.carrier), unit_scale)
     if not place.is_draft:
         place.publish()
-    ground_mesh.write(found(place.carrier), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
-    if place.is_draft:
-        yield Progress("write", 0.9)
-    carrier = found(place.carrier)
-    playback.attach(carrier, place.index[spans.point], spans, found(table), up=up)
+    try:
+        ground_mesh.write(found(place.carrier), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+        if place.is_draft:
+            yield Progress("write", 0.9)
+        carrier = found(place.carrier)
+        playback.attach(carrier, place.index[spans.point], spans, found(table), up=up)
+        ground_mesh.write_soles(carrier, place.index, marks)
+    except BaseException:
+        if not place.is_draft:  # which whoever made it takes away
+            ground_mesh.restore(found(place.carrier))
+        raise
     return carrier
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import InputError
-from . import ground_mesh, still_ground, trail_detail
+from . import ground_mesh, own_data, playback, still_ground, trail_detail
 
 
 def check_writable(ground: bpy.types.Object) -> None:
@@ -22,10 +22,21 @@ def check_writable(ground: bpy.types.Object) -> None:
         raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
 
 
+def check_playable(carrier: bpy.types.Object) -> None:
+    """Raise InputError, naming the modifier, if no playback could come before this object's modifiers."""
+    if barrier := playback.barrier_on(carrier):
+        raise InputError(
+            f"The modifier '{barrier.name}' of '{carrier.name}' lets nothing play before it: apply it, or take it off."
+        )
+
+
 def check_usable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
-    for thing in filter(None, (ground, trail_detail.detail_of(ground))):
+    detail = trail_detail.detail_of(ground)
+    for thing in filter(None, (ground, detail)):
         check_writable(thing)
+    if detail:
+        check_playable(detail)
     name = ground.name
     mesh = ground_mesh.mesh_of(ground)
     if mesh.users - mesh.use_fake_user > 1:
@@ -39,6 +50,11 @@ def check_usable(ground: bpy.types.Object) -> None:
         raise InputError(
             f"Ground '{name}' has shape keys of its own: apply them (Object > Apply > Visual Geometry to Mesh), or "
             "choose a copy without them."
+        )
+    if taken := own_data.users_own(mesh):
+        raise InputError(
+            f"Ground '{name}' has data of its own called '{taken[0]}', which a bake would need: give it another name "
+            "(Object Data > Attributes, or Custom Properties), or choose a copy without it."
         )
     if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
         raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import cast
 
 import bpy
 import numpy as np
@@ -26,25 +26,15 @@ from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
-from . import display_key, painted_ground, playback
+from . import display_key, own_data, painted_ground, playback
+from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUMMARY, WARNINGS
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-REST = "softground_rest"
-COMPRESSION = "softground_compression"
-RIM = "softground_rim"
-AGE = "softground_age"
 SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
-SOLE = "softground_sole"
-"""Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
-RECORD = "softground_record"
-SUMMARY = "softground_summary"
 SHOWN = ("steps", "max_depth_m", "peak_force_n")
 """Numbers that every summary has."""
-WARNINGS = "softground_warnings"
-PROPERTIES = (RECORD, SUMMARY, WARNINGS, "softground_fingerprints")
-"""Properties of a mesh that carries a bake."""
 
 _BY_PARTS = ("BONE", "VERTEX", "VERTEX_3")
 """Ways in which an object hangs on a part of its parent, which may lie elsewhere than the parent."""
@@ -119,12 +109,12 @@ def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 def is_baked(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground."""
-    return ground.type == "MESH" and REST in mesh_of(ground).attributes and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
+    return has_remains(ground) and RECORD in mesh_of(ground).keys()  # noqa: SIM118  (an ID is no mapping)
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground, or at least what a bake would take away again."""
-    return ground.type == "MESH" and REST in mesh_of(ground).attributes
+    return ground.type == "MESH" and REST in own_data.made(mesh_of(ground))
 
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
@@ -293,7 +283,7 @@ def write(
     """
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
-    kept = _attribute(mesh, REST, "FLOAT_VECTOR")
+    kept = own_data.attribute(mesh, REST, "FLOAT_VECTOR")
     kept.data.foreach_set("vector", rest.ravel())
     up = up_of(ground, unit_scale)
     raw, display = rest.copy(), rest.copy()
@@ -311,7 +301,7 @@ def write(
     ):
         whole = np.full(len(mesh.vertices), default, dtype=np.float32)
         whole[index] = values
-        attribute = _attribute(mesh, name, "FLOAT")
+        attribute = own_data.attribute(mesh, name, "FLOAT")
         attribute.data.foreach_set("value", whole)
     # Numbers, not bytes: Blender's Alembic exporter ends the program on bytes that hold a zero.
     mesh.pop(RECORD, None)  # an array that is there would keep its length
@@ -323,12 +313,11 @@ def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -
     """Say of vertices (K,) where under a sole they lay, (K, 3) as in `SOLE`, and of all others that under none."""
     mesh = mesh_of(ground)
     if marks is None:
-        if SOLE in mesh.attributes:
-            mesh.attributes.remove(mesh.attributes[SOLE])
+        own_data.remove(mesh, [SOLE])
         return
     whole = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     whole[index] = marks
-    attribute = _attribute(mesh, SOLE, "FLOAT_VECTOR")
+    attribute = own_data.attribute(mesh, SOLE, "FLOAT_VECTOR")
     attribute.data.foreach_set("vector", whole.ravel())
 
 
@@ -359,9 +348,7 @@ def restore(ground: bpy.types.Object) -> None:
     rest = rest_positions(mesh)
     playback.remove(ground)
     display_key.take_off(ground, rest)
-    for name in (REST, *SHADING_ATTRIBUTES, SOLE):
-        if name in mesh.attributes:
-            mesh.attributes.remove(mesh.attributes[name])
+    own_data.remove(mesh, own_data.ATTRIBUTES)
     for key in PROPERTIES:
         mesh.pop(key, None)
     write_positions(mesh, rest)
@@ -377,25 +364,12 @@ def discard(ground: bpy.types.Object) -> None:
         bpy.data.meshes.remove(mesh)
 
 
-def _attribute(mesh: bpy.types.Mesh, name: str, kind: Literal["FLOAT", "FLOAT_VECTOR"]) -> Any:
-    """A point attribute, new unless there is one of that kind; the one that the user has active stays so."""
-    there = mesh.attributes.get(name)
-    if there and (there.domain, there.data_type) == ("POINT", kind):
-        return there
-    if there:
-        mesh.attributes.remove(there)
-    active = mesh.attributes.active_index
-    attribute = mesh.attributes.new(name, kind, "POINT")
-    mesh.attributes.active_index = active
-    return mesh.attributes[attribute.name]
-
-
 def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Positions without the bake, (V, 3) in the object's own space and units.
 
     Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
     """
-    attribute = mesh.attributes.get(REST)
+    attribute = mesh.attributes[REST] if REST in own_data.made(mesh) else None
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return mesh_arrays.positions(mesh)
     kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)

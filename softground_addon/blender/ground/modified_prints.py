@@ -10,7 +10,7 @@ from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from .. import mesh_arrays
-from . import ground_mesh
+from . import ground_mesh, playback
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -28,7 +28,7 @@ MARGIN = 0.1
 def are_undone(
     ground: bpy.types.Object, vertices: Array, moved: Indices, terrain: Terrain, *, unit_scale: float, detail: str
 ) -> bool:
-    """Whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does.
+    """Whether the ground's modifiers put back what a bake moves, as a Shrinkwrap does, or would not let it play.
 
     Parameters
     ----------
@@ -49,6 +49,13 @@ def are_undone(
     InputError
         If they do, and there may be no copy.
     """
+    if barrier := playback.barrier_on(ground):
+        if detail == "NEVER":
+            raise InputError(
+                f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: set Detail to "
+                "Automatic in the Ground panel, or apply it."
+            )
+        return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
         return False
     to_world = ground_mesh.to_world_of(ground, unit_scale)
@@ -72,6 +79,12 @@ def are_undone(
 
 def undone_warning(ground: bpy.types.Object) -> str:
     """What to tell the user of such a ground."""
+    if barrier := playback.barrier_on(ground):
+        return (
+            f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: a copy without it, "
+            f"'{ground.name} Trail', takes the prints. To have them on '{ground.name}' itself, clear the bake and "
+            "apply it."
+        )
     return (
         f"The modifiers of ground '{ground.name}' undo prints on it: a copy without them, '{ground.name} Trail', takes "
         f"the prints. To have them on '{ground.name}' itself, clear the bake and apply the modifiers."

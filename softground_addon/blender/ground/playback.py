@@ -14,6 +14,7 @@ from ...core.playback.keyframe_tables import NO_VISIT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
 from ..settings import find, found, name_of
+from . import own_data
 from . import playback_nodes as nodes
 
 Array = NDArray[np.float64]
@@ -23,16 +24,6 @@ MODIFIER = "SoftGround Playback"
 
 TABLE = "SoftGround KeyframeTables"
 
-_ATTRIBUTES = (
-    nodes.MOVED,
-    nodes.START,
-    nodes.END,
-    nodes.SPLINE,
-    nodes.OFFSET,
-    nodes.LAST_HEIGHT,
-    nodes.LAST_CONTACT,
-    nodes.PRESSURE,
-)
 _TYPE = {"FLOAT": np.float32, "INT": np.int32, "BOOLEAN": np.bool_}
 
 FEW = 1 / 64
@@ -92,6 +83,15 @@ def attach(
     return modifier
 
 
+NEED_THE_MESH = ("MULTIRES", "SOFT_BODY")
+"""Modifiers that take the mesh as it is, and let Blender put none that makes geometry before them."""
+
+
+def barrier_on(ground: bpy.types.Object) -> bpy.types.Modifier | None:
+    """A modifier that keeps the playback from coming first, as it must."""
+    return next((modifier for modifier in ground.modifiers if modifier.type in NEED_THE_MESH), None)
+
+
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     """The ground's playback, whatever the names of the modifier and its node group have become."""
     for modifier in ground.modifiers:
@@ -110,9 +110,7 @@ def remove(ground: bpy.types.Object) -> None:
             shown.modifiers.remove(modifier)
     for group in [one for one in bpy.data.node_groups if nodes.is_playback(one) and not (one.users or one.library)]:
         _remove_group(group)  # also of a modifier that the user has deleted
-    for name in [attribute.name for attribute in mesh.attributes]:
-        if is_playback_attribute(name):
-            mesh.attributes.remove(mesh.attributes[name])
+    own_data.remove(mesh, own_data.OF_PLAYBACK)
 
 
 def _remove_group(group: bpy.types.NodeTree) -> None:
@@ -126,11 +124,6 @@ def _remove_table(table: bpy.types.Object) -> None:
     splines: Any = table.data
     bpy.data.objects.remove(table)
     bpy.data.hair_curves.remove(splines)
-
-
-def is_playback_attribute(name: str) -> bool:
-    """Whether an attribute of this name belongs to the playback."""
-    return name in _ATTRIBUTES
 
 
 def moves(mesh: bpy.types.Mesh) -> NDArray[np.bool_] | None:
@@ -151,7 +144,6 @@ def moved_vertices(mesh: bpy.types.Mesh) -> Indices:
 
 def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> None:
     """Store of which vertices (P,) the spans are."""
-    active = mesh.attributes.active_index
     for name, kind, values, elsewhere in (
         (nodes.MOVED, "BOOLEAN", True, False),
         (nodes.START, "FLOAT", spans.start, -NO_VISIT),
@@ -165,8 +157,7 @@ def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> No
     ):
         whole = np.full(len(mesh.vertices), elsewhere, dtype=_TYPE[kind])
         whole[vertex] = values
-        _store(mesh, name, kind, whole)
-    mesh.attributes.active_index = active  # the one that the user has active stays so
+        own_data.attribute(mesh, name, kind).data.foreach_set("value", whole)
 
 
 def _table_object(lines: PlaybackCurves) -> bpy.types.Object:

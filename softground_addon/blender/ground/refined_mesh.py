@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.meshing.refinement import Refinement, Surface
 from .. import mesh_arrays
+from . import own_data
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -132,7 +133,7 @@ def _copy_vertex_groups(
 
 
 def _comes_along(name: str) -> bool:
-    return name == SEAM or not (name.startswith((".", "softground_")) or name in NOT_COPIED)
+    return name == SEAM or not (name.startswith(".") or name in NOT_COPIED or name in own_data.ATTRIBUTES)
 
 
 def _add_loose_edges(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
-from ..ground import baked_ground, display_key, ground_mesh, playback
+from ..ground import baked_ground, display_key, ground_mesh, own_data, playback
 
 
 def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
@@ -120,16 +120,14 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     mesh = ground_mesh.mesh_of(carrier).copy()
     display_key.drop_all(mesh)
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
+    own_data.remove(mesh, (own_data.REST, *own_data.OF_PLAYBACK))  # those for shading stay
     if any(item.show_viewport for item in ground_mesh.users_modifiers(carrier)):
         with ground_mesh.stand_in(carrier, mesh) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
         mesh.name = plain.name
         bpy.data.meshes.remove(plain)
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
-    for name in [attribute.name for attribute in mesh.attributes]:
-        if name == ground_mesh.REST or playback.is_playback_attribute(name):
-            mesh.attributes.remove(mesh.attributes[name])
-    for key in ground_mesh.PROPERTIES:
+    for key in own_data.PROPERTIES:
         mesh.pop(key, None)
     still.matrix_world = Matrix(ground_mesh.to_world_of(carrier, 1.0).tolist())
     scene.collection.objects.link(still)

@@ -20,10 +20,8 @@ from ..characters.sole_extraction import meshes_on
 from ..compat import SERIES
 from ..ground import ground_mesh, painted_ground, playback
 from ..ground.baked_ground import carrier_of
+from ..ground.own_data import FINGERPRINTS
 from . import input_hashes
-
-FINGERPRINTS = "softground_fingerprints"
-"""Property of the mesh that carries a bake: what it was made from, as JSON."""
 
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
 ANIMATION, PLACE, MOVEMENT, BODY = "animation", "place", "movement", "body"

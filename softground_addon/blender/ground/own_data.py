@@ -1,0 +1,76 @@
+"""Which attributes and properties of a mesh a bake has made: a user may have data of the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+import bpy
+
+from . import playback_nodes as nodes
+
+REST = "softground_rest"
+COMPRESSION = "softground_compression"
+RIM = "softground_rim"
+AGE = "softground_age"
+SOLE = "softground_sole"
+"""Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
+OF_PLAYBACK = (
+    nodes.MOVED,
+    nodes.START,
+    nodes.END,
+    nodes.SPLINE,
+    nodes.OFFSET,
+    nodes.LAST_HEIGHT,
+    nodes.LAST_CONTACT,
+    nodes.PRESSURE,
+)
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, *OF_PLAYBACK)
+
+RECORD = "softground_record"
+SUMMARY = "softground_summary"
+WARNINGS = "softground_warnings"
+FINGERPRINTS = "softground_fingerprints"
+"""What a bake was made from, as JSON."""
+MADE = "softground_made"
+"""Property of a mesh that carries a bake: the names of the attributes that the bake has made, in lines."""
+PROPERTIES = (RECORD, SUMMARY, WARNINGS, FINGERPRINTS, MADE)
+"""Properties of a mesh that carries a bake."""
+
+
+def made(mesh: bpy.types.Mesh) -> set[str]:
+    """Names of the attributes that a bake has made on a mesh, as far as they are still there."""
+    noted = mesh.get(MADE)
+    if noted is None:  # as version 0.1 left it, which noted nothing
+        rest = mesh.attributes.get(REST)
+        whole = rest is not None and (rest.domain, rest.data_type) == ("POINT", "FLOAT_VECTOR")
+        noted = "\n".join(ATTRIBUTES) if whole and hasattr(mesh.get(RECORD), "to_list") else ""
+    return {name for name in str(noted).split("\n") if name in ATTRIBUTES and name in mesh.attributes}
+
+
+def users_own(mesh: bpy.types.Mesh) -> list[str]:
+    """What of a mesh a bake would need for itself, and the user has made."""
+    ours = made(mesh)
+    attributes = [name for name in ATTRIBUTES if name in mesh.attributes and name not in ours]
+    return attributes if ours else [*attributes, *(name for name in PROPERTIES if name in mesh.keys())]  # noqa: SIM118
+
+
+def attribute(mesh: bpy.types.Mesh, name: str, kind: str) -> Any:
+    """A point attribute, new unless there is one of that kind; the one that the user has active stays so."""
+    ours = made(mesh)
+    there = mesh.attributes.get(name)
+    if there and (there.domain, there.data_type) == ("POINT", kind):
+        return there
+    if there:
+        mesh.attributes.remove(there)
+    active = mesh.attributes.active_index
+    mesh.attributes.new(name, cast("Any", kind), "POINT")
+    mesh.attributes.active_index = active
+    mesh[MADE] = "\n".join(sorted(ours | {name}))
+    return mesh.attributes[name]
+
+
+def remove(mesh: bpy.types.Mesh, names: Iterable[str]) -> None:
+    """Take away attributes of these names that a bake has made."""
+    for name in made(mesh).intersection(names):
+        mesh.attributes.remove(mesh.attributes[name])

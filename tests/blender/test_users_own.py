@@ -1,0 +1,124 @@
+"""What is the user's own on a ground stays so: data under a bake's names, and modifiers that none may precede."""
+
+import bpy
+import pytest
+
+from softground_addon.blender.ground import baked_ground, ground_mesh, own_data, playback
+from tests.blender import fingerprints
+from tests.blender.grounds import field, refusal
+
+FINE = {"vertices": 150, "size": 5.0}
+
+
+@pytest.mark.parametrize("name", own_data.ATTRIBUTES)
+def test_attributes_of_the_users_that_a_bake_would_need_are_named_and_stay(short_walk, name):
+    ground = field(short_walk, **FINE)
+    kind, domain = ("FLOAT_VECTOR", "POINT") if name == own_data.REST else ("INT", "FACE")
+    ground.data.attributes.new(name, kind, domain)
+    before = fingerprints.of_file()
+    for detail in ("AUTO", "ALWAYS"):
+        short_walk.softground.detail = detail
+        assert f"data of its own called '{name}'" in refusal(bpy.ops.softground.bake)
+    assert not ground_mesh.has_remains(ground)
+    baked_ground.clear(ground)
+    assert fingerprints.of_file() == before
+
+
+@pytest.mark.parametrize("name", own_data.PROPERTIES)
+def test_properties_of_the_users_that_a_bake_would_need_are_named_and_stay(short_walk, name):
+    ground = field(short_walk, **FINE)
+    ground.data[name] = "mine"
+    before = fingerprints.of_file()
+    assert f"data of its own called '{name}'" in refusal(bpy.ops.softground.bake)
+    baked_ground.clear(ground)
+    assert fingerprints.of_file() == before
+
+
+def test_what_the_user_makes_after_the_bake_under_such_a_name_stays_and_is_told_of(short_walk):
+    short_walk.softground.shape_keys = False  # without which a bake needs fewer attributes
+    ground = field(short_walk, **FINE)
+    bpy.ops.softground.bake()
+    assert baked_ground.carrier_of(ground) == ground
+    for name in (own_data.SOLE, playback.nodes.LAST_HEIGHT):
+        assert name not in ground.data.attributes
+        ground.data.attributes.new(name, "FLOAT", "POINT")
+    ground.data.attributes.new("softground_mine", "FLOAT", "POINT")
+    assert f"called '{own_data.SOLE}'" in refusal(bpy.ops.softground.bake)
+    bpy.ops.softground.clear_bake()
+    left = [name for name in ground.data.attributes.keys() if name.startswith("softground")]  # noqa: SIM118
+    assert left == [own_data.SOLE, playback.nodes.LAST_HEIGHT, "softground_mine"]
+
+
+def test_a_bake_of_version_0_1_which_noted_no_names_is_cleared_whole(short_walk):
+    ground = field(short_walk, **FINE)
+    before = fingerprints.of_file()
+    bpy.ops.softground.bake()
+    del ground.data[own_data.MADE]
+    assert ground_mesh.is_baked(ground)
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_attributes_of_the_users_come_along_to_the_copy_whatever_they_are_called(short_walk):
+    short_walk.softground.detail = "ALWAYS"
+    ground = field(short_walk, **FINE)
+    ground.data.attributes.new("softground_mine", "FLOAT", "POINT")
+    bpy.ops.softground.bake()
+    assert "softground_mine" in baked_ground.carrier_of(ground).data.attributes
+
+
+@pytest.mark.parametrize("kind", playback.NEED_THE_MESH)
+def test_a_fine_ground_whose_modifier_none_may_precede_gets_a_copy(short_walk, kind):
+    ground = field(short_walk, **FINE)
+    ground.modifiers.new("Theirs", kind)
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    short_walk.softground.detail = "NEVER"
+    assert "'Theirs' of ground 'Field' lets nothing play before it" in refusal(bpy.ops.softground.bake)
+    assert fingerprints.of_file() == before
+    short_walk.softground.detail = "AUTO"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    carrier = baked_ground.carrier_of(ground)
+    assert carrier != ground
+    assert any("lets nothing play before it" in warning for warning in ground_mesh.warnings_of(carrier))
+    bpy.ops.softground.bake()
+    carrier = baked_ground.carrier_of(ground)
+    carrier.modifiers.new("Later", kind)
+    baked = fingerprints.of_file()
+    assert "'Later' of 'Field Trail' lets nothing play before it" in refusal(bpy.ops.softground.bake)
+    assert fingerprints.of_file() == baked
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_these_are_all_the_modifiers_that_none_may_precede(scene):
+    ground = field(scene)
+    stubborn = []
+    for kind in bpy.types.Modifier.bl_rna.properties["type"].enum_items.keys():  # noqa: SIM118
+        try:
+            other = ground.modifiers.new("Theirs", kind)
+        except TypeError:  # of other kinds of objects
+            continue
+        if other is None:
+            continue
+        ground.modifiers.new("Playback", "NODES")
+        try:
+            ground.modifiers.move(1, 0)
+        except RuntimeError:
+            stubborn.append(kind)
+        ground.modifiers.clear()
+    assert sorted(stubborn) == sorted(playback.NEED_THE_MESH)
+
+
+@pytest.mark.parametrize("part", ["attach", "write_soles"])
+def test_whatever_fails_while_the_ground_is_written_it_is_given_back(short_walk, monkeypatch, part):
+    def fail(*_arguments, **_named):
+        raise MemoryError(part)
+
+    short_walk.softground.tread = 0.003
+    field(short_walk, **FINE)
+    before = fingerprints.of_file()
+    monkeypatch.setattr(playback if part == "attach" else ground_mesh, part, fail)
+    with pytest.raises(RuntimeError, match="MemoryError"):
+        bpy.ops.softground.bake()
+    assert fingerprints.of_file() == before
