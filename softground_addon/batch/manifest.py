@@ -24,6 +24,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,9 @@ DEEPEST = 10
 
 FRAME_LIMIT = 1_048_574
 """Largest frame number that Blender takes, and minus the smallest."""
+
+MOST_LOOKED_AT = 100_000
+"""Files and folders that the pattern of one shot may make us look at: a disk has millions, and a loop no end."""
 
 _FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report")
 _OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
@@ -152,9 +156,12 @@ def parse(text: str, folder: Path, origin: str, *, is_json: bool = False) -> tup
         Naming `origin`, the shot, and what is wrong with it.
     """
     try:
-        content = json.loads(text) if is_json else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin} is no {'JSON' if is_json else 'TOML'}: {error}.") from None
+        return _parsed(json.loads(text) if is_json else tomllib.loads(text), folder, origin)
+    except (ValueError, OverflowError, RecursionError) as error:  # also of values that are too long or deep to be told
+        raise InputError(f"{origin} is no {'JSON' if is_json else 'TOML'} that can be read: {error}.") from None
+
+
+def _parsed(content: object, folder: Path, origin: str) -> tuple[BatchShot, ...]:
     if not isinstance(content, dict):
         raise InputError(f"{origin} must be a table with a list 'shots'.")
     _check_keys(content, ("defaults", "shots"), origin)
@@ -199,7 +206,10 @@ def frame_range(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
     if not match:
         raise ValueError(f"'{text}' is no frame range like 1-250")
-    return int(match[1]), int(match[2])
+    first, last = int(match[1]), int(match[2])
+    if max(abs(first), abs(last)) > FRAME_LIMIT:
+        raise ValueError(f"'{text}' is no frame range: frames go from {-FRAME_LIMIT:,} to {FRAME_LIMIT:,}")
+    return first, last
 
 
 def is_file(path: Path) -> bool:
@@ -221,15 +231,51 @@ def _shots(entry: Mapping[str, Any], defaults: Mapping[str, Any], folder: Path, 
     if "name" in entry:
         raise InputError(f"{where}: a pattern's shots are named after their files; leave 'name' out.")
     pattern = _text(entry["files"], f"{where}: 'files'")
-    base = Path(folder.anchor) if Path(pattern).is_absolute() else folder
-    try:
-        found = sorted(base.glob(os.path.relpath(pattern, base) if Path(pattern).is_absolute() else pattern))
-    except (ValueError, IndexError, NotImplementedError, OSError, RecursionError) as error:
-        raise InputError(f"{where}: 'files' is {pattern!r}, which is no pattern: {error}.") from None
+    found = sorted(set(_fitting(folder, pattern, where)))
     if not found:
         raise InputError(f"{where}: no file fits the pattern {pattern!r} in '{folder}'.")
     for path in found:
         yield _shot(entry, defaults, path, folder, where)
+
+
+def _fitting(folder: Path, pattern: str, where: str) -> Iterator[Path]:
+    """The files that fit a pattern; InputError where it makes us look through `MOST_LOOKED_AT` of them."""
+    left = MOST_LOOKED_AT
+
+    def entries(inside: Path) -> Iterator[os.DirEntry[str]]:
+        nonlocal left
+        try:
+            with os.scandir(inside) as found:
+                for number, entry in enumerate(found):
+                    left -= 1 + (number == 0)
+                    if left < 0:
+                        raise InputError(
+                            f"{where}: {pattern!r} goes through more than {MOST_LOOKED_AT:,} files: name the folder "
+                            "that the shots are in."
+                        )
+                    yield entry
+        except (OSError, ValueError):  # what is no folder, or not ours to look into, holds no shots
+            return
+
+    def below(inside: Path, parts: tuple[str, ...]) -> Iterator[Path]:
+        if not parts:
+            yield inside
+        elif parts[0] == "**":
+            yield from below(inside, parts[1:])
+            for entry in entries(inside):
+                if entry.is_dir(follow_symlinks=False):
+                    yield from below(Path(entry.path), parts)
+        elif re.search(r"[*?\[]", parts[0]):
+            for entry in entries(inside):
+                if fnmatch(entry.name, parts[0]):
+                    yield from below(Path(entry.path), parts[1:])
+        elif os.path.lexists(inside / parts[0]):
+            yield from below(inside / parts[0], parts[1:])
+
+    path = Path(pattern)
+    parts = path.relative_to(path.anchor).parts
+    once = tuple(part for number, part in enumerate(parts) if part != "**" or parts[number - 1 : number] != ("**",))
+    return below(folder / path.anchor, once)
 
 
 def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, folder: Path, where: str) -> BatchShot:

@@ -1,8 +1,7 @@
 """What a bake has read and written, with checksums: how a later batch knows that a shot is done.
 
-The receipt of a bake is written when its results are whole under other names and before they take their own. So
-wherever a bake is killed, either the files on disk are those that the receipt names and the shot is done, or they are
-not and it is baked again.
+The receipt of a bake holds the checksums of its results and takes its name after them. So wherever a bake is killed,
+either there is a receipt that fits the files on disk and the shot is done, or there is none and it is baked again.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.files import files
 from ..core.files.files import read_regular, regular_blocks
 
 SCHEMA_VERSION = 1
@@ -42,21 +40,18 @@ def checksums(paths: Iterable[Path]) -> dict[str, str]:
     return sums
 
 
-def write(
-    path: Path,
+def dump(
     *,
     made_by: str,
     options: Sequence[str],
     read: Mapping[str, str],
     wrote: Mapping[str, str],
     totals: Mapping[str, object],
-) -> None:
-    """Write the receipt of a bake.
+) -> str:
+    """The receipt of a bake as JSON.
 
     Parameters
     ----------
-    path : Path
-        Where it goes.
     made_by : str
         Versions of the programs that baked.
     options : sequence of str
@@ -65,11 +60,6 @@ def write(
         The shot and what it links; the results.
     totals : mapping
         The bake in a few numbers.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
     """
     receipt = {
         "schema_version": SCHEMA_VERSION,
@@ -79,7 +69,7 @@ def write(
         "wrote": dict(wrote),
         "totals": dict(totals),
     }
-    files.write_text(path, json.dumps(receipt, indent=2) + "\n")
+    return json.dumps(receipt, indent=2) + "\n"
 
 
 def totals_if_done(

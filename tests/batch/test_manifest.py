@@ -1,5 +1,6 @@
 """Manifests: TOML or JSON in, shots with absolute paths out, and an error that names the place otherwise."""
 
+import glob
 import json
 import os
 import string
@@ -220,3 +221,49 @@ def test_no_text_makes_anything_but_shots_or_a_clear_error(text):
     for is_json in (False, True):
         with pytest.raises(InputError, match="fuzz"):
             manifest.parse(text, FOLDER, "fuzz", is_json=is_json)
+
+
+def test_a_pattern_that_goes_through_a_whole_disk_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(manifest, "MOST_LOOKED_AT", 50)
+    (tmp_path / "deep").mkdir()
+    for number in range(60):
+        (tmp_path / "deep" / f"{number}.txt").touch()
+    (tmp_path / "a.blend").touch()
+    for pattern in ("**/*.blend", "deep/*.blend", "**/**/**/**/*.blend", str(tmp_path / "**/x.blend")):
+        with pytest.raises(InputError, match="goes through more than 50 files: name the folder"):
+            manifest.parse(json.dumps({"shots": [{"files": pattern, "in_place": True}]}), tmp_path, "it", is_json=True)
+    (found,) = manifest.parse(
+        json.dumps({"shots": [{"files": "*.blend", "in_place": True}]}), tmp_path, "it", is_json=True
+    )
+    assert found.file == tmp_path / "a.blend"
+
+
+def test_a_pattern_finds_what_a_shell_finds(tmp_path):
+    for name in ("a/1.blend", "a/b/2.blend", "a/b/c/3.blend", "a/b/4.txt", "d/5.blend"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    patterns = (
+        *("a/*.blend", "a/**/*.blend", "[ad]/?.blend", "a/b/../*.blend", "**/3.blend"),
+        str(tmp_path / "d/*"),
+    )
+    expected = [glob.glob(str(tmp_path / pattern), recursive=True) for pattern in patterns]
+    (tmp_path / "a" / "loop").symlink_to(tmp_path)  # which is not gone through
+    for pattern, paths in zip(patterns, expected, strict=True):
+        entry = {"files": pattern, "save": "out/{name}.blend"}
+        shots = manifest.parse(json.dumps({"shots": [entry]}), tmp_path, "it", is_json=True)
+        assert {shot.file for shot in shots} == {Path(os.path.realpath(path)) for path in paths}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { " + "a." * 5000 + "b = 1 }",
+        "[[shots]]\nfile = 'a.blend'\nin_place = true\ncell_size = 0x" + "f" * 5000,
+        "[[shots]]\nfile = 'a.blend'\nframes = " + "[" * 300 + "]" * 300,
+        "[[shots]]\nfile = 'a.blend'\nin_place = 0x" + "f" * 5000,
+    ],
+    ids=["nested", "huge number", "lists", "huge answer"],
+)
+def test_what_is_nested_or_long_without_end_is_refused(tmp_path, text):
+    with pytest.raises(InputError, match="it"):
+        manifest.parse(text, tmp_path, "it")

@@ -28,7 +28,7 @@ def write(folder, **changes):
         "wrote": receipts.checksums([folder / "baked.blend", folder / "report.json"]),
         "totals": {"steps": 4},
     }
-    receipts.write(folder / "receipt.json", **(given | changes))
+    (folder / "receipt.json").write_text(receipts.dump(**(given | changes)))
 
 
 def done(folder, made_by="SoftGround 1", options=OPTIONS, source="shot.blend", outputs=("baked.blend", "report.json")):

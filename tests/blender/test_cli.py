@@ -227,3 +227,77 @@ def test_progress_comes_in_the_asked_style(shot, capfd, style):
         assert values[-1] == 100.0
     else:
         assert lines[-1].endswith(" s")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--frames=1-99999999999999"], "no frame range"),
+        (["--frames", "-1048575-3"], "no frame range"),
+        (
+            ["--frames=-1048574-1048574", "--dry-run"],
+            "2,097,149 frames from -1048574 to 1048574",
+        ),
+        (["--save=a\udcff.blend"], "no UTF-8 text"),
+        (["--cell-size=0.0001", "--dry-run"], "GB of memory and"),
+    ],
+)
+def test_what_would_take_for_ever_is_refused_with_what_it_would_take(shot, capfd, monkeypatch, options, says):
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 6e9)
+    started = time.perf_counter()
+    assert run(shot, *options) == 2
+    told = capfd.readouterr().err
+    assert says in told
+    assert "Traceback" not in told
+    assert time.perf_counter() - started < 60
+
+
+def test_a_key_at_the_beginning_of_time_is_told_of(scene, tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 16e9)
+    armature = shots.walker(scene, frames=20)
+    curve = next(iter(action_curves(armature.animation_data.action)))
+    curve.keyframe_points.insert(float("-inf"), 0.0)
+    curve.keyframe_points.insert(1e9, 0.0)
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    assert run(shot, "--dry-run") == 2
+    assert "look for a key that lies far away" in capfd.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes")
+@pytest.mark.parametrize("output", ["closed", "full"])
+def test_an_output_that_nobody_reads_stops_no_bake(shot, tmp_path, output):
+    """As in `softground bake ... | head -1`."""
+    report = tmp_path / "report.json"
+    if output == "full":
+        stdout = os.open("/dev/full", os.O_WRONLY)
+    else:
+        reading, stdout = os.pipe()
+        os.close(reading)
+    process = command_line.begin("bake", shot, "--report", report, stdout=stdout, stderr=subprocess.PIPE)
+    os.close(stdout)
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
+    assert json.loads(report.read_text())["steps"]
+
+
+def test_a_library_of_the_shot_is_not_written_over(scene, tmp_path, capfd):
+    """The shot links a file, and that one, in turn, the shot."""
+    shot, library = tmp_path / "shot.blend", tmp_path / "library.blend"
+    shots.walker(scene, frames=20)
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    for file, other in ((library, shot), (shot, library)):
+        bpy.ops.wm.open_mainfile(filepath=str(file))
+        with bpy.data.libraries.load(str(other), link=True) as (_, wanted):
+            wanted.objects = ["Walker"]
+        bpy.context.scene.collection.children.link(bpy.data.collections.new("Linked"))
+        bpy.data.collections["Linked"].objects.link(wanted.objects[0])
+        bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    before = library.read_bytes()
+    (tmp_path / "again.blend").symlink_to(library)
+    for name in ("library.blend", "again.blend"):
+        assert run(shot, "--save", tmp_path / name) == 2
+        assert "would be lost" in capfd.readouterr().err
+    assert library.read_bytes() == before

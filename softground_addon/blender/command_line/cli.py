@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import json
 import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import bpy
 
@@ -42,8 +43,40 @@ def run_standalone(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str], *, standalone: bool) -> int:
+    with contextlib.redirect_stdout(_Unbroken(sys.stdout)) if sys.stdout else contextlib.nullcontext():
+        return _exit_code(arguments, standalone=standalone)
+
+
+class _Unbroken(io.TextIOBase):
+    """An output that goes on where nobody reads it any more, as before `| head`, or where it has no room."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        try:
+            self._stream.write(text)
+        except OSError:
+            self._hush()
+        return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except OSError:
+            self._hush()
+
+    def _hush(self) -> None:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), self._stream.fileno())
+
+
+def _exit_code(arguments: Sequence[str], *, standalone: bool) -> int:
     previous = {number: signal.signal(number, _interrupt) for number in _INTERRUPTS}
     try:
+        for argument in arguments:
+            if not _is_text(argument):
+                raise InputError(f"{argument!r} is no UTF-8 text: rename the file, or give another name.")
         options = cli_arguments.parse(arguments, standalone=standalone)
         if options.command == "batch":
             return _batch_code(command.bake_batch(options, program.made_by(), program.worker_command))
@@ -67,6 +100,14 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
         for number, handler in previous.items():
             signal.signal(number, handler or signal.SIG_DFL)  # none: Blender's own, which Python cannot name
     return EXIT_DONE
+
+
+def _is_text(argument: str) -> bool:
+    try:
+        argument.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _interrupt(_number: int, _frame: object) -> None:
@@ -158,8 +199,9 @@ def _files_read(options: argparse.Namespace) -> list[Path]:
 def _write_results(
     options: argparse.Namespace, target: Path | None, content: dict[str, Any], read: dict[str, str]
 ) -> None:
-    """Write shot and report whole under other names, then the receipt, and give them their names at the very end."""
-    with contextlib.ExitStack() as results:
+    """Write all results whole under other names, and then give them their names: the receipt, which is proof, last."""
+    with contextlib.ExitStack() as results:  # which ends with what it began with
+        receipt = results.enter_context(files.replacing(options.receipt)) if options.receipt else None
         wrote: dict[Path, Path] = {}
         if target and not options.dry_run:
             wrote[target] = results.enter_context(files.replacing(target))
@@ -168,15 +210,15 @@ def _write_results(
             path = Path(os.path.realpath(options.report))
             wrote[path] = results.enter_context(files.replacing(path))
             wrote[path].write_text(report.dump(content), encoding="utf-8")
-        if options.receipt:
-            receipts.write(
-                options.receipt,
+        if receipt:
+            content_of_receipt = receipts.dump(
                 made_by=program.made_by(),
                 options=_batch_shot(options, target).options,
                 read=read,
                 wrote={str(path): receipts.checksum(partial) for path, partial in wrote.items()},
                 totals=content["totals"],
             )
+            receipt.write_text(content_of_receipt, encoding="utf-8")
 
 
 def _open(path: Path) -> None:
@@ -184,7 +226,7 @@ def _open(path: Path) -> None:
         raise InputError(f"There is no file '{path}'.")
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
+    except (RuntimeError, UnicodeEncodeError) as error:
         raise InputError(f"'{path}' could not be opened as a .blend file: {str(error).strip()}") from None
 
 
@@ -254,10 +296,13 @@ def _save_copy(path: Path) -> None:
     ------
     InputError
         If it could not be written.
+    OSError
+        If the disk is full.
     """
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=_is_compressed(bpy.data.filepath))
     except RuntimeError as error:
+        files.check_not_full(path)  # Blender may say "No such file" then
         raise InputError(f"The baked shot could not be saved: {str(error).strip()}") from None
 
 

@@ -15,6 +15,7 @@ from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
 from ...core.ground_plan import GroundPlan, extent, plan_ground
+from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
@@ -194,6 +195,7 @@ def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
 
 def sample_characters(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[list[CharacterMotion]]:
     """The motion of each character."""
+    check_frames(*wanted.frames, len(wanted.characters))
     motions = []
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, one in enumerate(wanted.characters):

@@ -75,6 +75,7 @@ def replacing(path: Path) -> Iterator[Path]:
         if path.exists():
             shutil.copymode(path, partial)
         partial.replace(path)
+        _sync_folder(path.parent)  # without which a power cut may take the new name back
     except OSError as error:
         raise _not_written(path, error) from error
     finally:
@@ -91,6 +92,10 @@ def check_place(path: Path) -> None:
     InputError
         If the folder is missing or cannot be written, the file is protected, or something else has that name.
     """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{str(path)!r} is no Unicode text: choose another name, or rename the folder.") from None
     if not path.parent.is_dir():
         raise InputError(f"The folder of '{path}' does not exist: create it first.")
     partial = _partial(path)
@@ -112,10 +117,9 @@ def check_room(path: Path, size: int) -> None:
 
 
 def check_not_full(path: Path) -> None:
-    """Raise OSError where nothing can be added to a file: a writer that does not tell may then have lost its end."""
-    size = path.stat().st_size
-    with path.open("r+b") as written:
-        written.seek(size)
+    """Raise OSError where nothing can be added to a file, or none be made: a writer may not tell, or not tell why."""
+    with path.open("ab") as written:
+        size = written.tell()
         written.write(bytes(_LARGEST_BLOCK))
         written.flush()
         os.fsync(written.fileno())
@@ -148,6 +152,18 @@ def _partial(path: Path) -> Path:
         raise InputError(f"'{path}' is write-protected: choose another name, or let it be written.")
     # Containers share process ids, and some writers go by the suffix.
     return path.with_name(f".{path.stem}.{_MACHINE}-{secrets.token_hex(8)}.partial{path.suffix}")
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring the names of a folder's files to the disk; some systems and network disks cannot be asked to."""
+    if os.name != "posix":
+        return
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _not_written(path: Path, error: OSError) -> InputError:

@@ -177,3 +177,57 @@ def test_a_file_has_one_identity_whatever_its_name(tmp_path: Path):
     names = ("real/Ä.blend", "link/Ä.blend", "real/../link/ä.BLEND", "real/A\u0308.blend")
     assert len({identity(tmp_path / name) for name in names}) == 1
     assert identity(tmp_path / "real/a.blend") != identity(tmp_path / "real/b.blend")
+
+
+class Disk:
+    """What a power cut leaves of a folder: of each file what was synced, under the names that were synced with it."""
+
+    def __init__(self, monkeypatch, folder):
+        self.folder, self.written, self.names = folder, {}, {}
+        self.keep_names()
+        fsync, replace = os.fsync, Path.replace
+        self.log = []
+
+        def synced(handle):
+            fsync(handle)
+            path = Path(os.readlink(f"/proc/self/fd/{handle}"))
+            if path == folder:
+                self.keep_names()
+            else:
+                self.written[path.stat().st_ino] = path.read_bytes()
+            self.log.append(path.name)
+
+        def replaced(path, target):
+            self.log.append("rename")
+            return replace(path, target)
+
+        monkeypatch.setattr(os, "fsync", synced)
+        monkeypatch.setattr(Path, "replace", replaced)
+
+    def keep_names(self):
+        for path in self.folder.iterdir():
+            self.written.setdefault(path.stat().st_ino, path.read_bytes())
+        self.names = {path.name: path.stat().st_ino for path in self.folder.iterdir()}
+
+    def after_power_cut(self):
+        return {name: self.written[node] for name, node in self.names.items()}
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="asks Linux for the names of open files")
+@pytest.mark.parametrize("before", [None, "old"])
+def test_what_is_done_stays_done_after_a_power_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, before: str | None):
+    path = tmp_path / "a.json"
+    if before is not None:
+        path.write_text(before)
+    disk = Disk(monkeypatch, tmp_path)
+    with replacing(path) as partial:
+        partial.write_text("new")
+        old = {} if before is None else {"a.json": before.encode()}
+        assert disk.after_power_cut() == old
+    assert disk.after_power_cut() == {"a.json": b"new"}
+    assert disk.log[1:] == ["rename", tmp_path.name]  # the content first, then the name, then the folder
+
+
+def test_a_name_that_is_no_text_is_refused_beforehand(tmp_path: Path):
+    with pytest.raises(InputError, match="no Unicode text"):
+        check_place(tmp_path / "a\udcff.json")

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from softground_addon.core.errors import InputError
-from softground_addon.core.loads.cell_limits import check_cell_size, machine_memory, pressed_area
+from softground_addon.core.loads import cell_limits
+from softground_addon.core.loads.cell_limits import check_cell_size, check_frames, machine_memory, pressed_area
 from tests.core.walkers import box_sole, standing
 
 WEIGHT = 750.0
@@ -33,6 +34,33 @@ def test_cells_that_swallow_a_sole_are_refused_with_a_size_that_shows_it():
         check_cell_size([LOADS], 0.3)
     assert named_size(error) == pytest.approx(0.02)
     check_cell_size([LOADS], 0.15)
+
+
+def test_frames_that_no_memory_holds_are_refused_with_what_they_would_take():
+    with pytest.raises(InputError, match=r"2,097,149 frames from -1048574 .* 126 GB of memory and 6 hours"):
+        check_frames(-1_048_574, 1_048_574, 1, available=24e9)
+    check_frames(1, 100_000, 1, available=24e9)
+
+
+@pytest.mark.parametrize(
+    ("groups", "files", "limits"),
+    [
+        ("0::/user/bake\n", {"user/bake/memory.max": "max", "user/memory.max": "3000"}, {3000.0}),
+        ("0::/elsewhere\n", {"memory.max": "2000"}, {2000.0}),
+        ("9:cpu:/\n4:hugetlb,memory:/a/b\n", {"memory/a/b/memory.limit_in_bytes": "5000"}, {5000.0}),
+        ("3:cpu:/\n", {"memory.max": "1"}, set()),
+        (None, {}, set()),
+    ],
+)
+def test_the_limits_of_containers_are_heeded(tmp_path, groups, files, limits):
+    if groups is not None:
+        (tmp_path / "proc/self").mkdir(parents=True)
+        (tmp_path / "proc/self/cgroup").write_text(groups)
+    for name, text in files.items():
+        place = tmp_path / "sys/fs/cgroup" / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(text)
+    assert set(cell_limits._container_limits(tmp_path)) == limits
 
 
 def test_the_machine_tells_its_memory():
