@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import os
 import string
 import struct
 import tracemalloc
@@ -96,6 +97,51 @@ def test_no_manifest_file_makes_a_traceback(count, tmp_path):
                 assert "fuzz." in str(error)  # noqa: PT017
 
     each(mutated(valid) | st.binary(max_size=64), count, check)
+
+
+INPUTS = ("night.json", "shots/a.blend", "shots/b.blend", "snow.json")
+OUTPUTS = ("out/a.blend", "out/b.blend", "out/a.json", "out/b.json")
+
+
+def aliases(name):
+    """Other ways to say where a file is: through links, around corners, in other letters."""
+    folder, _, last = name.rpartition("/")
+    inside = f"{folder}/" if folder else ""
+    return st.sampled_from([
+        *(name, name, f"./{name}", f"out/../{name}", f"linked/{name}", f"{inside}{last.upper()}"),
+        *(f"{inside}../{folder}/{last}" if folder else name, f"linked/out/../{name}"),
+    ])  # fmt: skip
+
+
+@counts(4000)
+def test_no_result_of_a_batch_takes_the_place_of_anything_else(count, tmp_path):
+    for folder in ("shots", "out"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "linked").symlink_to(tmp_path)
+    for name in INPUTS[1:]:
+        (tmp_path / name).touch()
+
+    def is_one(path):
+        return os.path.realpath(tmp_path / path).lower()
+
+    def check(drawn):
+        sources, places = drawn
+        entries = [
+            {"file": source, "preset": "snow.json", "save": save, "report": report}
+            for source, (save, report) in zip(sources, places, strict=True)
+        ]
+        (tmp_path / "night.json").write_text(json.dumps({"shots": entries}))
+        written = [is_one(path) for pair in places for path in pair]
+        collides = len(set(written)) < len(written) or not {is_one(name) for name in INPUTS}.isdisjoint(written)
+        try:
+            manifest.load(tmp_path / "night.json")
+            assert not collides, entries
+        except InputError as error:
+            assert collides, error  # noqa: PT017
+
+    place = st.sampled_from([*OUTPUTS * 3, *INPUTS]).flatmap(aliases)
+    sources = st.just(["shots/a.blend", "shots/b.blend"])
+    each(st.tuples(sources, st.lists(st.tuples(place, place), min_size=2, max_size=2)), count, check)
 
 
 @pytest.fixture(scope="module")

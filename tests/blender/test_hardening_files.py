@@ -8,6 +8,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from functools import partial
 
@@ -16,6 +17,7 @@ import pytest
 
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import ground_mesh
+from softground_addon.core.files.files import remove_leftovers
 from tests.blender import command_line, shots
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")
@@ -69,6 +71,60 @@ def test_a_killed_bake_leaves_the_old_file_or_the_new_one_whole(shot, tmp_path, 
     assert seen["old"]
     left = [path for path in tmp_path.iterdir() if path not in (shot, receipt)]
     assert all(path.name.startswith(".") and ".partial" in path.name for path in left)
+
+
+KILLED_WHILE_SAVING = """
+import signal, sys
+number, delay = int(sys.argv.pop(1)), float(sys.argv.pop(1))
+
+def count(event, arguments):
+    global number
+    if event in ("open", "os.rename", "os.remove", "os.chmod") and ".partial" in str(arguments[0]):
+        number -= 1
+        if number == 0:
+            signal.setitimer(signal.ITIMER_REAL, delay)  # which ends the process, also within Blender's saver
+
+sys.addaudithook(count)
+from softground_addon.__main__ import main
+sys.exit(main())
+"""
+
+
+@posix
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize(
+    "kills", [pytest.param(12, marks=pytest.mark.slow), pytest.param(200, marks=pytest.mark.marathon)]
+)
+def test_a_bake_killed_within_its_save_leaves_whole_files_and_a_receipt_that_is_true(scene, tmp_path, kills):
+    """Between the first write and the last rename: at each step of it, or up to a tenth of a second later."""
+    shot = tmp_path / "shot.blend"
+    shots.walker(scene, frames=9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    folder = tmp_path / "out"
+    folder.mkdir()
+    places = {name: folder / name for name in ("baked.blend", "report.json", "receipt.json")}
+    options = ["--save", places["baked.blend"], "--report", places["report.json"], "--receipt", places["receipt.json"]]
+    chance, ended = random.Random(2), 0
+    for attempt in range(kills):
+        old = {name: path.read_bytes() for name, path in places.items() if path.exists()}
+        told = [attempt % 25 + 1, chance.choice([1e-6, chance.uniform(0, 0.1)])]
+        command = [sys.executable, "-c", KILLED_WHILE_SAVING, *told, "bake", shot, "--progress=none", *options]
+        done = subprocess.run(list(map(str, command)), cwd=command_line.ROOT, capture_output=True, check=False)
+        assert done.returncode in (0, -signal.SIGALRM), done.stderr
+        ended += done.returncode == 0
+        found = {name: path.read_bytes() for name, path in places.items() if path.exists()}
+        if found.get("baked.blend") != old.get("baked.blend"):
+            bpy.ops.wm.open_mainfile(filepath=str(places["baked.blend"]))
+            assert ground_mesh.is_baked(bpy.context.scene.softground.ground)
+        if "report.json" in found:
+            assert json.loads(found["report.json"])["steps"]
+        if found.get("receipt.json") != old.get("receipt.json"):
+            wrote = json.loads(found["receipt.json"])["wrote"]
+            assert wrote == {str(places[name]): checksum(places[name]) for name in ("baked.blend", "report.json")}
+        for path in places.values():
+            remove_leftovers(path)
+        assert {path.name for path in folder.iterdir()} <= set(places)
+    assert ended < kills
 
 
 @posix

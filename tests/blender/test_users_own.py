@@ -24,6 +24,15 @@ def test_attributes_of_the_users_that_a_bake_would_need_are_named_and_stay(short
     assert fingerprints.of_file() == before
 
 
+def test_a_vertex_group_of_the_users_that_is_called_as_an_attribute_is_named_and_stays(short_walk):
+    ground = field(short_walk, **FINE)
+    ground.vertex_groups.new(name=own_data.RIM)
+    before = fingerprints.of_file()
+    assert f"data of its own called '{own_data.RIM}'" in refusal(bpy.ops.softground.bake)
+    baked_ground.clear(ground)
+    assert fingerprints.of_file() == before
+
+
 @pytest.mark.parametrize("name", own_data.PROPERTIES)
 def test_properties_of_the_users_that_a_bake_would_need_are_named_and_stay(short_walk, name):
     ground = field(short_walk, **FINE)

@@ -74,7 +74,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
         yield Progress("write", 0.8)
         marks = _tread(footprints, place.position, made_with.tread_m)
         yield Progress("write", 0.9)
-        carrier = yield from baked_ground.write(
+        yield from baked_ground.write(
             place,
             sample,
             spans,

@@ -51,10 +51,10 @@ def check_usable(ground: bpy.types.Object) -> None:
             f"Ground '{name}' has shape keys of its own: apply them (Object > Apply > Visual Geometry to Mesh), or "
             "choose a copy without them."
         )
-    if taken := own_data.users_own(mesh):
+    if taken := own_data.users_own(ground):
         raise InputError(
             f"Ground '{name}' has data of its own called '{taken[0]}', which a bake would need: give it another name "
-            "(Object Data > Attributes, or Custom Properties), or choose a copy without it."
+            "(Object Data > Attributes, Vertex Groups or Custom Properties), or choose a copy without it."
         )
     if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
         raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")

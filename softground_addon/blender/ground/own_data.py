@@ -48,10 +48,12 @@ def made(mesh: bpy.types.Mesh) -> set[str]:
     return {name for name in str(noted).split("\n") if name in ATTRIBUTES and name in mesh.attributes}
 
 
-def users_own(mesh: bpy.types.Mesh) -> list[str]:
-    """What of a mesh a bake would need for itself, and the user has made."""
+def users_own(ground: bpy.types.Object) -> list[str]:
+    """What of a ground a bake would need for itself, and the user has made."""
+    mesh = cast("bpy.types.Mesh", ground.data)
     ours = made(mesh)
-    attributes = [name for name in ATTRIBUTES if name in mesh.attributes and name not in ours]
+    there = {*mesh.attributes.keys(), *ground.vertex_groups.keys()}  # which may not be called alike
+    attributes = [name for name in ATTRIBUTES if name in there and name not in ours]
     return attributes if ours else [*attributes, *(name for name in PROPERTIES if name in mesh.keys())]  # noqa: SIM118
 
 
