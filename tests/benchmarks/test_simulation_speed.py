@@ -7,7 +7,7 @@ import pytest
 from softground_addon.core.ground.display_blur import blurred
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import recompose
-from tests.core.walkers import pressed, walk
+from tests.core.walkers import memory_of, pressed, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 LIMIT = 0.6e-3
@@ -58,7 +58,7 @@ def test_the_cost_of_a_frame_follows_the_cell_size_the_frame_rate_and_not_the_le
     ground, footprints = pressed(loads, SNOW)
     lines.append(f"recompose {len(footprints)} footprints: {best_time(recompose, footprints) * 1e3:.1f} ms")
     lines.append(f"blur their ground: {best_time(blurred, ground, 0.01) * 1e3:.1f} ms")
-    lines.append(f"memory: {ground.nbytes / len(footprints) / 1024:.0f} KB of cells per step")
+    lines.append(f"memory: {memory_of(ground) / len(footprints) / 1024:.0f} KB of cells per step")
     with capsys.disabled():
         print("\n" + "\n".join(lines))
     assert cost[100] < 1.3 * cost[20]

@@ -141,6 +141,9 @@ def test_bad_options_exit_with_2_and_say_what_to_do(shot, capfd, options, says):
     ("options", "says"),
     [
         (("--in-place", "--report", "shot.blend"), "Two results"),
+        (("--in-place", "--report", "SHOT.blend"), "Two results"),
+        (("--save", "new.blend", "--report", "New.BLEND"), "Two results"),
+        (("--dry-run", "--report", "Shot.Blend"), "would be lost"),
         (("--save", "new.blend", "--report", "new.blend"), "Two results"),
         (("--dry-run", "--report", "a.json", "--receipt", "./a.json"), "Two results"),
         (("--dry-run", "--report", "shot.blend"), "is read by this bake"),

@@ -190,3 +190,8 @@ def through_scene_frames(loads):
         soles=tuple(replace(sole, transforms=sole.transforms[::per_frame]) for sole in loads.motion.soles),
     )
     return replace(loads, motion=coarse.resampled(per_frame))
+
+
+def memory_of(field):
+    """Memory of the cells' values of a height field [bytes]."""
+    return sum(tile.nbytes for tile in field.tiles.values())

@@ -160,11 +160,6 @@ class SparseGrid:
         self.fill = fill
         self.tiles: dict[tuple[int, int], Array] = {}
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the cells' values [bytes]."""
-        return sum(tile.nbytes for tile in self.tiles.values())
-
     def tile_windows(self) -> list[Window]:
         """The windows of all tiles, in the order of their place."""
         return [Window(column * TILE, row * TILE, TILE, TILE) for column, row in sorted(self.tiles)]
