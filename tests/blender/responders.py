@@ -8,10 +8,11 @@ import numpy as np
 from sample_scenes.body import BONES
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.character_setup import mapping_of
+from softground_addon.blender.characters.rig_mapping import RigMapping
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
+from softground_addon.blender.settings import character_of
 from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.foot_placement import lowest_clearance, posed_points
@@ -34,6 +35,12 @@ _MIXAMO = {
     "foot": "Foot",
     "toe": "ToeBase",
 }
+
+
+def mapping_of(character):
+    """The joints and soles of a character as the user left them."""
+    mapped = character_of(character)
+    return RigMapping(mapped.joints, mapped.soles, "settings")
 
 
 def bake(scene, *, tilt=True, grounding=True, **values):

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
 from ..properties import SoftGroundCharacter
-from ..settings import SIDE_TO_CODE, character_of, is_set_up, time_stretch_of
+from ..settings import SIDE_TO_CODE, is_set_up, time_stretch_of
 from .prop_extraction import surface_of
 from .rig_mapping import RigMapping, instances_armature, map_rig, require_armature
 from .rig_sampling import is_animated, is_simulated
@@ -242,12 +242,6 @@ def title_of(character: SoftGroundCharacter) -> str:
 def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
     """The scene's characters whose armature or objects are still there."""
     return [character for character in scene.softground.characters if is_set_up(character)]
-
-
-def mapping_of(character: SoftGroundCharacter) -> RigMapping:
-    """The joints and soles of a character as the user left them."""
-    mapped = character_of(character)
-    return RigMapping(mapped.joints, mapped.soles, "settings")
 
 
 def animated_frames(

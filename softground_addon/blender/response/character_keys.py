@@ -17,7 +17,7 @@ from ..animation_layer.layer_curves import LayerCurve
 from ..characters.rig_mapping import RigMapping
 from ..settings import found, name_of, time_stretch_of
 from .pose_sampling import BonePoses, RigPoses, sample_poses
-from .rig_controls import BODY, Control, RigControls, find_controls
+from .rig_controls import BODY, Control, find_controls
 
 Array = NDArray[np.float64]
 
@@ -58,18 +58,18 @@ def response_curves(
     """
     rig, controls = name_of(armature), controls_of(scene, armature, mapping)
     frames = [round(frame) for frame in motion.frames]
-    poses = yield from sample_poses(scene, armature, frames, controls.bones)
+    poses = yield from sample_poses(scene, armature, frames, [control.bone for control in controls])
     armature = found(rig)
     moved = _parts_in_armature(response, motion, poses, scene.unit_settings.scale_length)
     curves: list[LayerCurve] = []
     times = motion.frames * time_stretch_of(scene)
-    for control in controls.controls:
+    for control in controls:
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
             curves += _bone_curves(armature, control, poses, moved, times, scene.unit_settings.scale_length)
     return curves
 
 
-def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> RigControls:
+def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
     """The bones of a rig that a response is keyed on."""
     depsgraph = scene.view_layers[0].depsgraph
     assert depsgraph is not None

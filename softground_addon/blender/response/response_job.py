@@ -167,7 +167,7 @@ def layers_of(scene: bpy.types.Scene, wanted: BakeSettings, answers: Sequence[Ch
         reading = response_curves(scene, settings.found(armature), mapping, answer.motion, answer.response)
         frames = len(answer.motion.frames)
         curves = yield from counted(reading, "write", frames, part=number, parts=len(answers), share=SHARE_OF_WRITING)
-        carrier = controls_of(scene, settings.found(armature), mapping).bones[0]
+        carrier = controls_of(scene, settings.found(armature), mapping)[0].bone
         layers.append(Layer(curves, _notes(carrier, answer)))
     return layers
 

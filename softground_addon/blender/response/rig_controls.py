@@ -46,28 +46,8 @@ class Control:
     moves: bool
 
 
-@dataclass(frozen=True)
-class RigControls:
-    """What is keyed on a rig, parents first, and what could not be found.
-
-    Attributes
-    ----------
-    controls : tuple of Control
-    sides : tuple of str
-        Legs that can be solved.
-    """
-
-    controls: tuple[Control, ...]
-    sides: tuple[str, ...]
-
-    @property
-    def bones(self) -> list[str]:
-        """Names of the keyed bones."""
-        return [control.bone for control in self.controls]
-
-
-def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mapping: RigMapping) -> RigControls:
-    """The bones to key on a rig.
+def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mapping: RigMapping) -> list[Control]:
+    """The bones to key on a rig, parents first.
 
     Parameters
     ----------
@@ -85,13 +65,11 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     body = _body_control(rig, mapping)
     parts = {body: BODY}
     found: list[tuple[str, str, bool]] = [(body, BODY, True)]
-    sides = []
     for side in "lr":
         names = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
         if all(names) and len(set(names)) == 3:
             leg = _leg_controls(rig, side, names, body)
             if leg:
-                sides.append(side)
                 found += leg
                 parts |= {bone: part for bone, part, _ in leg}
         arm = _arm_control(rig, mapping, side)
@@ -102,7 +80,7 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     for bone, part, moves in found:
         above = (ancestor for ancestor in rig.behind(bone) if ancestor != bone and ancestor in parts)
         controls.append(Control(bone, part, parts.get(next(above, ""), ""), moves))
-    return RigControls(tuple(controls), tuple(sides))
+    return controls
 
 
 def _body_control(rig: _Rig, mapping: RigMapping) -> str:
