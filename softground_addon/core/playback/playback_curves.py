@@ -135,8 +135,9 @@ def playback_curves_at(
     }
     position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
     for places in _parts(footprints, x, y):
-        yield
-        over_time = vertex_histories(footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance)
+        over_time = yield from vertex_histories.slices(
+            footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance
+        )
         yield
         spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)
         part = replace(spans, point=places[spans.point], curve=spans.curve + np.int32(count))
@@ -147,6 +148,7 @@ def playback_curves_at(
         sizes.append(lines.size)
         count += len(lines.size)
         error = max(error, spans.error)
+        yield
     arrays: dict[str, NDArray[Any]] = {name: packed.unpacked() for name, packed in whole.items()}
     spans = Spans(**arrays, frame_rate=frame_rate * time_stretch, error=error)
     return spans, PlaybackCurves(np.concatenate(sizes), position, contact)

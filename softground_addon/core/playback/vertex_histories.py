@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.heightfield import Window
+from ..numerics.slices import Slices, sliced
 from ..record.footprints import QUANTUM, Footprint
 from .ramps import TOLERANCE, Ramps, fit
 
@@ -75,9 +76,10 @@ class VertexHistories:
         )
 
 
+@sliced
 def vertex_histories(
     footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
-) -> VertexHistories:
+) -> Slices[VertexHistories]:
     """The record as it is seen from given places.
 
     Parameters
@@ -108,7 +110,9 @@ def vertex_histories(
             fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
             movements.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
+            yield
         visits.append(_visits(footprint, places))
+        yield
     return VertexHistories(Ramps.joined(movements, 2), _joined(visits), error)
 
 
