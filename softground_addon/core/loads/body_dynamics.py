@@ -37,8 +37,10 @@ LIGHT = 0.2
 """Below this total force the point of action is not known, in body weights."""
 TRUE_FALL = 0.2
 """A flight whose fall differs from gravity by less shows the error of the body's mass, not another time scale."""
-RATES_OF_FALL = (0.5, 3.0)
-"""Slowest and fastest fall that is taken for a flight, in gravities."""
+RATES_OF_FALL = (0.05, 3.0)
+"""Slowest and fastest fall that is taken for a flight, in gravities: slow motion by 4 falls at 1/16."""
+EVEN_FALL = 0.35
+"""A body falls evenly, and so in slow motion, where its acceleration varies by less than this part of itself."""
 MOST_ROUNDS = 12
 """Rounds in which a body comes to fall freely where it would be pulled down."""
 STEADY_ENDS = 0.01
@@ -115,7 +117,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
         return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
 
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
-    flying = _flights(airborne, body.force[:, 2]) if airborne is not None else np.zeros(0, dtype=bool)
+    flying = flights(airborne, body, motion.time_step) if airborne is not None else np.zeros(0, dtype=bool)
     if flying.any():
         cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
@@ -132,7 +134,7 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     A body on its feet that the motion asks to be pulled down, as when it bobs too fast by hand, falls freely there too:
     cutting the force off instead would leave it more than its weight on average.
     """
-    flying = _flights(airborne, body.force[:, 2])
+    flying = flights(airborne, body, motion.time_step)
     pulled = ~airborne & (body.force[:, 2] < 0)
     if not (flying.any() or pulled.any()):
         return body
@@ -171,7 +173,7 @@ def _falling_freely(
     the shaking of soft tissue through: both show as a force where there is none.
     """
     step, usual = motion.frame_step, _usual_cutoff(motion)
-    fall = _rate_of_fall(body, flying, motion.gravity, round(0.5 / (body.cutoff * motion.time_step)))
+    fall = _rate_of_fall(body, flying, motion.gravity, _leak(body, motion.time_step))
     parts, flying = body.points.part_centres(), flying[motion.on_frames]
     highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
 
@@ -215,12 +217,25 @@ def _downhill(score: Callable[[float], float], start: float, stride: float, limi
     return best
 
 
-def _flights(airborne: Mask, force: Array) -> Mask:
-    """Those stretches without contact in which the motion asks for little force (N,) [body weights]."""
-    flights = airborne.copy()
+def flights(airborne: Mask, body: BodyDynamics, step: float) -> Mask:
+    """Those of the stretches without contact `airborne` (N,) in which the body falls, `step` [s] apart.
+
+    Either it asks for little force, or it falls slowly but evenly, as in slow motion. A body borne by feet that float
+    does neither.
+    """
+    flying = airborne.copy()
+    edge = _leak(body, step)
     for first, last in zip(*runs(airborne), strict=True):
-        flights[first:last] = force[first:last].mean() < FREE_FALL
-    return flights
+        fall = 1 - body.force[first:last, 2]
+        inner = fall[edge:-edge] if last - first > 3 * edge else fall[:0]
+        even = len(inner) > 0 and inner.mean() > RATES_OF_FALL[0] and inner.std() < EVEN_FALL * inner.mean()
+        flying[first:last] = fall.mean() > 1 - FREE_FALL or even
+    return flying
+
+
+def _leak(body: BodyDynamics, step: float) -> int:
+    """Steps over which the force of a stance leaks into the flight beside it."""
+    return max(1, round(0.25 / (body.cutoff * step)))
 
 
 def _rate_of_fall(body: BodyDynamics, flying: Mask, gravity: float, edge: int) -> float:
@@ -229,7 +244,7 @@ def _rate_of_fall(body: BodyDynamics, flying: Mask, gravity: float, edge: int) -
     A jump made by hand, retimed or put on a larger rig hangs in the air or drops like a stone. Its forces are those
     of the same motion at the time scale at which it falls with gravity.
     """
-    window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge // 2, mode="edge"), edge // 2 * 2 + 1)
+    window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge, mode="edge"), 2 * edge + 1)
     inner = 1 - body.force[window.all(axis=1), 2]
     if not len(inner):
         return gravity

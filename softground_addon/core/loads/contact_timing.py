@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import close_short, runs
 from ..numerics.smoothing_spline import smooth_path
-from .body_dynamics import FREE_FALL, BodyDynamics
+from .body_dynamics import FREE_FALL, BodyDynamics, flights
 from .centre_of_pressure import extents, lowest_points
 from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts
 from .load_sharing import whole_body_shares
@@ -92,7 +92,8 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         Of that motion, before anything is known about flight.
     """
     unit = motion.pendulum_time / motion.time_step
-    touching = _supported(motion, contacts, body.force[:, 2])
+    flying = flights(~contacts.touching.any(axis=1), body, motion.time_step)
+    touching = _supported(motion, contacts, np.where(flying, 0.0, body.force[:, 2]))
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
     lowest = lowest_points(motion)
@@ -101,6 +102,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         for change in transitions(touching, round(SEARCH * unit))
         # In flight the feet are right, there is no double support.
         if body.force[change.leave : change.strike, 2].min(initial=np.inf) >= FREE_FALL
+        and not flying[change.leave : change.strike].any()
     ]
     for change, (strike, leave) in zip(
         changes, _fit_overlaps(changes, lowest, extents(motion, lowest), body, unit), strict=True

@@ -31,6 +31,10 @@ LEAVE_HEIGHT = 0.05
 TOUCH_SPEED = 0.25
 """A sole slower than this, or than the body, starts to touch, in sqrt(gravity·leg length) (0.8 m/s for an adult). The
 foot that swings overtakes the body, the foot that stands falls behind it."""
+TOUCH_SHARE = 0.2
+"""The same as a part of the sole's own highest speeds, where that is less: in slow motion swings are slow."""
+SLOWEST_TOUCH = 0.055
+"""The least of it, in sqrt(gravity·leg length); a sole whose highest speeds are below that only shakes."""
 LEAVE_SPEED = 1.5
 """A touching sole faster than this many times that speed has left."""
 LANDED_HEIGHT = 0.01
@@ -116,9 +120,8 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
-    limit = np.maximum(TOUCH_SPEED * motion.froude_speed, body_speed)
     found = [
-        _detect(track, drift, limit, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
+        _detect(track, drift, body_speed, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
         for track, sole in zip(tracks, motion.soles, strict=True)
     ]
     sharp, offset = (np.array(values) for values in zip(*found, strict=True))
@@ -232,12 +235,13 @@ def _low(clearance: Array, leg_length: float) -> float:
 
 
 def _detect(
-    track: _Track, drift: Array, limit: Array, motion: CharacterMotion, float_limit: float
+    track: _Track, drift: Array, body_speed: Array, motion: CharacterMotion, float_limit: float
 ) -> tuple[Mask, float]:
     """When one sole touches, and the float that was removed."""
     leg = motion.leg_length
     speed = np.linalg.norm(track.velocity - drift, axis=-1)
     offset = _float(track.clearance, speed / motion.froude_speed, float_limit * leg)
+    limit = np.maximum(_touch_speed(track.velocity - drift, motion), body_speed)
     height = (track.clearance - offset) / leg
     touching = hysteresis(
         (height < TOUCH_HEIGHT) & (speed < limit), (height > LEAVE_HEIGHT) | (speed > LEAVE_SPEED * limit)
@@ -245,6 +249,17 @@ def _detect(
     unit = motion.pendulum_time / motion.time_step
     touching = close_short(touching, round(SHORTEST_CONTACT * unit))
     return _sharpened(touching, track, motion), offset
+
+
+def _touch_speed(velocity: Array, motion: CharacterMotion) -> float:
+    """Speed below which a sole may touch [m/s]: by its own way over time, in which jitter counts for nothing."""
+    window = max(1, round(BESIDE * motion.pendulum_time / motion.time_step))
+    way = np.diff(np.cumsum(np.pad(velocity, ((window, 0), (0, 0))), axis=0)[window - 1 :: window], axis=0) / window
+    if not len(way):
+        return TOUCH_SPEED * motion.froude_speed
+    highest = float(np.percentile(np.linalg.norm(way, axis=1), 95)) / motion.froude_speed
+    rests = highest < SLOWEST_TOUCH
+    return motion.froude_speed * (TOUCH_SPEED if rests else np.clip(TOUCH_SHARE * highest, SLOWEST_TOUCH, TOUCH_SPEED))
 
 
 def _sharpened(touching: Mask, track: _Track, motion: CharacterMotion) -> Mask:

@@ -89,6 +89,26 @@ def test_one_frame_and_no_motion_at_all_are_no_errors():
     assert detect_contacts(character([flat_sole(np.zeros((1, 3)))]), Slope()).touching.tolist() == [[True]]
 
 
+def test_a_slow_walk_has_swings():
+    """Feet that move on at 0.27 m/s, a centimetre above the ground: slower than a human foot lands."""
+    step = np.arange(1440)
+    soles = []
+    for phase in (0, 240):
+        cycle, moment = np.divmod(step + phase, 480)
+        swing = np.clip((moment - 300) / 180, 0.0, 1.0)
+        x = 0.4 * (cycle + swing)
+        soles.append(flat_sole(np.stack([x, 0 * x, 0.01 * np.sin(np.pi * swing)], axis=1)))
+    hips = np.stack([0.1 * step / RATE, 0 * step, np.full(len(step), 0.9)], axis=1)
+    touching = detect_contacts(character(soles, hips=hips, rate=RATE), Slope()).touching
+    assert [len(runs(foot)[0]) for foot in touching.T] == [3, 4]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_millimetre_of_jitter_is_no_step(seed):
+    path = 0.001 * np.random.default_rng(seed).normal(size=(600, 3))
+    assert detect_contacts(character([flat_sole(path)], rate=60.0), Slope()).touching.all()
+
+
 def step_beside():
     """A foot that comes in flat beside one that stands, and stops within 0.2 s; the other then leaves gently."""
     time = np.arange(360) / RATE
