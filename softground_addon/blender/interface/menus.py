@@ -14,11 +14,11 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout: Any = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("softground.add_character", icon="ARMATURE_DATA")
         layout.operator("softground.add_contact", icon="PLUS")
         layout.operator("softground.create_ground", icon="MESH_GRID")
         layout.separator()
-        layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         layout.operator("softground.live", icon="PLAY")
         layout.operator("softground.clear_bake", icon="TRASH")
