@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate gui pictures package lint types clean
+.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate zoo gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -56,6 +56,11 @@ bench: $(READY)
 
 validate: $(READY)
 	$(BIN)/python -m tests.validation.validate $(DATA)
+
+# Rigs that strangers made, each baked with default settings and judged by its own skin.
+RIGS := ../shared/data/rigs/rigs.json
+zoo: $(READY)
+	$(BIN)/python ../shared/tools/zoo.py $(RIGS) $(CLIPS)
 
 lint: $(READY)
 	$(BIN)/ruff check .

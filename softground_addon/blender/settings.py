@@ -167,6 +167,7 @@ def character_of(character: Any) -> CharacterSettings:
             sole.toe_bone,
             sole.object.name_full if sole.object else "",
             sole.kind == "LIMB",
+            tuple(sole.parts.keys()),
         )
         for sole in character.soles
         if sole.object or (sole.bone and armature)

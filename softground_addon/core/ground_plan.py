@@ -120,7 +120,9 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
     It is level, unless the soles stand on a slope.
     """
     slope = _slope([motion for motion in motions if motion.centre is None])
-    low = float(np.median([_standing_height(motion, sole, slope) for motion in motions for sole in _feet(motion)]))
+    levels = [] if slope.any() else [motion.ground_level for motion in motions if motion.ground_level is not None]
+    lows = levels or [_standing_height(motion, sole, slope) for motion in motions for sole in _feet(motion)]
+    low = float(np.median(lows))
     contacts = []
     for motion in motions:
         yield

@@ -14,7 +14,8 @@ from ...core.motion.props import mass_properties
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, is_set_up, time_stretch_of
 from .prop_extraction import surface_of
-from .rig_mapping import RigMapping, instances_armature, map_rig, require_armature
+from .recognition import recognise
+from .rig_mapping import RigMapping, instances_armature, require_armature
 from .rig_sampling import is_animated, is_simulated
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
@@ -37,7 +38,7 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
         raise InputError(
             f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
         )
-    mapping = map_rig(armature)
+    mapping = recognise(scene, armature, animated_frames(armature))
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
@@ -163,7 +164,9 @@ def detect_bones(character: SoftGroundCharacter) -> None:
         If it has no armature, or its feet are not found.
     """
     require_armature(character.armature)
-    _fill(character, map_rig(character.armature))
+    scene = character.id_data
+    assert isinstance(scene, bpy.types.Scene)
+    _fill(character, recognise(scene, character.armature, animated_frames(character.armature)))
 
 
 def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
@@ -179,6 +182,9 @@ def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
         sole = character.soles.add()
         sole.name, sole.bone, sole.toe_bone = source.name, source.bone, source.toe_bone
         sole.side = _SIDE_TO_ENUM[source.side]
+        sole.kind = "LIMB" if source.limb else "FOOT"
+        for bone in source.parts:
+            sole.parts.add().name = bone
 
 
 def add_bone_contacts(character: SoftGroundCharacter, bones: Iterable[str]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -25,8 +25,10 @@ from ...core.soles.foot_attitude import (
 )
 from ...core.soles.soles import PlacedSole, prop_sole
 from ..settings import frame_rate_of, gravity_of
+from .recording import Recording
 from .rig_at_rest import RestPose
 from .rig_mapping import RigMapping, SoleSource
+from .skin_stances import SkinStances
 from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
 
 _REST_IS_FLAT = np.radians(10.0)
@@ -39,47 +41,6 @@ _SAME_SIZE = 0.2
 """Relative difference of foot bones up to which both feet are given one size."""
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Where bones and objects are over time, as evaluated; a bone's y axis points from head to tail.
-
-    Attributes
-    ----------
-    frames : (F,) float array
-    bones : tuple of str
-        Names.
-    poses : (F, bones, 4, 4) float32 array
-        Transposed matrices of the bones in the armature's space, as Blender gives them [Blender units].
-    world : (F, 4, 4) float array
-        Of the armature [Blender units].
-    things : mapping of str to (F, 4, 4) float array
-        World matrices of the objects by their names [m].
-    metre : float
-        Blender unit [m].
-    """
-
-    frames: Array
-    bones: tuple[str, ...]
-    poses: NDArray[np.float32]
-    world: Array
-    things: Mapping[str, Array]
-    metre: float
-
-    @property
-    def armature(self) -> Array:
-        """World matrices of the armature, (F, 4, 4) [m]."""
-        return self._in_metres(self.world.copy())
-
-    def bone(self, name: str) -> Array:
-        """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
-        pose = self.poses[:, self.bones.index(name)].astype(float)
-        return self._in_metres(self.world @ np.swapaxes(pose, -1, -2))
-
-    def _in_metres(self, matrices: Array) -> Array:
-        matrices[..., :3, :] *= self.metre
-        return matrices
-
-
 def assemble_motion(
     scene: bpy.types.Scene,
     armature: bpy.types.Object,
@@ -88,6 +49,7 @@ def assemble_motion(
     *,
     mass: float,
     carried: Mapping[str, SoleMotion],
+    stances: SkinStances | None = None,
 ) -> Generator[int, None, CharacterMotion]:
     """The character's motion with the soles of its mapping.
 
@@ -103,6 +65,8 @@ def assemble_motion(
         [kg]
     carried : mapping of str to SoleMotion
         The objects that print, by name of the sole.
+    stances : SkinStances, optional
+        When the skin bears, and how the feet lie then.
 
     Raises
     ------
@@ -112,15 +76,20 @@ def assemble_motion(
     rest = RestPose.of(armature, mapping, recording.armature)
     frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
     leg = rest.leg_length(mapping)
+    if not rest.is_upright:
+        stances = None  # where the whole rig is tilted, what its feet stand on is tilted with it
 
     sources = [source for source in mapping.soles if not source.object and not source.limb]
-    feet = [_Foot.of(source, recording, rest) for source in sources]
+    standing = stances.standing if stances else {}
+    feet = [_Foot.of(source, recording, rest, standing.get(source.name)) for source in sources]
     step = float(recording.frames[1] - recording.frames[0]) if len(recording.frames) > 1 else 1.0
     planted = planted_instants(
         [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
     )
     yield len(recording.frames)
-    meshes = find_foot_meshes(scene, rest.armature, sources, rest.world)
+    unseen = [source for source in sources if source.name not in standing]
+    meshes = find_foot_meshes(scene, rest.armature, unseen, rest.world)
+    meshes |= stances.meshes if stances else {}
     yield len(recording.frames)
     flats = _flat_feet(feet, planted, rest, facing=rest.facing(mapping), leg=leg, modelled=meshes.keys())
     sizes = [
@@ -135,6 +104,9 @@ def assemble_motion(
         yield len(recording.frames)
     motions.update(_limb_motions(scene, mapping, recording, rest))
     motions.update(carried)
+    if stances:
+        for name, bears in stances.bears.items():
+            motions[name] = replace(motions[name], bears=bears)
 
     return CharacterMotion(
         name=rest.armature.name,
@@ -149,6 +121,7 @@ def assemble_motion(
         },
         gravity=gravity,
         four_legged=rest.is_four_legged(mapping),
+        ground_level=stances.level if stances else None,
     )
 
 
@@ -205,6 +178,7 @@ class _Foot:
     motion: Array
     toe_motion: Array
     path: Array  # of ankle and hinge, (F, 2, 3)
+    stands: bool = False  # joints and motions are from where it is seen standing, in place of the rest pose
 
     @property
     def ball(self) -> Array | None:
@@ -217,24 +191,32 @@ class _Foot:
         return SoleMotion(placed.sole, np.stack(transforms, axis=1))
 
     @classmethod
-    def of(cls, source: SoleSource, recording: Recording, rest: RestPose) -> _Foot:
+    def of(cls, source: SoleSource, recording: Recording, rest: RestPose, standing: int | None = None) -> _Foot:
+        """A foot and its bones, from the rest pose or from the sample at which its skin is seen standing."""
+        bones = rest.armature.data.bones
         last = source.toe_bone or source.bone
-        hinge = (last, "head") if source.toe_bone else (last, "tail")
         matrices = recording.bone(source.bone)
         last_matrices = recording.bone(last) if source.toe_bone else matrices
-        motion = _rigid_motion(matrices, rest.matrix(source.bone))
-        length = rest.armature.data.bones[source.bone].length
+        start, last_start = (
+            (rest.matrix(source.bone), rest.matrix(last))
+            if standing is None
+            else (matrices[standing], last_matrices[standing])
+        )
+        motion = _rigid_motion(matrices, start)
+        length, last_length = bones[source.bone].length, bones[last].length
+        tip = last_start[:3, 3] + last_length * last_start[:3, 1]
         return cls(
             source=source,
-            ankle=rest.end(source.bone, "head"),
-            hinge=rest.end(*hinge),
-            tip=rest.end(last, "tail"),
+            ankle=start[:3, 3],
+            hinge=last_start[:3, 3] if source.toe_bone else tip,
+            tip=tip,
             motion=motion,
-            toe_motion=_rigid_motion(last_matrices, rest.matrix(last)) if source.toe_bone else motion,
+            toe_motion=_rigid_motion(last_matrices, last_start) if source.toe_bone else motion,
             path=np.stack(
                 [matrices[:, :3, 3], along_bone(last_matrices, 0.0 if source.toe_bone else length)],
                 axis=1,
             ),
+            stands=standing is not None,
         )
 
 
@@ -273,6 +255,11 @@ def _stand(
     stands at rest.
     """
 
+    foot, own = feet[place], planted[place]
+    if foot.stands:
+        ahead = _pointing(foot, UP, facing, leg)
+        return flat_foot(foot.ankle, foot.hinge, ahead, foot_up=UP, toe_up=UP, toe_turns=np.eye(3)[None])
+
     def standing(turns: Sequence[Array], tilts: Array) -> Array:
         def levelled(index: int) -> Array:
             stands = planted[index]
@@ -284,7 +271,6 @@ def _stand(
     foot_motions, toe_motions = [other.motion for other in feet], [other.toe_motion for other in feet]
     levels = (np.broadcast_to(np.eye(3), rest.tilts.shape), rest.tilts)
     foot_up, tilts = max(((standing(foot_motions, level), level) for level in levels), key=lambda found: found[0] @ UP)
-    foot, own = feet[place], planted[place]
     return flat_foot(
         foot.ankle,
         foot.hinge,

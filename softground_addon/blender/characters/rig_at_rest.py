@@ -59,6 +59,11 @@ class RestPose:
     def is_mirrored(self) -> bool:
         return bool(np.linalg.det(self.world[:3, :3]) < 0)
 
+    @property
+    def is_upright(self) -> bool:
+        """Whether the armature stands upright in every frame."""
+        return bool(self.tilts[:, 2, 2].min() > _UPRIGHT)
+
     def matrix(self, bone: str) -> Array:
         return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
 

@@ -7,7 +7,7 @@ user's frame, pose and handlers are left alone.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from itertools import chain
 
@@ -20,9 +20,12 @@ from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
 from ..settings import found, frame_rate_of, gravity_of, name_of, time_stretch_of
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
-from .motion_assembly import Recording, assemble_motion
+from .motion_assembly import assemble_motion
 from .prop_extraction import check_things, prop_motion
+from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource, require_armature
+from .skin_sampling import read_skin
+from .skin_stances import LONGEST, skin_stances
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -85,15 +88,12 @@ def sample_character(
     """
     _check_input(scene, armature, mapping, mass)
     _check_frames(frames)
-    bones = dict.fromkeys([bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)])
-    things = dict.fromkeys(source.object for source in mapping.soles if source.object)
+    bones = [bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)]
+    on_bones = any(source.bone and not source.object for source in mapping.soles)
+    skin = read_skin(scene, armature) if on_bones and len(frames) <= LONGEST else None
+    things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig = name_of(armature)
-    with without_layer(armature):
-        keyed = not things and is_moved_by_keys_alone(armature, bones)
-    if keyed:
-        recording = yield from _read_keys(scene, armature.name_full, frames, list(bones))
-    else:
-        recording = yield from _evaluate(scene, armature.name_full, frames, list(bones), list(things))
+    recording = yield from record(scene, armature, frames, [*bones, *(skin.bones if skin else ())], things)
     armature = found(rig)
     _check_recording(armature.name, recording)
     carried = {
@@ -101,7 +101,27 @@ def sample_character(
         for source in mapping.soles
         if source.object
     }
-    return (yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried))
+    rate = frame_rate_of(scene) / frames.step
+    stances = skin_stances(skin, armature, mapping, recording, rate) if skin else None
+    return (
+        yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried, stances=stances)
+    )
+
+
+def record(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    frames: range,
+    bones: Iterable[str],
+    things: Sequence[str] = (),
+) -> Generator[int, None, Recording]:
+    """Where some bones of a rig and some objects are over time; yields the number of frames read."""
+    names = list(dict.fromkeys(bones))
+    with without_layer(armature):
+        keyed = not things and is_moved_by_keys_alone(armature, names)
+    if keyed:
+        return (yield from _read_keys(scene, armature.name_full, frames, names))
+    return (yield from _evaluate(scene, armature.name_full, frames, names, things))
 
 
 def sample_thing(

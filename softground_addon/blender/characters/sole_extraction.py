@@ -120,7 +120,7 @@ def find_foot_meshes(
     return _find_meshes(
         scene,
         armature,
-        {source.name: _bone_families(armature, source) for source in sources if source.bone},
+        {source.name: bone_families(armature, source) for source in sources if source.bone},
         rest_world,
     )
 
@@ -129,18 +129,24 @@ def find_limb_meshes(
     scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, rest_world: Array
 ) -> dict[str, FootMesh]:
     """The meshes on each limb that prints, by name of the sole: what moves with its bone, up to the next joints."""
-    joints = {bone for bone, end in mapping.joints.values() if end == "head"}
-    soles = {bone for source in mapping.soles for bone in (source.bone, source.toe_bone) if bone}
-    families: dict[str, tuple[frozenset[str], frozenset[str]]] = {}
-    for source in mapping.soles:
-        if source.limb and not source.object:
-            family, waiting = set(), [armature.data.bones[source.bone]]
-            while waiting:
-                bone = waiting.pop()
-                family.add(bone.name)
-                waiting += [child for child in bone.children if child.name not in joints | soles]
-            families[source.name] = frozenset(family), frozenset()
+    families = {
+        source.name: (limb_family(armature, source, mapping), frozenset[str]())
+        for source in mapping.soles
+        if source.limb and not source.object
+    }
     return _find_meshes(scene, armature, families, rest_world)
+
+
+def limb_family(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
+    """Names of the bones that move with a limb, up to the next joints and soles."""
+    joints = {bone for bone, end in mapping.joints.values() if end == "head"}
+    soles = {bone for other in mapping.soles for bone in (other.bone, other.toe_bone) if bone}
+    family, waiting = set(), [armature.data.bones[source.bone]]
+    while waiting:
+        bone = waiting.pop()
+        family.add(bone.name)
+        waiting += [child for child in bone.children if child.name not in joints | soles]
+    return frozenset(family)
 
 
 def _find_meshes(
@@ -189,7 +195,7 @@ def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.ty
     ]
 
 
-def _bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
+def bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
     """Names of the bones that move with the foot and, of these, with the toes."""
     bones = armature.data.bones
     toes: frozenset[str] = frozenset()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from .character import DEFAULT_MASS as DEFAULT_MASS
-from .character import SoftGroundCharacter, SoftGroundJoint, SoftGroundSole
+from .character import DEFAULT_MASS, SoftGroundCharacter, SoftGroundJoint, SoftGroundPart, SoftGroundSole
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .response import SoftGroundGrounding, SoftGroundTilt
-from .scene import DEFAULT_CELL_SIZE as DEFAULT_CELL_SIZE
-from .scene import SoftGroundSettings
+from .scene import DEFAULT_CELL_SIZE, SoftGroundSettings
 
 CLASSES = (
     SoftGroundJoint,
+    SoftGroundPart,
     SoftGroundSole,
     SoftGroundCharacter,
     SoftGroundMaterial,
@@ -19,3 +18,17 @@ CLASSES = (
     SoftGroundGrounding,
     SoftGroundSettings,
 )
+
+__all__ = [
+    "CLASSES",
+    "DEFAULT_CELL_SIZE",
+    "DEFAULT_MASS",
+    "SoftGroundCharacter",
+    "SoftGroundGrounding",
+    "SoftGroundJoint",
+    "SoftGroundMaterial",
+    "SoftGroundPainted",
+    "SoftGroundSettings",
+    "SoftGroundSole",
+    "SoftGroundTilt",
+]

@@ -36,6 +36,10 @@ class SoftGroundJoint(bpy.types.PropertyGroup):
     )
 
 
+class SoftGroundPart(bpy.types.PropertyGroup):
+    """A bone whose skin belongs to a contact; `name` is the bone."""
+
+
 class SoftGroundSole(bpy.types.PropertyGroup):
     """One thing that prints; `name` is what the report calls it."""
 
@@ -55,6 +59,7 @@ class SoftGroundSole(bpy.types.PropertyGroup):
         default="FOOT",
     )
     bone: StringProperty(name="Bone", description="Bone that carries the sole; of a foot, from heel to ball")
+    parts: CollectionProperty(name="Parts", type=SoftGroundPart)
     toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
     object: PointerProperty(
         name="Object",

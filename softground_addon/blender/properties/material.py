@@ -12,10 +12,9 @@ from ...core.ground.presets import SURFACES
 from .fields import in_unit
 
 
-def _ranged(field: str, name: str, description: str, default: float = 0.0, **how: Any) -> Any:
-    """A number of the material, between the limits that it has there."""
+def _limits(field: str) -> dict[str, float]:
     low, high = MATERIAL_RANGES[field]
-    return FloatProperty(name=name, description=description, default=default, min=low, max=high, **how)
+    return {"min": low, "max": high}
 
 
 _STIFFNESS = (
@@ -42,57 +41,104 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
         items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
         default="snow",
     )
-    youngs_modulus: _ranged("youngs_modulus", "Young's Modulus (Pa)", _STIFFNESS, 375e3, precision=0, step=1000000)
-    poisson_ratio: _ranged(
-        "poisson_ratio",
-        "Poisson's Ratio",
-        "How much of the pressed-down volume rises around the foot: none at 0, all of it at 0.5 (sand)",
-        0.05,
-        precision=3,
+    youngs_modulus: FloatProperty(
+        name="Young's Modulus (Pa)",
+        description=_STIFFNESS,
+        default=375e3,
+        precision=0,
+        step=1000000,
+        **_limits("youngs_modulus"),
     )
-    characteristic_time: _ranged(
-        "characteristic_time",
-        "Time",
-        "How long the ground takes to give way under a steady load",
-        0.2,
+    poisson_ratio: FloatProperty(
+        name="Poisson's Ratio",
+        description="How much of the pressed-down volume rises around the foot: none at 0, all of it at 0.5 (sand)",
+        default=0.05,
+        precision=3,
+        **_limits("poisson_ratio"),
+    )
+    characteristic_time: FloatProperty(
+        name="Time",
+        description="How long the ground takes to give way under a steady load",
+        default=0.2,
         precision=3,
         unit="TIME_ABSOLUTE",
+        **_limits("characteristic_time"),
     )
-    layer_depth: _ranged("layer_depth", "Layer Depth (m)", _LAYER, 0.3, precision=3, soft_max=2.0)
-    rim_reach: _ranged("rim_reach", "Rim Reach (m)", _RIM_REACH, 0.04, precision=3, soft_max=0.5)
-    blur_sigma: _ranged("blur_sigma", "Smoothing (m)", _SMOOTHING, 0.005, precision=4, soft_max=0.05)
-    rim_bias: _ranged(
-        "rim_bias",
-        "Rim Ahead",
-        "How much more of the rim rises ahead of a moving foot than behind it: 0 none, 1 all of it",
+    layer_depth: FloatProperty(
+        name="Layer Depth (m)",
+        description=_LAYER,
+        default=0.3,
+        precision=3,
+        soft_max=2.0,
+        **_limits("layer_depth"),
+    )
+    rim_reach: FloatProperty(
+        name="Rim Reach (m)",
+        description=_RIM_REACH,
+        default=0.04,
+        precision=3,
+        soft_max=0.5,
+        **_limits("rim_reach"),
+    )
+    blur_sigma: FloatProperty(
+        name="Smoothing (m)",
+        description=_SMOOTHING,
+        default=0.005,
+        precision=4,
+        soft_max=0.05,
+        **_limits("blur_sigma"),
+    )
+    rim_bias: FloatProperty(
+        name="Rim Ahead",
+        description="How much more of the rim rises ahead of a moving foot than behind it: 0 none, 1 all of it",
+        default=0.0,
         subtype="FACTOR",
+        **_limits("rim_bias"),
     )
-    repose_angle: _ranged(
-        "repose_angle",
-        "Angle of Repose",
-        "Steepest slope that loose ground keeps: rims and walls slide down to it. 0 keeps them as pressed; dry sand "
-        "has 32°",
+    repose_angle: FloatProperty(
+        name="Angle of Repose",
+        description="Steepest slope that loose ground keeps: rims and walls slide down to it. 0 keeps them as pressed; "
+        "dry sand has 32°",
+        default=0.0,
         subtype="ANGLE",
+        **_limits("repose_angle"),
     )
-    shortest_time: _ranged(
-        "shortest_time",
-        "Shortest Time",
-        "Under a fast landing the ground gives way within the time that the foot takes to stop, down to this. 0 always "
-        "takes the full time",
+    shortest_time: FloatProperty(
+        name="Shortest Time",
+        description="Under a fast landing the ground gives way within the time that the foot takes to stop, down to "
+        "this. 0 always takes the full time",
+        default=0.0,
         precision=3,
         soft_max=0.2,
         unit="TIME_ABSOLUTE",
+        **_limits("shortest_time"),
     )
-    hardening: _ranged(
-        "hardening",
-        "Hardening",
-        "How much stiffer trodden ground is under the next foot: at 10, a second step like the first adds less than a "
-        "third of it. 0 turns it off",
+    hardening: FloatProperty(
+        name="Hardening",
+        description="How much stiffer trodden ground is under the next foot: at 10, a second step like the first adds "
+        "less than a third of it. 0 turns it off",
+        default=0.0,
         precision=1,
         soft_max=50.0,
+        **_limits("hardening"),
     )
-    crust_stress: _ranged("crust_stress", "Crust (Pa)", _CRUST, precision=0, soft_max=100e3, step=100000)
-    firm_depth: _ranged("firm_depth", "Firm Below (m)", _FIRM_BELOW, precision=3, soft_max=0.3)
+    crust_stress: FloatProperty(
+        name="Crust (Pa)",
+        description=_CRUST,
+        default=0.0,
+        precision=0,
+        soft_max=100e3,
+        step=100000,
+        **_limits("crust_stress"),
+    )
+    firm_depth: FloatProperty(
+        name="Firm Below (m)",
+        description=_FIRM_BELOW,
+        default=0.0,
+        precision=3,
+        soft_max=0.3,
+        **_limits("firm_depth"),
+    )
 
     stiffness_mpa: in_unit(
         "youngs_modulus", 1e6, "Stiffness (MPa)", _STIFFNESS, min=1e-3, soft_min=0.02, soft_max=5.0, precision=3, step=1

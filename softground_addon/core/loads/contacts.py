@@ -117,6 +117,8 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     Contacts
     """
     tracks = [_track(sole, motion, terrain) for sole in motion.soles]
+    if (seen := _seen_on_skin(motion, terrain, tracks)) is not None:
+        return seen
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
@@ -132,6 +134,27 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
     return Contacts(np.stack(touching, axis=1), offset, normal, clearance)
+
+
+def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track]) -> Contacts | None:
+    """The contacts that the skin shows, at one offset for the character, where the ground is level under them."""
+    level, bears = motion.ground_level, [sole.bears for sole in motion.soles]
+    if level is None or any(seen is None for seen in bears):
+        return None
+    touching = np.stack([seen for seen in bears if seen is not None], axis=1)
+    clearance = np.stack([track.clearance for track in tracks], axis=1)
+    touching &= np.isfinite(clearance)
+    under = [sole.landmark_positions()[on, :, :2] for sole, on in zip(motion.soles, touching.T, strict=True)]
+    places = np.concatenate([points.reshape(-1, 2) for points in under])
+    heights = terrain.heights(*places.T)
+    heights = heights[np.isfinite(heights)]
+    if not len(heights) or np.ptp(heights) > TOUCH_HEIGHT * motion.leg_length:
+        return None
+    offset = level - float(np.median(heights))
+    if abs(offset) > FLOAT_LIMIT * motion.leg_length:
+        return None
+    normal = np.stack([track.normal for track in tracks], axis=1)
+    return Contacts(touching, np.full(len(tracks), offset), normal, clearance - offset)
 
 
 def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:

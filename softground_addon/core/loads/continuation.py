@@ -127,5 +127,12 @@ def _held(motion: CharacterMotion) -> Mask:
 
 def _mapped(motion: CharacterMotion, change: Callable[[Array], Array]) -> CharacterMotion:
     """The motion with every pose and joint path changed likewise."""
-    soles = tuple(dataclasses.replace(sole, transforms=orthonormal(change(sole.transforms))) for sole in motion.soles)
+    soles = tuple(
+        dataclasses.replace(
+            sole,
+            transforms=orthonormal(change(sole.transforms)),
+            bears=None if sole.bears is None else change(sole.bears.astype(float)) > 0.5,
+        )
+        for sole in motion.soles
+    )
     return dataclasses.replace(motion, soles=soles, joints={name: change(path) for name, path in motion.joints.items()})

@@ -15,6 +15,7 @@ from .contacts import Contacts, detect_contacts
 from .continuation import continued, without_holds
 from .forces import ContactForces, impulse_forces, whole_body_forces
 from .free_bodies import free_loads
+from .sliding import treadmill_speed
 
 ForceModel = Literal["WHOLE_BODY", "IMPULSE"]
 
@@ -63,12 +64,14 @@ def estimate_loads(
     yield
     contacts = detect_contacts(source, terrain)
     yield
-    if force_model == "IMPULSE":
+    if force_model == "IMPULSE" or not motion.joints:  # without joints, nothing tells what the body does
         forces = impulse_forces(source, contacts, material.characteristic_time)
     else:
         body = body_dynamics(source, ~contacts.touching.any(axis=1))
         yield
-        contacts = refine_contacts(source, contacts, body)
+        # A cycle on the spot is acted: its skin tells better when it touches than the forces that would move it so.
+        if source.ground_level is None or treadmill_speed(source, contacts) == 0:
+            contacts = refine_contacts(source, contacts, body)
         yield
         forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)
     shown = slice(given.start * steps, (given.stop - 1) * steps + 1)

@@ -119,10 +119,13 @@ class SoleMotion:
     sole : Sole
     transforms : (F, P, 4, 4) float array
         Patch frame to world, rotation and translation only [m]; of the one frame of a prop.
+    bears : (F,) bool array or None
+        When the skin under it bears on level ground, where that was seen.
     """
 
     sole: Sole
     transforms: Array
+    bears: NDArray[np.bool_] | None = None
 
     def landmark_positions(self) -> Array:
         """World positions of the sole's landmarks, (F, L, 3) [m]; worked out once, not to be written to."""
@@ -154,7 +157,13 @@ class SoleMotion:
         so that what rolls keeps its shape and what stops at once does not swing past.
         """
         method = turning if self.sole.prop else _rigid_cubic
-        return dataclasses.replace(self, transforms=_between(self.transforms, position, method))
+        bears = None if self.bears is None else self.bears[np.rint(position).astype(np.intp)]
+        return dataclasses.replace(self, transforms=_between(self.transforms, position, method), bears=bears)
+
+    def of(self, samples: slice | NDArray[np.bool_]) -> SoleMotion:
+        """Some of the samples."""
+        bears = None if self.bears is None else self.bears[samples]
+        return dataclasses.replace(self, transforms=self.transforms[samples], bears=bears)
 
 
 @dataclass(frozen=True)
@@ -183,6 +192,8 @@ class CharacterMotion:
         joints tell it.
     four_legged : bool
         An animal on four legs: its mass is distributed otherwise than a man's.
+    ground_level : float or None
+        Height at which its skin rests on level ground [m], where that was seen.
     """
 
     name: str
@@ -195,6 +206,7 @@ class CharacterMotion:
     gravity: float = 9.81
     centre: Array | None = None
     four_legged: bool = False
+    ground_level: float | None = None
 
     @property
     def times(self) -> Array:
@@ -266,7 +278,7 @@ class CharacterMotion:
         return dataclasses.replace(
             self,
             frames=self.frames[samples],
-            soles=tuple(dataclasses.replace(sole, transforms=sole.transforms[samples]) for sole in self.soles),
+            soles=tuple(sole.of(samples) for sole in self.soles),
             joints={name: path[samples] for name, path in self.joints.items()},
             centre=None if self.centre is None else self.centre[samples],
         )

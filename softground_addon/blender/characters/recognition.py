@@ -1,0 +1,101 @@
+"""What a character prints with: from its skin where it has one, else from the names and the rest pose of its bones."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.numerics.rigid import unit
+from ...core.skin.contacts import SkinContacts, find_contacts
+from .. import jobs
+from ..settings import frame_rate_of, time_stretch_of
+from .recording import Recording
+from .rig_mapping import RigMapping, SoleSource, map_rig
+from .rig_sampling import is_animated, record
+from .skin_sampling import FollowedSkin, followed_skin, read_skin
+from .skin_stances import UNDERSIDE
+from .sole_extraction import bone_families
+
+MOST_FRAMES = 500
+"""Frames from the beginning of the animation that are looked at."""
+
+TURNED = 50.0
+"""A contact whose bone leans farther than this from how it mostly bears prints by other sides too [°]."""
+
+TURNED_SHARE = 0.2
+"""Share of the bearing time for which it does."""
+
+
+def recognise(scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None = None) -> RigMapping:
+    """Joints and contacts of a character.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    armature : bpy.types.Object
+    frames : tuple of int, optional
+        First and last frame of its animation.
+
+    Raises
+    ------
+    InputError
+        If neither the skin, nor the names, nor the rest pose show any contact.
+    """
+    seen = _contacts_of_skin(scene, armature, frames) if frames and is_animated(armature) else ()
+    try:
+        mapping = map_rig(armature)
+    except InputError:
+        if not seen:
+            raise
+        mapping = RigMapping(method="skin")
+    return RigMapping(mapping.joints, _joined(armature, mapping.soles, seen), mapping.method)
+
+
+def _joined(
+    armature: bpy.types.Object, named: tuple[SoleSource, ...], seen: tuple[SoleSource, ...]
+) -> tuple[SoleSource, ...]:
+    """What the names say with the skin's parts, and what only the skin shows."""
+    soles, left = [], list(seen)
+    for source in named:
+        family, _ = bone_families(armature, source)
+        same = [contact for contact in left if family & {*contact.parts}]
+        left = [contact for contact in left if contact not in same]
+        parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
+        soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))
+    return (*soles, *left)
+
+
+def _contacts_of_skin(
+    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int]
+) -> tuple[SoleSource, ...]:
+    """The contacts that the skin shows."""
+    skin = read_skin(scene, armature)
+    if skin is None or armature.mode == "EDIT" or armature.data.pose_position == "REST":
+        return ()
+    first, last = (round(frame / time_stretch_of(scene)) for frame in frames)
+    reading = record(scene, armature, range(first, min(last, first + MOST_FRAMES) + 1), skin.bones)
+    recording = jobs.run(jobs.counted(reading, "sample", MOST_FRAMES))
+    followed = followed_skin(skin, armature, recording, frame_rate_of(scene))
+    found = find_contacts(followed.motion)
+    return tuple(_source(number, found, followed, recording) for number in range(found.bears.shape[1]))
+
+
+def _source(number: int, found: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource:
+    """One contact, carried by the bone with most of the skin that bears."""
+    parts = np.flatnonzero(found.group == number)
+    bears = found.bears[:, number]
+    height = followed.motion.positions[bears][..., 2] - found.level
+    low = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=0)
+    weight = np.bincount(followed.motion.part, low, len(followed.bones))
+    bones = [followed.bones[part] for part in parts if followed.bones[part]]
+    main = followed.bones[int(parts[weight[parts].argmax()])]
+    return SoleSource(main, "", main, limb=_turns(recording, main, bears), parts=tuple(bones))
+
+
+def _turns(recording: Recording, bone: str, bears: NDArray[np.bool_]) -> bool:
+    """Whether a bone bears in attitudes that differ much."""
+    axes = unit(np.swapaxes(recording.bone(bone)[bears, :3, :3], -1, -2)[..., 2])
+    usual = unit(np.median(axes, axis=0))
+    return bool((axes @ usual < np.cos(np.radians(TURNED))).mean() > TURNED_SHARE)

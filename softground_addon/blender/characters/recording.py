@@ -1,0 +1,57 @@
+"""Where the bones of a rig are over time, as they were read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.motion.motion import Array
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Where bones and objects are over time, as evaluated; a bone's y axis points from head to tail.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+    bones : tuple of str
+        Names.
+    poses : (F, bones, 4, 4) float32 array
+        Transposed matrices of the bones in the armature's space, as Blender gives them [Blender units].
+    world : (F, 4, 4) float array
+        Of the armature [Blender units].
+    things : mapping of str to (F, 4, 4) float array
+        World matrices of the objects by their names [m].
+    metre : float
+        Blender unit [m].
+    """
+
+    frames: Array
+    bones: tuple[str, ...]
+    poses: NDArray[np.float32]
+    world: Array
+    things: Mapping[str, Array]
+    metre: float
+
+    @property
+    def armature(self) -> Array:
+        """World matrices of the armature, (F, 4, 4) [m]."""
+        return self._in_metres(self.world.copy())
+
+    def bone(self, name: str) -> Array:
+        """World matrices of a bone, (F, 4, 4) [m]; worked out anew, as all bones at once take much memory."""
+        pose = self.poses[:, self.bones.index(name)].astype(float)
+        return self._in_metres(self.world @ np.swapaxes(pose, -1, -2))
+
+    def of(self, samples: NDArray[np.intp]) -> Recording:
+        """Some of the samples."""
+        things = {name: matrices[samples] for name, matrices in self.things.items()}
+        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], things, self.metre)
+
+    def _in_metres(self, matrices: Array) -> Array:
+        matrices[..., :3, :] *= self.metre
+        return matrices

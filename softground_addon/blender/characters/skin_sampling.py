@@ -1,0 +1,283 @@
+"""The skin of a rig over time: its meshes as their bones move them, by weights and matrices alone.
+
+No mesh is evaluated: linear blend skinning of a few thousand vertices is exact for what the Armature modifier does and
+takes milliseconds, while Blender evaluates every mesh of a scene at every frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.motion.motion import Array
+from ...core.skin.skin_motion import SkinMotion
+from .. import mesh_arrays
+from .recording import Recording
+from .sole_extraction import meshes_on
+
+Indices = NDArray[np.intp]
+
+_WELD = 1e-5
+"""Vertices nearer than this over the size of the mesh are one."""
+
+_LEAST_WEIGHT = 1e-4
+"""Weights that come to less leave a vertex where its object is, as in Blender's armature deformation."""
+
+
+@dataclass(frozen=True)
+class RigSkin:
+    """The meshes of a rig in its rest pose, and what moves them.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        In the armature's space [Blender units].
+    triangles : (T, 3) int array
+    bones : tuple of str
+        Names of the bones that move some vertex; the armature itself is the last part, without a name here.
+    weights : tuple of (vertices, weights) for each bone
+        Which vertices (N,) a bone moves, and how much (N,).
+    part : (V,) int array
+        The bone that moves each vertex most, as an index; that of the armature where none does.
+    hung : (V,) bool array
+        Of objects that hang on a bone instead of being deformed.
+    """
+
+    vertices: Array
+    triangles: Indices
+    bones: tuple[str, ...]
+    weights: tuple[tuple[Indices, Array], ...]
+    part: Indices
+    hung: NDArray[np.bool_]
+
+
+def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> RigSkin | None:
+    """The rendered meshes on an armature, or None where there is none.
+
+    Raises
+    ------
+    InputError
+        If one is being edited.
+    """
+    pieces = []
+    for thing in meshes_on(scene, armature):
+        if thing.mode == "EDIT":
+            raise InputError(
+                f"'{thing.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first."
+            )
+        mesh = thing.data
+        assert isinstance(mesh, bpy.types.Mesh), thing.name
+        if not len(mesh.polygons):
+            continue
+        hung = thing.parent == armature and thing.parent_type == "BONE"
+        pieces.append(_hung(thing, mesh, armature) if hung else _deformed(thing, mesh, armature))
+    if not pieces:
+        return None
+    bones = tuple(dict.fromkeys(name for piece in pieces for name in piece.names))
+    place = {name: number for number, name in enumerate(bones)}
+    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    vertex = np.concatenate([piece.vertex + start for piece, start in zip(pieces, first[:-1], strict=True)])
+    numbers = [np.array([place[name] for name in piece.names], dtype=np.intp) for piece in pieces]
+    bone = np.concatenate([number[piece.group] for number, piece in zip(numbers, pieces, strict=True)])
+    weight = np.concatenate([piece.weight for piece in pieces])
+    return RigSkin(
+        vertices=np.concatenate([piece.vertices for piece in pieces]),
+        triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, first[:-1], strict=True)]),
+        bones=bones,
+        weights=tuple((vertex[bone == number], weight[bone == number]) for number in range(len(bones))),
+        part=_dominant(vertex, bone, weight, int(first[-1]), len(bones)),
+        hung=np.concatenate([np.full(len(piece.vertices), piece.hung) for piece in pieces]),
+    )
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """One mesh: its vertices in the armature's space, and the weights that bones have on them."""
+
+    vertices: Array
+    triangles: Indices
+    names: tuple[str, ...]
+    vertex: Indices
+    group: Indices
+    weight: Array
+    hung: bool = False
+
+
+def _hung(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types.Object) -> _Piece:
+    bone = armature.data.bones[thing.parent_bone]
+    parent = np.eye(4)
+    if not bone.use_relative_parent:
+        parent = np.array(bone.matrix_local)
+        parent[:3, 3] += parent[:3, 1] * bone.length
+    to_armature = parent @ np.array(thing.matrix_parent_inverse @ thing.matrix_basis)
+    count = len(mesh.vertices)
+    return _Piece(
+        _moved(to_armature, mesh_arrays.positions(mesh)),
+        mesh_arrays.triangles(mesh),
+        (bone.name,),
+        np.arange(count),
+        np.zeros(count, dtype=np.intp),
+        np.ones(count),
+        hung=True,
+    )
+
+
+def _deformed(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types.Object) -> _Piece:
+    bones = armature.data.bones
+    names = tuple(group.name for group in thing.vertex_groups)
+    deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])
+    entries = [(vertex.index, each.group, each.weight) for vertex in mesh.vertices for each in vertex.groups]
+    table = np.array(entries, dtype=float).reshape(-1, 3)
+    group = table[:, 1].astype(np.intp)
+    table, group = table[deforms[group]], group[deforms[group]]
+    vertex = table[:, 0].astype(np.intp)
+    used, group = np.unique(group, return_inverse=True)
+    total = np.bincount(vertex, table[:, 2], len(mesh.vertices))
+    held = total[vertex] > _LEAST_WEIGHT
+    to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
+    return _Piece(
+        _moved(to_armature, mesh_arrays.positions(mesh)),
+        mesh_arrays.triangles(mesh),
+        tuple(names[number] for number in used),
+        vertex[held],
+        group[held],
+        table[held, 2] / total[vertex[held]],
+    )
+
+
+def _moved(transform: Array, points: NDArray[np.float32]) -> Array:
+    return np.asarray(points @ transform[:3, :3].T + transform[:3, 3], dtype=float)
+
+
+def _dominant(vertex: Indices, bone: Indices, weight: Array, count: int, none: int) -> Indices:
+    """The bone with the largest weight on each vertex."""
+    order = np.lexsort((weight, vertex))
+    last = np.flatnonzero(np.diff(vertex[order], append=-1))
+    part = np.full(count, none, dtype=np.intp)
+    part[vertex[order[last]]] = bone[order[last]]
+    return part
+
+
+def skinned(skin: RigSkin, armature: bpy.types.Object, recording: Recording, chosen: Indices) -> NDArray[np.float32]:
+    """World positions of the chosen vertices over time, (F, N, 3) [m].
+
+    Parameters
+    ----------
+    skin : RigSkin
+    armature : bpy.types.Object
+    recording : Recording
+        Of all `skin.bones`.
+    chosen : (N,) int array
+    """
+    place = np.full(len(skin.vertices), -1, dtype=np.intp)
+    place[chosen] = np.arange(len(chosen))
+    rest = np.column_stack([skin.vertices, np.ones(len(skin.vertices))])
+    result = np.zeros((len(recording.frames), len(chosen), 3), dtype=np.float32)
+    held = np.zeros(len(chosen), dtype=bool)
+    for name, (moved_by, weights) in zip(skin.bones, skin.weights, strict=True):
+        here = place[moved_by] >= 0
+        if not here.any():
+            continue
+        vertex, weight = moved_by[here], weights[here]
+        back = np.linalg.inv(np.array(armature.data.bones[name].matrix_local, dtype=float))
+        moved = recording.bone(name) @ back
+        result[:, place[vertex]] += ((weight[:, None] * rest[vertex]) @ np.swapaxes(moved[:, :3], -1, -2)).astype(
+            np.float32
+        )
+        held[place[vertex]] = True
+    if not held.all():
+        result[:, ~held] = rest[chosen[~held]] @ np.swapaxes(recording.armature[:, :3], -1, -2)
+    return result
+
+
+_PROBES = 8
+"""Poses in which the vertices near the ground are looked for."""
+
+_NEAR = 0.15
+"""Vertices that never come this near to the lowest are left out, in body heights."""
+
+_MOST_POINTS = 3000
+"""Vertices that are followed at most."""
+
+_MOST_PLACES = 6_000_000
+"""The same times the samples, so that long shots fit into memory."""
+
+
+@dataclass(frozen=True)
+class FollowedSkin:
+    """The skin near the ground over time.
+
+    Attributes
+    ----------
+    motion : SkinMotion
+    bones : tuple of str
+        Bone of each part of the motion; empty where only the armature moves it.
+    """
+
+    motion: SkinMotion
+    bones: tuple[str, ...]
+
+
+def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float) -> FollowedSkin:
+    """Some vertices over time, by which the contacts of a rig are found.
+
+    Parameters
+    ----------
+    skin : RigSkin
+    armature : bpy.types.Object
+    recording : Recording
+        Of all `skin.bones`.
+    rate : float
+        Samples per second [Hz].
+    """
+    body = np.flatnonzero(~_carried(skin, armature))
+    probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
+    height = skinned(skin, armature, probes, body)[..., 2]
+    size = float(np.median(np.ptp(height, axis=1)))
+    above = (height - height.min(axis=1, keepdims=True)).min(axis=0)
+    chosen = body[above < _NEAR * size]
+    most = min(_MOST_POINTS, max(_MOST_PLACES // len(recording.frames), 1))
+    if len(chosen) > most:
+        chosen = body[np.argsort(above, kind="stable")[:most]]
+    chosen = chosen[np.argsort(skin.part[chosen], kind="stable")]
+    used, part = np.unique(skin.part[chosen], return_inverse=True)
+    motion = SkinMotion(
+        skinned(skin, armature, recording, chosen), part, _links(skin, armature)[np.ix_(used, used)], rate, size
+    )
+    return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
+
+
+def _carried(skin: RigSkin, armature: bpy.types.Object) -> NDArray[np.bool_]:
+    """Vertices of what a character carries: hung on bones that hang from bones with a skin.
+
+    A robot of rigid pieces has no such skin above them; there they are its body.
+    """
+    bones = armature.data.bones
+    clothed = {skin.bones[number] for number in np.unique(skin.part[~skin.hung]) if number < len(skin.bones)}
+    carries = [any(above.name in clothed for above in bones[name].parent_recursive) for name in skin.bones]
+    return skin.hung & np.array([*carries, False])[skin.part]
+
+
+def _links(skin: RigSkin, armature: bpy.types.Object) -> NDArray[np.bool_]:
+    """Which parts hang together, by welded skin or as parent and child, (P, P) with the armature's own last."""
+    count = len(skin.bones) + 1
+    links = np.zeros((count, count), dtype=bool)
+    corners = skin.part[skin.triangles]
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        links[corners[:, one], corners[:, other]] = True
+    # Imported meshes are cut open along their edges: vertices in one place are one.
+    size = max(float(np.ptp(skin.vertices, axis=0).max()), 1e-12)
+    _, place = np.unique(np.round(skin.vertices / (_WELD * size)), axis=0, return_inverse=True)
+    order = np.lexsort((skin.part, place.ravel()))
+    same = np.diff(place.ravel()[order]) == 0
+    links[skin.part[order[1:]][same], skin.part[order[:-1]][same]] = True
+    number = {name: index for index, name in enumerate(skin.bones)}
+    for name, index in number.items():
+        above = next((bone.name for bone in armature.data.bones[name].parent_recursive if bone.name in number), None)
+        if above:
+            links[index, number[above]] = True
+    return np.asarray(links | links.T)

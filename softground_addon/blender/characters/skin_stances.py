@@ -1,0 +1,138 @@
+"""When the skin of a character's contacts bears, and how its feet lie then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.skin.contacts import find_contacts
+from .recording import Recording
+from .rig_mapping import RigMapping, SoleSource
+from .skin_sampling import FollowedSkin, RigSkin, followed_skin, skinned
+from .sole_extraction import FootMesh, bone_families, limb_family
+
+UNDERSIDE = 0.02
+"""Skin this near to the ground is the underside of a contact that stands, in body heights."""
+
+SOLE_BAND = 0.06
+"""Faces that reach down to this over the ground are looked at for the sole, in body heights."""
+
+LONGEST = 3000
+"""Samples up to which the skin is followed."""
+
+
+@dataclass(frozen=True)
+class SkinStances:
+    """What the skin shows of a character's contacts.
+
+    Attributes
+    ----------
+    level : float
+        Height of the ground [m].
+    bears : mapping of str to (F,) bool array
+        When each contact bears, by name of the sole.
+    standing : mapping of str to int
+        The sample at which most of a foot's underside is on the ground.
+    meshes : mapping of str to FootMesh
+        The foot's skin as it is then.
+    """
+
+    level: float
+    bears: Mapping[str, NDArray[np.bool_]]
+    standing: Mapping[str, int]
+    meshes: Mapping[str, FootMesh]
+
+
+def skin_stances(
+    skin: RigSkin,
+    armature: bpy.types.Object,
+    mapping: RigMapping,
+    recording: Recording,
+    rate: float,
+) -> SkinStances | None:
+    """When some contacts of a character bear and how its feet lie, or None where their skin never comes down.
+
+    Parameters
+    ----------
+    skin : RigSkin
+    armature : bpy.types.Object
+    mapping : RigMapping
+        Its soles on bones are looked at.
+    recording : Recording
+        Of all `skin.bones` and those of the soles.
+    rate : float
+        Samples per second [Hz].
+    """
+    followed = followed_skin(skin, armature, recording, rate)
+    sources = [source for source in mapping.soles if source.bone and not source.object]
+    own = {source.name: _bones_of(armature, source, mapping) for source in sources}
+    numbers: dict[str, int] = {}
+    for number, source in enumerate(sources):
+        numbers = dict.fromkeys(own[source.name], number) | numbers
+    group = np.array([numbers.get(bone, -1) for bone in followed.bones])
+    present = np.unique(group[group >= 0])
+    if not len(present):
+        return None
+    place = np.full(len(sources) + 1, -1)
+    place[present] = np.arange(len(present))
+    found = find_contacts(followed.motion, place[group])
+    never = np.zeros(len(recording.frames), dtype=bool)
+    bears = {source.name: never for source in sources}
+    bears |= {sources[number].name: found.bears[:, contact] for contact, number in enumerate(present)}
+    feet = [source for source in sources if not source.limb and bears[source.name].any()]
+    standing = {
+        source.name: _standing(followed, group == sources.index(source), bears[source.name], found.level)
+        for source in feet
+    }
+    band = found.level + SOLE_BAND * followed.motion.height
+    meshes = {}
+    for source in feet:
+        mesh = _mesh(skin, armature, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
+        if mesh is not None:
+            meshes[source.name] = mesh
+    return SkinStances(found.level, bears, {name: standing[name] for name in meshes}, meshes)
+
+
+def _bones_of(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
+    """The bones whose skin is a contact's."""
+    if source.parts:
+        return frozenset(source.parts)
+    return limb_family(armature, source, mapping) if source.limb else bone_families(armature, source)[0]
+
+
+def _standing(followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[np.bool_], level: float) -> int:
+    """The sample at which most of some parts' points are near the ground while they bear."""
+    height = followed.motion.positions[:, parts[followed.motion.part], 2] - level
+    near = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=1)
+    return int(np.where(bears, near, -1).argmax())
+
+
+def _mesh(
+    skin: RigSkin,
+    armature: bpy.types.Object,
+    source: SoleSource,
+    names: frozenset[str],
+    standing: Recording,
+    highest: float,
+) -> FootMesh | None:
+    """The skin of a foot as it stands, where its faces reach down to a height; None without any face."""
+    _, toes = bone_families(armature, source)
+    own = np.array([name in names for name in skin.bones] + [False])[skin.part]
+    candidates = np.flatnonzero(own[skin.triangles].all(axis=1))
+    used, triangles = np.unique(skin.triangles[candidates], return_inverse=True)
+    if not len(used):
+        return None
+    vertices = skinned(skin, armature, standing, used)[0].astype(float)
+    triangles = triangles.reshape(-1, 3)
+    low = vertices[triangles, 2].min(axis=1) < highest
+    if not low.any():
+        return None
+    toe_weight = np.zeros(len(skin.vertices))
+    for name, (vertex, weight) in zip(skin.bones, skin.weights, strict=True):
+        if name in toes:
+            toe_weight[vertex] += weight
+    return FootMesh(vertices, np.clip(toe_weight[used], 0.0, 1.0), triangles[low])

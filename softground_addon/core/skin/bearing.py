@@ -1,0 +1,71 @@
+"""When each part bears: low, calm and moving with the ground, with hysteresis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics.intervals import hysteresis, runs
+from .skin_motion import Array, Mask, PartTracks
+
+TOUCH, LEAVE = 0.015, 0.018
+"""A part lower than the first over the ground starts to bear, one higher than the second has left, in body heights."""
+LEAVE_RISE = 2.0
+"""A bearing part that rises or falls faster than this many times the calm speed has left."""
+LEAVE_SLIP = 1.5
+"""The same for its slip, over the limit for touching."""
+SLIP_OF_REST = 4.0
+"""A bearing part slips at most this many times as fast as calm low skin does mostly, ..."""
+SLIP_SHARES = 0.15, 0.4
+"""... between these shares of the part's fast slip, ..."""
+LEAST_SLIP = 0.15
+"""... and never less than this, in H/s."""
+BLIP = 0.05
+"""What bears no longer than this does not bear [s]; of shots of at most `FEW` samples it is all that is known."""
+FEW = 4
+HARD_RISE, HARD_SLIP = 2.5, 0.12
+"""A hard step: fast, but it hardly slips; over the calm speed, and over the part's fast slip."""
+
+
+def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
+    """When each part bears.
+
+    Parameters
+    ----------
+    tracks : PartTracks
+    level : float
+        Height of the ground [H].
+    drift : (2,) float array
+        Horizontal velocity of the ground [H/s].
+
+    Returns
+    -------
+    (F, P) bool array
+    """
+    height, speed, slip = tracks.low - level, tracks.rise, tracks.slip(drift)
+    fast = np.percentile(slip, 90, axis=0)
+    limit = np.clip(SLIP_OF_REST * _usual_slip(height, speed, slip, tracks.calm), *(np.outer(SLIP_SHARES, fast)))
+    limit = np.maximum(limit, LEAST_SLIP)
+    near = height < TOUCH
+    touches = near & (speed < tracks.calm) & (slip < limit)
+    touches |= near & (speed < HARD_RISE * tracks.calm) & (slip < np.maximum(HARD_SLIP * fast, LEAST_SLIP))
+    leaves = (height > LEAVE) | (speed > np.maximum(LEAVE_RISE, HARD_RISE * touches) * tracks.calm)
+    leaves |= slip > LEAVE_SLIP * limit
+    bears = hysteresis(touches, leaves)
+    bears |= hysteresis(touches[::-1], leaves[::-1])[::-1]  # a landing is as soft as a lift-off
+    # The only calm skin on the ground bears, even where it slides.
+    sliding = near & (speed < tracks.calm)
+    bears |= sliding & ~bears.any(axis=1, keepdims=True)
+    return _without_blips(bears, round(BLIP * tracks.rate)) if len(bears) > FEW else bears
+
+
+def _without_blips(bears: Mask, longest: int) -> Mask:
+    lasting = bears.copy()
+    for part in np.flatnonzero(bears.any(axis=0)):
+        for first, last in zip(*runs(bears[:, part]), strict=True):
+            lasting[first:last, part] = last - first > longest
+    return lasting
+
+
+def _usual_slip(height: Array, speed: Array, slip: Array, calm: float) -> float:
+    rests = (np.abs(height) < TOUCH) & (speed < calm)
+    return float(np.median(slip[rests])) if rests.any() else 0.0

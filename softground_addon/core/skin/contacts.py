@@ -1,0 +1,91 @@
+"""From the skin to its contacts: the ground, what bears on it and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..numerics.intervals import runs
+from .bearing import bearing
+from .ground_level import drift_of, level_of
+from .merging import merged
+from .skin_motion import Array, Indices, Mask, SkinMotion, track_parts
+
+SHORT = 0.25
+"""A contact that never lasts longer may be a brush [s]."""
+RARE = 0.5
+"""A contact of less than this share of the busiest one's time is rare."""
+SLIPS = 0.5
+"""A contact that slips faster than this share of the fastest slip of its parts brushes."""
+ALONE = 0.5
+"""What bears alone for this share of its time bears the body."""
+
+
+@dataclass(frozen=True)
+class SkinContacts:
+    """What bears of a character, when, and on what.
+
+    Attributes
+    ----------
+    level : float
+        Height of the ground [m].
+    drift : (2,) float array
+        Horizontal velocity of the ground [m/s]: minus the travel that an in-place cycle lacks.
+    group : (P,) int array
+        Contact that each part belongs to, -1 for none.
+    bears : (F, C) bool array
+        When each contact bears.
+    """
+
+    level: float
+    drift: Array
+    group: Indices
+    bears: Mask
+
+
+def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> SkinContacts:
+    """The contacts of a character.
+
+    Parameters
+    ----------
+    skin : SkinMotion
+    groups : (P,) int array, optional
+        The contact that each part belongs to, where that is known; -1 for parts that do not bear.
+    """
+    parts = track_parts(skin)
+    drift = drift_of(parts)
+    level = level_of(parts, drift)
+    if groups is None:
+        parts = track_parts(skin, floor=level)
+        bears = bearing(parts, level, drift)
+        groups = merged(parts, bears, skin.links)
+        groups = _numbered(groups)
+        if (groups >= 0).any():
+            groups = _without_brushes(skin, groups, level, drift)
+    bears = np.zeros((len(skin.positions), 0), dtype=bool)
+    if (groups >= 0).any():
+        bears = bearing(track_parts(skin, groups, level), level, drift)
+    return SkinContacts(level * skin.height, drift * skin.height, groups, bears)
+
+
+def _numbered(groups: Indices) -> Indices:
+    values, numbers = np.unique(groups, return_inverse=True)
+    return np.asarray(numbers - (values[0] == -1), dtype=np.intp)
+
+
+def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Array) -> Indices:
+    """The groups less those that only brush the ground: short, and slipping or rare, while others bear."""
+    tracks = track_parts(skin, groups, level)
+    bears, slip = bearing(tracks, level, drift), tracks.slip(drift)
+    fast, time = np.percentile(slip, 90, axis=0), bears.sum(axis=0)
+    keeps = np.zeros(len(time), dtype=bool)
+    for contact in np.flatnonzero(time):
+        on = bears[:, contact]
+        starts, ends = runs(on)
+        alone = (bears[on].sum(axis=1) == 1).mean()
+        slips = np.median(slip[on, contact]) > SLIPS * fast[contact]
+        rare = time[contact] < RARE * time.max()
+        keeps[contact] = (ends - starts).max() >= SHORT * skin.rate or alone >= ALONE or not (slips or rare)
+    number = np.where(keeps, np.cumsum(keeps) - 1, -1)
+    return np.where(groups >= 0, number[groups], -1)

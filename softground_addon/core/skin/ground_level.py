@@ -1,0 +1,79 @@
+"""The ground that a character rests on, and the speed that an in-place cycle lacks, found together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .skin_motion import Array, PartTracks
+
+REACH = 0.05
+"""What may rest lies at most this far over the lowest skin, in body heights."""
+BIN = 0.004
+"""Step of the levels that are tried, in body heights."""
+FURTHER_PART = 0.15
+"""How much a further part that rests at a level adds to a moment's vote for it."""
+BELOW = 0.03
+"""Skin deeper than this below a level speaks against it, in body heights."""
+AGAINST = 0.35
+"""How much a moment with such skin takes off."""
+SAME_WAY = 0.15
+"""Velocities that differ by less are one, in H/s, or over the speed itself."""
+STANDS = 0.15
+"""A ground that moves slower than this stands, in H/s."""
+STANDING_SHARE = 0.8
+"""A ground that stands wins with this share of the votes of one that moves."""
+MOST_VOTES = 500
+"""Moments of parts that are asked at most."""
+
+
+def drift_of(tracks: PartTracks) -> Array:
+    """Horizontal velocity that most calm low skin has, (2,) [H/s]: 0 where the character travels.
+
+    The belt's in a walk on the spot, backward: minus the travel that root motion would have.
+    """
+    weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH)
+    frame, part = np.nonzero(weight)
+    if not len(frame):
+        return np.zeros(2)
+    if len(frame) > MOST_VOTES:
+        some = np.linspace(0, len(frame) - 1, MOST_VOTES).astype(int)
+        frame, part = frame[some], part[some]
+    ways, weight = tracks.ways.mean(axis=0)[frame, part], weight[frame, part]
+    first = np.flatnonzero(np.diff(frame, prepend=-1))
+
+    def votes(way: Array) -> Array:
+        """Each moment has one vote for a velocity (N, 2), however many parts move with it."""
+        apart = np.linalg.norm(way[:, None] - ways, axis=-1) / _width(way)[:, None]
+        return np.asarray(np.maximum.reduceat(weight * np.clip(1 - apart, 0.0, None), first, axis=1).sum(axis=1))
+
+    found = votes(ways)
+    best = ways[int(found.argmax())]
+    if np.linalg.norm(best) < STANDS or votes(np.zeros((1, 2)))[0] >= STANDING_SHARE * found.max():
+        return np.zeros(2)
+    alike = weight * np.clip(1 - np.linalg.norm(ways - best, axis=-1) / _width(best), 0.0, None)
+    return np.asarray((ways * alike[:, None]).sum(axis=0) / alike.sum())
+
+
+def _width(way: Array) -> Array:
+    return np.maximum(SAME_WAY, SAME_WAY * np.linalg.norm(way, axis=-1))
+
+
+def level_of(tracks: PartTracks, drift: Array) -> float:
+    """Height of the ground [H]: where calm skin that moves with the ground is most often."""
+    lowest = tracks.lowest
+    speed = max(float(np.linalg.norm(drift)), 1.0)
+    agrees = np.clip(1.5 - tracks.slip(drift) / (4 * SAME_WAY * speed), 0.1, 1.0)
+    weight = _calm(tracks) * agrees * np.clip(1 - (tracks.low - lowest[:, None]) / REACH, 0.0, None)
+    if not weight.any():
+        return float(np.percentile(lowest, 20))
+    levels = np.arange(lowest.min(), (tracks.low[weight > 0]).max() + BIN, BIN)
+    near = np.clip(1.5 - np.abs(tracks.low - levels[:, None, None]) / BIN, 0.0, 1.0) * weight
+    votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > 0.3).sum(axis=2) - 1, 0, 3))
+    score = votes.sum(axis=1) - AGAINST * (lowest < levels[:, None] - BELOW).sum(axis=1)
+    best = levels[int(score.argmax())]
+    here = weight * (np.abs(tracks.low - best) < 1.5 * BIN)
+    return float((tracks.low * here).sum() / here.sum()) if here.any() else float(best)
+
+
+def _calm(tracks: PartTracks) -> Array:
+    return np.clip(1.5 - tracks.rise / tracks.calm, 0.0, 1.0)

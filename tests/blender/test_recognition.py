@@ -1,0 +1,95 @@
+"""Contacts that the skin of a rig shows, whatever its bones are called and however they hang together."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import jobs
+from softground_addon.blender.characters.character_setup import add_character, mapping_of
+from softground_addon.blender.characters.rig_sampling import sample_character
+
+from . import rigs
+
+FRAMES = 60
+LEGS = {"Qx": (0.0, 0.4), "Zk": (-0.35, -0.2), "Vn": (0.35, -0.2)}
+"""Three feet that are children of the root: names and rest pose say nothing of feet, and no two are mirror images."""
+
+
+def box(name: str, size: float, place: tuple[float, float, float], armature: bpy.types.Object, bone: str) -> None:
+    """A cube that hangs on a bone."""
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2 + place
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners.tolist(), [], faces)
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    thing.modifiers.new("Armature", "ARMATURE").object = armature
+    thing.parent = armature
+    thing.vertex_groups.new(name=bone).add(range(8), 1.0, "REPLACE")
+
+
+def stool() -> bpy.types.Object:
+    """A stool of 1 m that walks on its three legs, its feet 10 cm wide and 6 cm above their bones' origin."""
+    bones = {"Root": ((0, 0, 0), (0, 0, 0.1)), "Pm": ((0, 0, 0.9), (0, 0, 1.0))}
+    bones |= {name: ((x, y, 0.05), (x, y, 0.051)) for name, (x, y) in LEGS.items()}
+    armature = rigs.build("Stool", bones, dict.fromkeys(("Pm", *LEGS), "Root"))
+    for name, (x, y) in LEGS.items():
+        box(f"{name} foot", 0.1, (x, y, 0.11), armature, name)
+    box("seat", 0.3, (0, 0, 0.95), armature, "Pm")
+    for number, name in enumerate(LEGS):
+        values = {}
+        for frame in range(1, FRAMES + 1):
+            cycles, phase = divmod((frame - 1) / 30 + number / 3 + 0.5, 1.0)
+            swing = max(0.0, phase - 0.6) / 0.4
+            ahead = 0.5 * (cycles + swing - np.sin(2 * np.pi * swing) / (2 * np.pi))
+            # The bones point up: their y is the world's z, their z the world's -y.
+            values[frame] = (0.0, 0.15 * np.sin(np.pi * swing), ahead)
+        rigs.key(armature, "location", values, bone=name)
+    seat = {frame: (0.0, 0.0, 0.5 * (frame - 1) / 30) for frame in range(1, FRAMES + 1)}
+    rigs.key(armature, "location", seat, bone="Pm")
+    return armature
+
+
+def test_feet_that_nothing_names_are_found_by_their_skin(scene):
+    character = add_character(scene, stool())
+    assert {sole.bone for sole in character.soles} == set(LEGS)
+    assert all(sole.kind == "FOOT" and sole.parts.keys() == [sole.bone] for sole in character.soles)
+
+
+def test_the_ground_is_where_the_skin_rests_and_each_foot_bears_as_it_stands(scene):
+    armature = stool()
+    character = add_character(scene, armature)
+    motion = jobs.run(
+        jobs.counted(
+            sample_character(scene, armature, mapping_of(character), mass=10.0, frames=range(1, FRAMES + 1)),
+            "sample",
+            FRAMES,
+        )
+    )
+    assert motion.ground_level == pytest.approx(0.06, abs=1e-3)
+    for sole in motion.soles:
+        number = list(LEGS).index(sole.sole.name)
+        stands = ((np.arange(FRAMES) / 30 + number / 3 + 0.5) % 1.0) < 0.6
+        assert (sole.bears == stands).mean() > 0.9
+        low = sole.landmark_positions()[sole.bears][..., 2].min(axis=1)
+        assert low == pytest.approx(0.06, abs=0.02)
+
+
+def test_what_a_hand_carries_is_no_part_of_the_body(scene):
+    armature = stool()
+    corners = [(0, 0, -1.2), (0.1, 0, -1.2), (0, 0.1, -1.2), (0, 0, -0.1)]
+    mesh = bpy.data.meshes.new("Sword")
+    mesh.from_pydata(corners, [], [(0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)])
+    sword = bpy.data.objects.new("Sword", mesh)
+    scene.collection.objects.link(sword)
+    with bpy.context.temp_override(active_object=armature, object=armature):
+        bpy.context.view_layer.objects.active = armature
+        bpy.ops.object.mode_set(mode="EDIT")
+        slot = armature.data.edit_bones.new("Slot")
+        slot.head, slot.tail, slot.parent = (0, 0, 1.0), (0, 0, 1.1), armature.data.edit_bones["Pm"]
+        bpy.ops.object.mode_set(mode="OBJECT")
+    sword.parent, sword.parent_type, sword.parent_bone = armature, "BONE", "Slot"
+    character = add_character(scene, armature)
+    assert {sole.bone for sole in character.soles} == set(LEGS)

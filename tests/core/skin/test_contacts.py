@@ -1,0 +1,133 @@
+"""Contacts from the skin of made-up animals whose gait is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softground_addon.core.skin.contacts import SkinContacts, find_contacts
+from softground_addon.core.skin.skin_motion import SkinMotion
+
+RATE, PERIOD, FRAMES = 30.0, 30, 90
+LIFT = 0.12
+
+
+def animal(
+    legs: int, *, duty: float, stride: float, on_the_spot: bool = False, leaves: int = 0, seed: int = 0
+) -> tuple[SkinMotion, np.ndarray]:
+    """An animal 1 m tall that walks along x, its feet plates of 8 cm, and when each foot stands (F, legs).
+
+    `leaves` more parts lie inside of feet, as the leaf bones of imported rigs do.
+    """
+    chance = np.random.default_rng(seed)
+    time = np.arange(FRAMES)[:, None] / PERIOD + np.arange(legs) * (1 / 2 if legs == 2 else 0.618) + 0.1
+    phase = time % 1.0
+    stands = phase < duty
+    swing = np.clip((phase - duty) / (1 - duty), 0, 1)
+    ahead = (np.floor(time) + (swing - np.sin(2 * np.pi * swing) / (2 * np.pi))) * stride
+    if on_the_spot:
+        ahead = ahead - time * stride
+    lift = LIFT * np.sin(np.pi * swing)
+    plate = np.stack(np.meshgrid(np.linspace(-0.04, 0.04, 5), np.linspace(-0.02, 0.02, 3), [0.0, 0.03]), axis=-1)
+    plate = plate.reshape(-1, 3)
+    root = np.stack([np.arange(legs) // 2 * 0.4, np.where(np.arange(legs) % 2, -0.15, 0.15)], axis=-1)
+    feet = np.zeros((FRAMES, legs, len(plate), 3))
+    feet[..., :2] = root[:, None]
+    feet[..., 0] += ahead[..., None]
+    feet[..., 2] += lift[..., None]
+    feet += plate
+    body = chance.uniform((0.2, -0.2, 0.6), (0.6, 0.2, 1.0), (20, 3))
+    trunk = np.broadcast_to(body, (FRAMES, 20, 3)).copy()
+    trunk[:, :, 0] += (0.0 if on_the_spot else 1.0) * np.arange(FRAMES)[:, None] / PERIOD * stride
+    carriers = chance.integers(0, legs, leaves)
+    points = [*np.moveaxis(feet, 1, 0), *(feet[:, leg, :4] + (0, 0, 0.001) for leg in carriers), trunk]
+    part = np.repeat(np.arange(len(points)), [piece.shape[1] for piece in points])
+    links = np.zeros((len(points), len(points)), dtype=bool)
+    for number, leg in enumerate(carriers):
+        links[legs + number, leg] = links[leg, legs + number] = True
+    positions = np.concatenate(points, axis=1)
+    height = float(np.median(np.ptp(positions[..., 2], axis=1)))
+    return SkinMotion(positions, part, links, RATE, height), stands
+
+
+def changed(skin: SkinMotion, *, scale: float, turn: float, lift: float) -> SkinMotion:
+    """The same animal in another unit, direction and height."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    turned = skin.positions @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]) + (0, 0, lift)
+    return SkinMotion(turned * scale, skin.part, skin.links, skin.rate, skin.height * scale)
+
+
+def assert_gait(found: SkinContacts, stands: np.ndarray) -> None:
+    """Every foot is a contact, and nothing else; it bears when it stands, within two frames at each end."""
+    legs = stands.shape[1]
+    assert sorted(set(found.group[:legs])) == list(range(legs)) == list(range(found.bears.shape[1]))
+    assert found.group[-1] == -1, "the trunk does not touch the ground"
+    for leg in range(legs):
+        bears = found.bears[:, found.group[leg]]
+        wide = np.convolve(stands[:, leg], np.ones(5), "same") > 0
+        narrow = np.convolve(~stands[:, leg], np.ones(5), "same") == 0
+        inside = slice(2, -2)
+        assert (bears <= wide)[inside].all()
+        assert (bears >= narrow)[inside].all()
+
+
+@given(
+    legs=st.integers(2, 8),
+    duty=st.floats(0.5, 0.75),
+    stride=st.floats(0.3, 0.9),
+    on_the_spot=st.booleans(),
+    leaves=st.integers(0, 4),
+    scale=st.floats(-3, 3).map(lambda power: 10.0**power),
+    turn=st.floats(0, 6.28),
+    lift=st.floats(-2, 2),
+    seed=st.integers(0, 99),
+)
+def test_the_gait_of_an_animal_is_found_in_its_skin(
+    legs: int,
+    duty: float,
+    stride: float,
+    on_the_spot: bool,
+    leaves: int,
+    scale: float,
+    turn: float,
+    lift: float,
+    seed: int,
+) -> None:
+    skin, stands = animal(legs, duty=duty, stride=stride, on_the_spot=on_the_spot, leaves=leaves, seed=seed)
+    found = find_contacts(changed(skin, scale=scale, turn=turn, lift=lift))
+    assert found.level / scale == pytest.approx(lift, abs=0.005)
+    assert_gait(found, stands)
+    speed = stride * RATE / PERIOD if on_the_spot else 0.0
+    assert np.linalg.norm(found.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
+
+
+def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
+    skin, stands = animal(2, duty=0.6, stride=0.6)
+    positions = skin.positions.copy()
+    toe = skin.part == 0
+    dips = ~stands[:, 0]
+    positions[np.ix_(dips, toe)] -= (0, 0, 0.15)
+    found = find_contacts(SkinMotion(positions, skin.part, skin.links, skin.rate, skin.height))
+    assert found.level == pytest.approx(0.0, abs=0.006)
+    assert_gait(found, stands)
+
+
+def test_a_foot_that_stands_in_two_pieces_is_one_contact() -> None:
+    skin, _ = animal(2, duty=0.6, stride=0.6)
+    heel = (skin.part == 0) & (np.arange(len(skin.part)) < 16)
+    part = np.where(heel, skin.part.max() + 1, skin.part)
+    order = np.argsort(part, kind="stable")
+    links = np.pad(skin.links, (0, 1))
+    links[0, -1] = links[-1, 0] = True
+    found = find_contacts(SkinMotion(skin.positions[:, order], part[order], links, skin.rate, skin.height))
+    assert found.group[0] == found.group[-1]
+    assert found.bears.shape[1] == 2
+
+
+def test_skin_that_never_comes_to_rest_has_no_contact() -> None:
+    rise = np.arange(30.0)[:, None, None] * (0, 0, 0.1)
+    points = np.random.default_rng(0).uniform(0, 1, (1, 40, 3)) + rise
+    skin = SkinMotion(points, np.repeat([0, 1], 20), np.zeros((2, 2), dtype=bool), 30.0, 1.0)
+    assert find_contacts(skin).bears.shape == (30, 0)
