@@ -34,7 +34,7 @@ QUICK = 40
 
 
 def counts(whole):
-    """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon; the four kinds make 20,000."""
+    """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon; all kinds make 50,000."""
     return pytest.mark.parametrize(
         "count",
         [QUICK, pytest.param(whole // 10, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
@@ -113,7 +113,7 @@ def aliases(name):
     ])  # fmt: skip
 
 
-@counts(4000)
+@counts(5000)
 def test_no_result_of_a_batch_takes_the_place_of_anything_else(count, tmp_path):
     for folder in ("shots", "out"):
         (tmp_path / folder).mkdir()

@@ -234,3 +234,41 @@ def test_a_hostile_file_name_is_only_a_name(shot, name, tmp_path, capfd):
     manifest.write_text(json.dumps({"shots": [{"file": f"{name}/{name}.blend", "in_place": True}]}))
     assert cli.run_in_blender(["batch", str(manifest), "--progress=plain"]) == 0, capfd.readouterr().out
     assert "1 done" in capfd.readouterr().out
+
+
+@posix
+def test_a_bake_that_is_paused_goes_on_where_it_stopped(shot, tmp_path):
+    report = tmp_path / "report.json"
+    process = command_line.begin("bake", shot, "--report", report, "--progress=json", stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(1.0)
+    assert process.poll() is None
+    process.send_signal(signal.SIGCONT)
+    process.communicate(timeout=300)
+    assert process.returncode == 0
+    assert json.loads(report.read_text())["steps"]
+
+
+@posix
+@pytest.mark.slow
+def test_two_manifests_that_write_one_file_at_the_same_time_leave_it_whole(shot, tmp_path):
+    baked = tmp_path / "baked.blend"
+    batches = []
+    for name in ("one", "two"):
+        manifest = tmp_path / f"{name}.json"
+        manifest.write_text(json.dumps({"shots": [{"file": str(shot), "save": str(baked)}]}))
+        batches.append(
+            (manifest, command_line.begin("batch", manifest, stdout=subprocess.PIPE, stderr=subprocess.STDOUT))
+        )
+        time.sleep(0.5)
+    for _, process in batches:
+        said, _ = process.communicate(timeout=600)
+        assert process.returncode in (0, 2), said
+        assert "Traceback" not in said
+    bpy.ops.wm.open_mainfile(filepath=str(baked))
+    assert ground_mesh.is_baked(bpy.context.scene.softground.ground)
+    for manifest, _ in batches:  # whoever was refused, or written over, is done by the next run
+        assert command_line.run("batch", manifest).returncode == 0
+    assert not [path for path in tmp_path.iterdir() if ".partial" in path.name]
