@@ -76,6 +76,18 @@ def test_attributes_of_the_users_come_along_to_the_copy_whatever_they_are_called
     assert "softground_mine" in baked_ground.carrier_of(ground).data.attributes
 
 
+def test_the_modifier_that_the_user_works_at_stays_active(short_walk):
+    ground = field(short_walk, **FINE)
+    for name in ("One", "Two"):
+        ground.modifiers.new(name, "TRIANGULATE")
+    before = fingerprints.of_file()
+    for _ in range(2):
+        bpy.ops.softground.bake()
+        assert ground.modifiers.active.name == "Two"
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
 @pytest.mark.parametrize("kind", playback.NEED_THE_MESH)
 def test_a_fine_ground_whose_modifier_none_may_precede_gets_a_copy(short_walk, kind):
     ground = field(short_walk, **FINE)

@@ -69,6 +69,7 @@ def attach(
     remove(ground)
     mesh = cast("bpy.types.Mesh", ground.data)
     _write_attributes(mesh, vertices, spans)
+    active = ground.modifiers.active
     modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = nodes.build(
         table=table,
@@ -80,6 +81,8 @@ def attach(
     modifier.show_in_editmode = False
     modifier.show_expanded = False
     ground.modifiers.move(len(ground.modifiers) - 1, 0)
+    if active:  # the one that the user works at stays so
+        ground.modifiers.active = active
     return modifier
 
 
