@@ -94,7 +94,7 @@ def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
     known, expected = analysis.known(shot), analysis.expected_depth(shot)
     bpy.ops.softground.create_ground()
     bpy.context.view_layer.update()
-    assert analysis.known(shot).stances is known.stances
+    assert analysis.known(shot).contacts is known.contacts
     assert analysis.expected_depth(shot) == expected
 
 
@@ -106,7 +106,7 @@ def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding
     for change in (bpy.ops.softground.bake, bpy.ops.softground.bake, bpy.ops.softground.clear_bake):
         change()
         bpy.context.view_layer.update()
-        assert analysis.known(shot).stances is known.stances
+        assert analysis.known(shot).contacts is known.contacts
         assert analysis.expected_depth(shot) == expected
 
 
@@ -117,7 +117,7 @@ def test_the_depth_to_expect_holds_on_through_live_mode(shot):
     shot.frame_set(40)
     bpy.ops.softground.live(keep=True)
     bpy.context.view_layer.update()
-    assert analysis.known(shot).stances is known.stances
+    assert analysis.known(shot).contacts is known.contacts
 
 
 def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot):

@@ -9,6 +9,7 @@ from softground_addon.blender.interface import prediction
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
+from softground_addon.core.prediction import ContactLoads
 from tests.blender.shots import walker
 
 
@@ -30,8 +31,9 @@ def drawing(monkeypatch):
 
     def draw(scene):
         with monkeypatch.context() as patch:
-            for heavy in ("deepest", "estimate_shot", "read_shot", "stance_loads"):
+            for heavy in ("estimate_shot", "read_shot", "contact_loads"):
                 patch.setattr(analysis, heavy, fail)
+            patch.setattr(ContactLoads, "deepest", fail)
             return prediction.of(scene)
 
     return draw

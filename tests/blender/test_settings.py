@@ -154,7 +154,7 @@ def test_a_prediction_is_worked_out_anew_for_other_cells(scene):
     scene.softground.cell_size *= 3
     after = analysis.current(scene)
     analysis.forget()
-    assert hash_inputs(after.stances) == hash_inputs(analysis.read(scene).stances) != hash_inputs(before.stances)
+    assert hash_inputs(after.contacts) == hash_inputs(analysis.read(scene).contacts) != hash_inputs(before.contacts)
 
 
 def other_settings(scene):

@@ -1,4 +1,4 @@
-"""The depth that is foretold without pressing a cell is the one that pressing gives, whatever the ground does."""
+"""The depth that is predicted without pressing a cell is the one that pressing gives, whatever the ground does."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
-from softground_addon.core.prediction import deepest, stance_loads
+from softground_addon.core.prediction import FEW, contact_loads
 from softground_addon.core.simulation import simulate
 from tests.core.pressing.test_prop_prints import resting
 from tests.core.prop_bodies import prop_sole, sphere
@@ -37,27 +37,65 @@ class Stripes:
 
 
 def pressed(loads, material, pressure, variation=None):
-    results = simulate([loads], SoftGround(FlatTerrain(), material, pressure, variation), CELL)
+    results = simulate(loads, SoftGround(FlatTerrain(), material, pressure, variation), CELL)
     return max((print_.max_depth_m for result in results for print_ in result.footprints), default=0.0)
 
 
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
 @pytest.mark.parametrize("painted", [False, True], ids=["even", "painted"])
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
-def test_the_foretold_depth_is_the_pressed_one(options, painted, pressure):
+def test_the_predicted_depth_is_the_pressed_one(options, painted, pressure):
     loads, material = walk(steps=4), replace(SNOW, **options)
     variation = Stripes() if painted else None
-    stances = stance_loads([loads], FlatTerrain(), CELL, variation)
-    expected = pressed(loads, material, pressure, variation)
-    assert deepest(stances, material, pressure) == pytest.approx(expected, rel=0.03, abs=1e-6)
+    contacts = contact_loads([loads], FlatTerrain(), CELL, variation)
+    expected = pressed([loads], material, pressure, variation)
+    assert contacts.deepest(material, pressure) == pytest.approx(expected, rel=0.03, abs=1e-6)
 
 
 @pytest.mark.parametrize("painted", [False, True], ids=["even", "painted"])
 @pytest.mark.parametrize("crust", [0.0, 2e3, 1e6])
-def test_the_foretold_depth_of_a_ball_that_rests_is_the_pressed_one(crust, painted):
+def test_the_predicted_depth_of_a_ball_that_rests_is_the_pressed_one(crust, painted):
     loads = resting(prop_sole(*sphere(0.15, rings=32)), (0.3, 0.0, 0.15), 300.0, seconds=3.0)
     material, variation = replace(SNOW, crust_stress=crust), Stripes() if painted else None
-    stances = stance_loads([loads], FlatTerrain(), CELL, variation)
-    expected = pressed(loads, material, "UNIFORM", variation)
+    contacts = contact_loads([loads], FlatTerrain(), CELL, variation)
+    expected = pressed([loads], material, "UNIFORM", variation)
     assert (expected == 0) == (crust == 1e6)
-    assert deepest(stances, material) == pytest.approx(expected, rel=0.03)
+    assert contacts.deepest(material) == pytest.approx(expected, rel=0.03)
+
+
+def sliding(speed, loads):
+    """The same contacts with feet that slide along x [m/s] all the time."""
+    moved = []
+    for sole in loads.motion.soles:
+        transforms = sole.transforms.copy()
+        transforms[..., 0, 3] += (speed * loads.motion.time_step * np.arange(len(transforms)))[:, None]
+        moved.append(replace(sole, transforms=transforms))
+    return replace(loads, motion=replace(loads.motion, soles=tuple(moved)))
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("speed", [0.1, 0.4, 1.5])
+def test_a_foot_that_slides_is_predicted_as_shallow_as_it_prints(speed, pressure):
+    loads = sliding(speed, walk(steps=4))
+    expected = pressed([loads], SNOW, pressure)
+    assert contact_loads([loads], FlatTerrain(), CELL).deepest(SNOW, pressure) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+def test_few_contacts_tell_the_deepest_of_many(pressure):
+    loads = walk(steps=4)
+    weights = np.random.default_rng(2).uniform(0.5, 1.5, 30)
+    crowd = [replace(loads, forces=replace(loads.forces, forces=weight * loads.forces.forces)) for weight in weights]
+    contacts = contact_loads(crowd, FlatTerrain(), CELL)
+    assert len(crowd) * 4 > 3 * FEW
+    assert contacts.deepest(SNOW, pressure, most=FEW) == contacts.deepest(SNOW, pressure)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 4.0])
+@pytest.mark.parametrize("most", [FEW, None])
+def test_feet_that_come_down_on_their_own_prints_add_as_much_as_is_predicted(hardening, most):
+    loads, material = walk(steps=8, speed=1e-3), replace(SNOW, hardening=hardening)
+    first = pressed([walk(steps=1, speed=1e-3)], material, "UNIFORM")
+    expected = pressed([loads], material, "UNIFORM")
+    assert contact_loads([loads], FlatTerrain(), CELL).deepest(material, most=most) == pytest.approx(expected, rel=0.03)
+    assert expected < 1.2 * first

@@ -18,7 +18,7 @@ from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import pressed_area
 from ...core.loads.estimate import CharacterLoads
-from ...core.prediction import TAKES_NO_PRINT, PropLoad, StanceLoad, deepest, matching_modulus, stance_loads
+from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import jobs, settings
@@ -47,10 +47,10 @@ class Analysis:
     hashes : frozenset of str
         Of the animation, the meshes and the ground that it was read from, likewise.
     terms : tuple
-        Settings that the loads and the stances depend on beside that.
+        Settings that the loads and the contacts depend on beside that.
     shot : Shot
     loads : list of CharacterLoads
-    stances : list of StanceLoad or PropLoad
+    contacts : ContactLoads
     area : float
         That the soles cover on the ground, with each step counted [m²].
     """
@@ -60,7 +60,7 @@ class Analysis:
     terms: tuple[Any, ...]
     shot: Shot
     loads: list[CharacterLoads]
-    stances: list[StanceLoad | PropLoad]
+    contacts: ContactLoads
     area: float
 
 
@@ -68,7 +68,7 @@ _known: dict[int, Analysis] = {}
 """By session uid of the scene; a cache only: everything in it can be read again."""
 
 _depths: dict[tuple[int, GroundMaterial, Pressure], float] = {}
-"""Depths that were asked for lately, by identity of an analysis' stances; emptied with it."""
+"""Depths that were asked for lately, by identity of an analysis' contacts; emptied with it."""
 
 
 def forget() -> None:
@@ -166,7 +166,7 @@ def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = Non
         return None
     key = _key(settings.snapshot(scene), analysis, material)
     if key not in _depths:
-        _depths[key] = deepest(analysis.stances, *key[1:])
+        _depths[key] = analysis.contacts.deepest(*key[1:], most=FEW)
     return _depths[key]
 
 
@@ -178,7 +178,7 @@ def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:
 def _key(
     wanted: BakeSettings, analysis: Analysis, material: GroundMaterial | None = None
 ) -> tuple[int, GroundMaterial, Pressure]:
-    return id(analysis.stances), material or wanted.material, wanted.pressure
+    return id(analysis.contacts), material or wanted.material, wanted.pressure
 
 
 def match_depth(scene: bpy.types.Scene, depth: float) -> float:
@@ -192,7 +192,7 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
     analysis, wanted = read(scene), settings.snapshot(scene)
     aim = depth
     for _ in range(TRIALS):
-        modulus = matching_modulus(analysis.stances, wanted.material, aim, wanted.pressure)
+        modulus = matching_modulus(analysis.contacts, wanted.material, aim, wanted.pressure)
         wanted = replace(wanted, material=replace(wanted.material, youngs_modulus=modulus))
         reached = _simulated_depth(wanted, analysis)
         if not reached > 0:
@@ -213,8 +213,8 @@ def _keep(
 ) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on."""
     loads = yield from estimate_shot(wanted, shot)
-    stances = stance_loads(loads, shot.terrain, wanted.cell_size_m, shot.variation)
-    analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, stances, pressed_area(loads))
+    contacts = contact_loads(loads, shot.terrain, wanted.cell_size_m, shot.variation)
+    analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, pressed_area(loads))
     _known[scene.session_uid] = analysis
     _depths.clear()
     return analysis
@@ -237,7 +237,7 @@ def _place(ground: bpy.types.Object) -> list[tuple[float, ...]]:
 
 
 def _terms(wanted: BakeSettings) -> tuple[Any, ...]:
-    """What the loads depend on, and the stances: whatever acts on the prints but what a prediction is asked about."""
+    """What the loads depend on, and the contacts: whatever acts on the prints but what a prediction is asked about."""
     landing = any(one.force_model == "IMPULSE" or one.armature is None for one in wanted.characters)
     return _parts(wanted)[1], wanted.material.characteristic_time if landing else None
 

@@ -82,20 +82,20 @@ def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> fl
     return float(target_compression(force / area, material))
 
 
-def compression_rate(step: float, material: GroundMaterial, target: Any = 0.0, landing_speed: float = 0.0) -> Any:
+def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, landing_speed: Any = 0.0) -> Any:
     """Fraction of the target by which the ground gives way in a step (Eq. 11).
 
     Parameters
     ----------
-    step : float
+    step : float or float array
         Duration of the step [s].
     material : GroundMaterial
     target : float or float array
         Compression that the stress leads to [m].
-    landing_speed : float
+    landing_speed : float or float array
         Speed into the ground at which the sole landed [m/s]; with a `shortest_time`, it sets the pace.
     """
-    if not (material.shortest_time and landing_speed):
+    if not (material.shortest_time and np.any(landing_speed)):
         return step / material.characteristic_time
     shortest = min(material.shortest_time, material.characteristic_time)
     time = np.minimum(np.maximum(2.0 * target / landing_speed, shortest), material.characteristic_time)

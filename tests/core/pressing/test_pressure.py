@@ -12,7 +12,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.numerics.intervals import runs
-from softground_addon.core.prediction import deepest, matching_modulus, stance_loads
+from softground_addon.core.prediction import contact_loads, matching_modulus
 from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.pressing.pressure import KERN, pressure_field
 from softground_addon.core.simulation import simulate
@@ -216,12 +216,12 @@ def test_the_deepest_point_does_not_depend_on_cell_size_or_place(material):
 
 
 @pytest.mark.parametrize("material", [SNOW, GroundMaterial(1.2e6, 0.35, 0.05)])
-def test_the_depth_foretold_without_pressing_a_cell_is_that_of_the_print(material):
+def test_the_depth_predicted_without_pressing_a_cell_is_that_of_the_print(material):
     loads = rolling(walk(steps=2, heading=0.4))
-    stances = stance_loads([loads], FlatTerrain(), 0.01)
+    contacts = contact_loads([loads], FlatTerrain(), 0.01)
     reached = max(footprint.max_depth_m for footprint in pressed(loads, 0.01, material)[1])
-    assert deepest(stances, material, "CENTRE_OF_PRESSURE") == pytest.approx(reached, rel=0.02)
-    modulus = matching_modulus(stances, material, reached, "CENTRE_OF_PRESSURE")
+    assert contacts.deepest(material, "CENTRE_OF_PRESSURE") == pytest.approx(reached, rel=0.02)
+    modulus = matching_modulus(contacts, material, reached, "CENTRE_OF_PRESSURE")
     assert modulus == pytest.approx(material.youngs_modulus, rel=0.03)
 
 

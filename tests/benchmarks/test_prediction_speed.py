@@ -1,0 +1,33 @@
+"""What another material costs where a depth is predicted while a slider moves, printed and held to its limit."""
+
+from time import thread_time
+
+import pytest
+
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.prediction import FEW, contact_loads
+from tests.core.walkers import walk
+
+LIMITS = {50: 10e-3, 1000: 30e-3}
+"""Most that a prediction may cost, by the number of contacts in the shot [s]."""
+REPEATS = 8
+
+
+@pytest.mark.benchmark
+@pytest.mark.alone
+@pytest.mark.parametrize("count", LIMITS)
+def test_a_depth_is_predicted_while_a_slider_moves(count, capsys):
+    contacts = contact_loads([walk(steps=count - 2, heading=0.3)], FlatTerrain(), 0.01)
+    cost = {}
+    for pressure in ("UNIFORM", "CENTRE_OF_PRESSURE"):
+        times = []
+        for number in range(REPEATS):
+            material = GroundMaterial(0.25e6 * (1 + number / 10), 0.05, 0.2)
+            start = thread_time()
+            contacts.deepest(material, pressure, most=FEW)
+            times.append(thread_time() - start)
+        cost[pressure] = min(times)
+    with capsys.disabled():
+        print(f"\n{len(contacts.soles)} contacts: " + ", ".join(f"{k} {v * 1e3:.1f} ms" for k, v in cost.items()))
+    assert max(cost.values()) < LIMITS[count]
