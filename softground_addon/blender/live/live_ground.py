@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.ground.display_blur import blurred_window, gaussian_kernel
 from ...core.ground.heightfield import TILE, HeightField, Window
+from ...core.numerics import bilinear
 from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.footprints import NEVER
@@ -55,10 +56,8 @@ class _TileVertices:
         if not (self.u.any() or self.v.any()):
             on_centres: Array = values[:, row, column]
             return on_centres
-        low = values[:, row, column] * (1 - self.u) + values[:, row, column + 1] * self.u
-        high = values[:, row + 1, column] * (1 - self.u) + values[:, row + 1, column + 1] * self.u
-        result: Array = low * (1 - self.v) + high * self.v
-        return result
+        corners = ((row, column), (row, column + 1), (row + 1, column), (row + 1, column + 1))
+        return bilinear.between((values[:, *corner] for corner in corners), self.u, self.v)
 
 
 class LiveGround:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..numerics import bilinear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -201,10 +202,7 @@ class SparseGrid:
         u, v = column - left, row - low
         left, low = left.astype(int), low.astype(int)
         around = self._gather(np.concatenate([left, left + 1] * 2), np.concatenate([low, low, low + 1, low + 1]))
-        below, below_right, above, above_right = np.split(around, 4, axis=1)
-        values = (below * (1 - u) + below_right * u) * (1 - v)
-        values += (above * (1 - u) + above_right * u) * v
-        return values
+        return bilinear.between(np.split(around, 4, axis=1), u, v)
 
     def nearest(self, x: Array, y: Array) -> Array:
         """Values of the cells that hold the world positions of any shape: (channels, ...)."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.heightfield import Window
+from ..numerics import bilinear
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import QUANTUM, Footprint
 from .ramps import TOLERANCE, Ramps, fit
@@ -255,10 +256,8 @@ def _look_up(values: Array, window: Window, cell_size: float, places: _Places, p
     u, v = column - left, row - low
     flat = values.reshape(*values.shape[:2], -1)
     corner = low * window.columns + left
-    below = flat[..., corner] * (1 - u) + flat[..., corner + 1] * u
-    above = flat[..., corner + window.columns] * (1 - u) + flat[..., corner + window.columns + 1] * u
-    looked_up: Array = below * (1 - v) + above * v
-    return looked_up
+    above = corner + window.columns
+    return bilinear.between((flat[..., at] for at in (corner, corner + 1, above, above + 1)), u, v)
 
 
 def _visits(footprint: Footprint, places: _Places) -> Visits:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics import bilinear
 from ..numerics.triangles import SLACK, cross
 
 Array = NDArray[np.float64]
@@ -190,6 +191,6 @@ def sample_map(values: Array, points: Array, origin: Array, spacing: float) -> A
     u, v = np.moveaxis(position - corner, -1, 0)
     column, row = np.moveaxis(corner, -1, 0)
     right, above = np.minimum(column + 1, columns - 1), np.minimum(row + 1, rows - 1)
-    return (1 - v) * ((1 - u) * values[row, column] + u * values[row, right]) + v * (
-        (1 - u) * values[above, column] + u * values[above, right]
+    return bilinear.between(
+        (values[row, column], values[row, right], values[above, column], values[above, right]), u, v
     )
