@@ -8,6 +8,7 @@ import pytest
 
 from softground_addon.blender import settings
 from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.characters import rig_sampling
 from softground_addon.blender.response import response_job
 from softground_addon.blender.response.character_keys import controls_of
 from softground_addon.core.errors import InputError
@@ -73,6 +74,22 @@ def test_soles_stand_on_the_ground_that_they_pressed(armature):
         np.abs(np.diff(angles, axis=0)).max() * rate for angles in (responders.knee_angles(scene), before)
     )
     assert jump < max(15.0, 1.2 * source_jump)
+
+
+@pytest.mark.parametrize(("rig", "times"), [("walker", 0), ("ik", 1)])
+def test_a_rig_is_evaluated_once_for_its_motion_and_its_response_or_not_at_all(scene, monkeypatch, rig, times):
+    armature, entered = MAKE[rig](scene), []
+    set_up(armature)
+    sampling_scene = rig_sampling.sampling_scene
+
+    def counted(*arguments):
+        entered.append(arguments)
+        return sampling_scene(*arguments)
+
+    monkeypatch.setattr(rig_sampling, "sampling_scene", counted)
+    responders.bake(scene)
+    assert nla_layer.has_layer(armature)
+    assert len(entered) == times
 
 
 def test_auto_rig_pro_is_keyed_on_what_its_animators_key_in_ik_and_in_fk(scene):

@@ -95,7 +95,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     gaps = response_job.gap_table(answers)
     if gaps is None:
         gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, footprints)
-    layers = (yield from response_job.layers_of(scene, wanted, answers)) if write else []
+    layers = (yield from response_job.layers_of(wanted, shot.rigs, answers)) if write else []
     inputs = wanted.inputs()
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
@@ -116,7 +116,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     )
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
-    shot = replace(shot, motions=())
+    shot = replace(shot, motions=(), rigs=())
     del loads, answers
     written: _Written | None = None
     if write and wanted.output != "RESPONSE":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import bpy
@@ -73,7 +74,7 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
         Matrices of the bone in the armature's space [Blender units].
     """
     bone = armature.data.bones[name]
-    own = _transforms(armature.pose.bones[name], f'pose.bones["{bpy.utils.escape_identifier(name)}"].', times)
+    own = _transforms(armature.pose.bones[name], _path_of(name), times)
     if bone.use_connect:
         own[:, :3, 3] = 0.0
     if bone.parent is None:
@@ -81,9 +82,19 @@ def keyed_pose(armature: bpy.types.Object, name: str, times: Array, parent: NDAr
     return np.asarray(parent @ _from_parent(bone) @ own)
 
 
+def keyed_channel(armature: bpy.types.Object, name: str, channel: str, times: Array) -> Array:
+    """A channel of a bone of such an armature over time, e.g. "location", (F, 3) or (F, 4)."""
+    pose_bone, animation = armature.pose.bones[name], armature.animation_data
+    return _channel(pose_bone, _curves(animation) if animation else [], _path_of(name), times, channel)
+
+
 def keyed_world(armature: bpy.types.Object, times: Array) -> Array:
     """Where such an armature is itself over time, (F, 4, 4) [Blender units]."""
     return _transforms(armature, "", times)
+
+
+def _path_of(bone: str) -> str:
+    return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
 
 
 def _plays_its_action_only(animation: bpy.types.AnimData) -> bool:
@@ -136,22 +147,24 @@ def _transforms(thing: bpy.types.Object | bpy.types.PoseBone, path: str, times: 
 
     The object's curves have its channels at `path`; those that no curve animates stay as they are.
     """
-    animation = thing.id_data.animation_data
-    curves = [curve for curve in _curves(animation) if curve.data_path.startswith(path)]
-
-    def channel(name: str) -> Array:
-        values = np.tile(np.array(getattr(thing, name), dtype=float), (len(times), 1))
-        for curve in curves:
-            if curve.data_path == path + name:
-                values[:, curve.array_index] = _values(curve, times)
-        return values
-
+    curves = [curve for curve in _curves(thing.id_data.animation_data) if curve.data_path.startswith(path)]
+    channel = partial(_channel, thing, curves, path, times)
     result = np.zeros((len(times), 4, 4))
     with np.errstate(invalid="ignore"):  # of broken keys
         result[:, :3, :3] = _turns(thing.rotation_mode, channel) * channel("scale")[:, None]
     result[:, :3, 3] = channel("location")
     result[:, 3, 3] = 1.0
     return result
+
+
+def _channel(
+    thing: bpy.types.Object | bpy.types.PoseBone, curves: Iterable[bpy.types.FCurve], path: str, times: Array, name: str
+) -> Array:
+    values = np.tile(np.array(getattr(thing, name), dtype=float), (len(times), 1))
+    for curve in curves:
+        if curve.data_path == path + name:
+            values[:, curve.array_index] = _values(curve, times)
+    return values
 
 
 def _values(curve: bpy.types.FCurve, times: Array) -> Array:

@@ -19,6 +19,7 @@ from ...core.motion.motion import CharacterMotion
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
 from ..settings import found, frame_rate_of, gravity_of, name_of, time_stretch_of
+from .control_poses import PoseRecorder
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .motion_assembly import assemble_motion
 from .prop_extraction import check_things, prop_motion
@@ -56,6 +57,7 @@ def sample_character(
     *,
     mass: float,
     frames: range,
+    recorder: PoseRecorder | None = None,
 ) -> Sampling:
     """Read a character frame by frame.
 
@@ -71,6 +73,8 @@ def sample_character(
         [kg]
     frames : range
         Scene frames.
+    recorder : PoseRecorder, optional
+        Takes down how its bones stand.
 
     Yields
     ------
@@ -89,11 +93,12 @@ def sample_character(
     _check_input(scene, armature, mapping, mass)
     _check_frames(frames)
     bones = [bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)]
+    bones += recorder.bones if recorder else ()
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     skin = read_skin(scene, armature) if on_bones and len(frames) <= LONGEST else None
     things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig = name_of(armature)
-    recording = yield from record(scene, armature, frames, [*bones, *(skin.bones if skin else ())], things)
+    recording = yield from record(scene, armature, frames, [*bones, *(skin.bones if skin else ())], things, recorder)
     armature = found(rig)
     _check_recording(armature.name, recording)
     carried = {
@@ -114,14 +119,15 @@ def record(
     frames: range,
     bones: Iterable[str],
     things: Sequence[str] = (),
+    recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
     """Where some bones of a rig and some objects are over time; yields the number of frames read."""
     names = list(dict.fromkeys(bones))
     with without_layer(armature):
         keyed = not things and is_moved_by_keys_alone(armature, names)
     if keyed:
-        return (yield from _read_keys(scene, armature.name_full, frames, names))
-    return (yield from _evaluate(scene, armature.name_full, frames, names, things))
+        return (yield from _read_keys(scene, armature.name_full, frames, names, recorder))
+    return (yield from _evaluate(scene, armature.name_full, frames, names, things, recorder))
 
 
 def sample_thing(
@@ -171,7 +177,7 @@ def _bones(source: SoleSource) -> list[str]:
 
 
 def _read_keys(
-    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str]
+    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], recorder: PoseRecorder | None
 ) -> Generator[int, None, Recording]:
     """Record the matrices of a rig that nothing but its keys moves, bone by bone.
 
@@ -186,10 +192,14 @@ def _read_keys(
         parent = np.swapaxes(poses[:, chain.index(above.name) if above else done], -1, -2)
         with without_layer(thing):
             poses[:, done] = np.swapaxes(keyed_pose(thing, name, times, parent), -1, -2)
+            if recorder:
+                recorder.note_keys(thing, name, times, poses[:, done])
         yield len(frames) * (done + 1) // len(chain)
     thing = object_named(armature)
     with without_layer(thing):
         world = keyed_world(thing, times)
+    if recorder:
+        recorder.world[:] = world
     return Recording(
         frames=np.array(frames, dtype=float),
         bones=tuple(chain),
@@ -201,7 +211,12 @@ def _read_keys(
 
 
 def _evaluate(
-    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], things: Sequence[str]
+    scene: bpy.types.Scene,
+    armature: str,
+    frames: range,
+    bones: Sequence[str],
+    things: Sequence[str],
+    recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
     """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
     poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
@@ -229,6 +244,8 @@ def _evaluate(
                         buffer = np.empty((len(pose), 4, 4), dtype=np.float32)
                     pose.foreach_get("matrix", buffer.reshape(-1))
                     poses[done] = buffer[places]
+                    if recorder:
+                        recorder.note(done, evaluated)
             for place, thing in enumerate(things):
                 thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
             yield done + 1

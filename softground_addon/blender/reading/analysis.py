@@ -129,7 +129,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
     analysis = current(scene)
     if analysis is None:
         wanted = settings_of(scene)
-        shot = yield from read_shot(scene, wanted)
+        shot = yield from read_shot(scene, replace(wanted, response=None))
         source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene, wanted, shot, (source,), hashes)
     return analysis

@@ -20,12 +20,14 @@ from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
 from .. import settings
+from ..characters.control_poses import PoseRecorder
 from ..characters.prop_extraction import check_things
 from ..characters.rig_mapping import RigMapping
 from ..characters.rig_sampling import sample_character, sample_thing
 from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
+from ..response.character_keys import ReadRig, controls_of
 
 Array = NDArray[np.float64]
 
@@ -46,6 +48,8 @@ class Shot:
         The scene's ground, if it has one.
     terrain : Terrain
         The undisturbed ground.
+    rigs : tuple of ReadRig
+        Of the characters that have one, where they are to respond.
     """
 
     motions: tuple[CharacterMotion, ...]
@@ -54,6 +58,7 @@ class Shot:
     plan: GroundPlan | None
     surface: GroundSurface | None
     terrain: Terrain
+    rigs: tuple[ReadRig, ...] = ()
 
     @property
     def variation(self) -> PaintedSurface | None:
@@ -101,18 +106,18 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
     InputError
         If a character or the ground cannot be used; names it and the remedy.
     """
-    motions = yield from sample_characters(scene, wanted)
+    motions, rigs = yield from sample_characters(scene, wanted)
     lower, upper = extent(motions)
     if wanted.ground is None:
         plan = yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions))
-        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain)
+        return Shot(tuple(motions), lower, upper, plan, None, plan.terrain, rigs)
     ground = settings.found(wanted.ground)
     painted = painted_ground.names_of(ground, wanted.painted)
     surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
     yield Progress("sample", 1.0)
     work = ground_mesh.terrain_of.slices(surface, np.stack([lower, upper]))
     terrain = yield from meanwhile(Progress("sample", 1.0), work)
-    return Shot(tuple(motions), lower, upper, None, surface, terrain)
+    return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs)
 
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
@@ -189,21 +194,28 @@ def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:
     InputError
         If the characters cannot be read.
     """
-    motions = yield from sample_characters(scene, wanted)
+    motions, _ = yield from sample_characters(scene, replace(wanted, response=None))
     return (yield from meanwhile(Progress("sample", 1.0), plan_ground.slices(motions)))
 
 
-def sample_characters(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[list[CharacterMotion]]:
-    """The motion of each character."""
+def sample_characters(
+    scene: bpy.types.Scene, wanted: BakeSettings
+) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
+    """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
     check_frames(*wanted.frames, len(wanted.characters))
-    motions = []
+    motions, rigs = [], []
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, one in enumerate(wanted.characters):
-        mapping = RigMapping(one.joints, one.soles, "settings")
+        mapping, recorder = RigMapping(one.joints, one.soles, "settings"), None
         if one.armature:
             armature = settings.found(one.armature)
-            job = sample_character(scene, armature, mapping, mass=one.mass_kg, frames=frames)
+            if wanted.response:
+                controls = controls_of(scene, armature, mapping)
+                recorder = PoseRecorder([control.bone for control in controls], len(frames))
+            job = sample_character(scene, armature, mapping, mass=one.mass_kg, frames=frames, recorder=recorder)
         else:
             job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames)
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
-    return motions
+        if recorder:
+            rigs.append(ReadRig(controls, recorder.poses()))
+    return motions, tuple(rigs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -13,10 +14,11 @@ from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import euler_angles, quaternions, rotation_matrices
 from ...core.numerics.rigid import carried, rotation, unit
 from ...core.response.grounding import Response
+from ...core.settings import ObjectName
 from ..animation_layer.layer_curves import LayerCurve
+from ..characters.control_poses import BonePoses, RigPoses
 from ..characters.rig_mapping import RigMapping
-from ..settings import found, name_of, time_stretch_of
-from .pose_sampling import BonePoses, RigPoses, sample_poses
+from ..settings import found
 from .rig_controls import BODY, Control, find_controls
 
 Array = NDArray[np.float64]
@@ -27,50 +29,59 @@ LENGTH_TOLERANCE = 2e-4
 """The same for places [m]."""
 
 
+@dataclass(frozen=True)
+class ReadRig:
+    """A rig as it was read: the bones that a response is keyed on, and how they stand by the user's animation alone."""
+
+    controls: list[Control]
+    poses: RigPoses
+
+
 def response_curves(
-    scene: bpy.types.Scene,
-    armature: bpy.types.Object,
-    mapping: RigMapping,
+    armature: ObjectName,
+    rig: ReadRig,
     motion: CharacterMotion,
     response: Response,
+    *,
+    metre: float,
+    stretch: float,
 ) -> Generator[int, None, list[LayerCurve]]:
     """The keys that make a rig respond.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    armature : bpy.types.Object
-        Without its layer, or with it muted.
-    mapping : RigMapping
+    armature : ObjectName
+    rig : ReadRig
     motion : CharacterMotion
         The source that the response belongs to.
     response : Response
+    metre : float
+        Blender unit [m].
+    stretch : float
+        Frames of the animation per frame of the scene.
 
     Yields
     ------
     int
-        Number of frames read.
-
-    Raises
-    ------
-    InputError
-        If the rig has no bone that carries the body.
+        Number of bones done.
     """
-    rig, controls = name_of(armature), controls_of(scene, armature, mapping)
-    frames = [round(frame) for frame in motion.frames]
-    poses = yield from sample_poses(scene, armature, frames, [control.bone for control in controls])
-    armature = found(rig)
-    moved = _parts_in_armature(response, motion, poses, scene.unit_settings.scale_length)
+    moved = _parts_in_armature(response, motion, rig.poses, metre)
     curves: list[LayerCurve] = []
-    times = motion.frames * time_stretch_of(scene)
-    for control in controls:
+    for done, control in enumerate(rig.controls):
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
-            curves += _bone_curves(armature, control, poses, moved, times, scene.unit_settings.scale_length)
+            curves += _bone_curves(found(armature), control, rig.poses, moved, motion.frames * stretch, metre)
+        yield done + 1
     return curves
 
 
 def controls_of(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> list[Control]:
-    """The bones of a rig that a response is keyed on."""
+    """The bones of a rig that a response is keyed on.
+
+    Raises
+    ------
+    InputError
+        If it has no bone that carries the body.
+    """
     depsgraph = scene.view_layers[0].depsgraph
     assert depsgraph is not None
     return find_controls(armature, armature.evaluated_get(depsgraph), mapping)

@@ -28,9 +28,8 @@ from ...core.response.response import (
 from ...core.settings import BakeSettings, CharacterSettings, ResponseOptions
 from .. import settings
 from ..animation_layer import nla_layer
-from ..characters.rig_mapping import RigMapping
 from ..jobs import Job, Progress, counted, meanwhile
-from .character_keys import controls_of, response_curves
+from .character_keys import ReadRig, response_curves
 
 NOTICEABLE_LEAN = np.radians(0.25)
 """A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
@@ -39,7 +38,7 @@ LEAN_PASSES = 4
 it, so that each pass makes the shot right further on (Picard iteration); two are mostly enough."""
 
 SHARE_OF_WRITING = 0.1
-"""Part of a bake's last stage in which the rigs are read that get a layer."""
+"""Part of a bake's last stage in which the layers are worked out."""
 
 
 @dataclass(frozen=True)
@@ -158,17 +157,22 @@ def responses_of(
     return answers
 
 
-def layers_of(scene: bpy.types.Scene, wanted: BakeSettings, answers: Sequence[CharacterResponse]) -> Job[list[Layer]]:
-    """The keys of each character's layer; none without answers."""
+def layers_of(wanted: BakeSettings, rigs: Sequence[ReadRig], answers: Sequence[CharacterResponse]) -> Job[list[Layer]]:
+    """The keys of each character's layer, of rigs as they were read; none without answers."""
     layers: list[Layer] = []
-    rigs = [(one, one.armature) for one in wanted.characters if one.armature]
-    for number, ((character, armature), answer) in enumerate(zip(rigs, answers, strict=False)):
-        mapping = RigMapping(character.joints, character.soles, "settings")
-        reading = response_curves(scene, settings.found(armature), mapping, answer.motion, answer.response)
-        frames = len(answer.motion.frames)
-        curves = yield from counted(reading, "write", frames, part=number, parts=len(answers), share=SHARE_OF_WRITING)
-        carrier = controls_of(scene, settings.found(armature), mapping)[0].bone
-        layers.append(Layer(curves, _notes(carrier, answer)))
+    names = [one.armature for one in wanted.characters if one.armature]
+    for number, (name, rig, answer) in enumerate(zip(names, rigs, answers, strict=False)):
+        work = response_curves(
+            name,
+            rig,
+            answer.motion,
+            answer.response,
+            metre=wanted.unit_scale_m,
+            stretch=wanted.time_stretch,
+        )
+        count, parts = len(rig.controls), len(answers)
+        curves = yield from counted(work, "write", count, part=number, parts=parts, share=SHARE_OF_WRITING)
+        layers.append(Layer(curves, _notes(rig.controls[0].bone, answer)))
     return layers
 
 
