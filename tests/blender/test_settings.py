@@ -15,6 +15,7 @@ from tests.blender import shots
 from tests.blender.grounds import plane
 
 NO_INPUT = {
+    "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.response_strength": "how much of a baked layer shows; moves the layer itself",
