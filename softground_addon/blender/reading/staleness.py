@@ -131,8 +131,14 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _as_in_0_1(inputs: Mapping[str, Any]) -> dict[str, str]:
+    known = {name: inputs[name] for name in _OF_0_1}
+    known["characters"] = [
+        one
+        | {"soles": [{key: value for key, value in sole.items() if key != "parts" or value} for sole in one["soles"]]}
+        for one in known["characters"]  # whose soles had no parts yet
+    ]
     return {
-        SETTINGS: report.hash_inputs({name: inputs[name] for name in _OF_0_1}),
+        SETTINGS: report.hash_inputs(known),
         _WRITING: f"{inputs['detail']} {inputs['shape_keys']}",
     }
 
