@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import jobs
-from softground_addon.blender.characters.character_setup import add_character, mapping_of
+from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.rig_sampling import sample_character
 
 from . import rigs
+from .responders import mapping_of
 
 FRAMES = 60
 LEGS = {"Qx": (0.0, 0.4), "Zk": (-0.35, -0.2), "Vn": (0.35, -0.2)}

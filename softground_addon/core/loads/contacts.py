@@ -117,10 +117,11 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     Contacts
     """
     tracks = [_track(sole, motion, terrain) for sole in motion.soles]
-    if (seen := _seen_on_skin(motion, terrain, tracks)) is not None:
-        return seen
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
+    # Where a whole body travels, its speed tells more finely than its skin when a foot that swings has left.
+    if (drift.any() or not motion.joints) and (seen := _seen_on_skin(motion, terrain, tracks)) is not None:
+        return seen
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
     found = [
         _detect(track, drift, body_speed, motion, FLOAT_LIMIT if sole.sole.prop is None else SOLID_FLOAT_LIMIT)
