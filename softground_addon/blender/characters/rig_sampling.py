@@ -18,6 +18,7 @@ from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
+from ..jobs import meanwhile
 from ..settings import found, frame_rate_of, gravity_of, name_of, time_stretch_of
 from .control_poses import PoseRecorder
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
@@ -107,7 +108,10 @@ def sample_character(
         if source.object
     }
     rate = frame_rate_of(scene) / frames.step
-    stances = skin_stances(skin, armature, mapping, recording, rate) if skin else None
+    stances = None
+    if skin:
+        stances = yield from meanwhile(len(frames), skin_stances(skin, armature, mapping, recording, rate))
+        armature = found(rig)
     return (
         yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried, stances=stances)
     )

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.motion.motion import Array
+from ...core.numerics.slices import Slices, sliced
 from ...core.skin.skin_motion import SkinMotion
 from .. import mesh_arrays
+from ..settings import found, name_of
 from .recording import Recording
 from .sole_extraction import meshes_on
 
@@ -222,7 +224,8 @@ class FollowedSkin:
     bones: tuple[str, ...]
 
 
-def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float) -> FollowedSkin:
+@sliced
+def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float) -> Slices[FollowedSkin]:
     """Some vertices over time, by which the contacts of a rig are found.
 
     Parameters
@@ -234,6 +237,7 @@ def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recordin
     rate : float
         Samples per second [Hz].
     """
+    rig = name_of(armature)
     body = np.flatnonzero(~_carried(skin, armature))
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
     height = skinned(skin, armature, probes, body)[..., 2]
@@ -245,9 +249,10 @@ def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recordin
         chosen = body[np.argsort(above, kind="stable")[:most]]
     chosen = chosen[np.argsort(skin.part[chosen], kind="stable")]
     used, part = np.unique(skin.part[chosen], return_inverse=True)
-    motion = SkinMotion(
-        skinned(skin, armature, recording, chosen), part, _links(skin, armature)[np.ix_(used, used)], rate, size
-    )
+    yield
+    places = skinned(skin, found(rig), recording, chosen)
+    yield
+    motion = SkinMotion(places, part, _links(skin, found(rig))[np.ix_(used, used)], rate, size)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
 
 

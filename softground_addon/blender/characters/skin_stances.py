@@ -9,7 +9,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.numerics.slices import Slices
 from ...core.skin.contacts import find_contacts
+from ..settings import found, name_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource
 from .skin_sampling import FollowedSkin, RigSkin, followed_skin, skinned
@@ -53,7 +55,7 @@ def skin_stances(
     mapping: RigMapping,
     recording: Recording,
     rate: float,
-) -> SkinStances | None:
+) -> Slices[SkinStances | None]:
     """When some contacts of a character bear and how its feet lie, or None where their skin never comes down.
 
     Parameters
@@ -67,7 +69,10 @@ def skin_stances(
     rate : float
         Samples per second [Hz].
     """
-    followed = followed_skin(skin, armature, recording, rate)
+    rig = name_of(armature)
+    followed = yield from followed_skin.slices(skin, armature, recording, rate)
+    yield
+    armature = found(rig)
     sources = [source for source in mapping.soles if source.bone and not source.object]
     own = {source.name: _bones_of(armature, source, mapping) for source in sources}
     numbers: dict[str, int] = {}
@@ -79,22 +84,24 @@ def skin_stances(
         return None
     place = np.full(len(sources) + 1, -1)
     place[present] = np.arange(len(present))
-    found = find_contacts(followed.motion, place[group])
+    contacts = yield from find_contacts.slices(followed.motion, place[group])
+    yield
+    armature = found(rig)
     never = np.zeros(len(recording.frames), dtype=bool)
     bears = {source.name: never for source in sources}
-    bears |= {sources[number].name: found.bears[:, contact] for contact, number in enumerate(present)}
+    bears |= {sources[number].name: contacts.bears[:, contact] for contact, number in enumerate(present)}
     feet = [source for source in sources if not source.limb and bears[source.name].any()]
     standing = {
-        source.name: _standing(followed, group == sources.index(source), bears[source.name], found.level)
+        source.name: _standing(followed, group == sources.index(source), bears[source.name], contacts.level)
         for source in feet
     }
-    band = found.level + SOLE_BAND * followed.motion.height
+    band = contacts.level + SOLE_BAND * followed.motion.height
     meshes = {}
     for source in feet:
         mesh = _mesh(skin, armature, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
         if mesh is not None:
             meshes[source.name] = mesh
-    return SkinStances(found.level, bears, {name: standing[name] for name in meshes}, meshes)
+    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes)
 
 
 def _bones_of(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:

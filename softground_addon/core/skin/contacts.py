@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..numerics.intervals import runs
+from ..numerics.slices import Slices, sliced
 from .bearing import bearing
 from .ground_level import drift_of, level_of
 from .merging import merged
@@ -44,7 +45,8 @@ class SkinContacts:
     bears: Mask
 
 
-def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> SkinContacts:
+@sliced
+def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[SkinContacts]:
     """The contacts of a character.
 
     Parameters
@@ -54,8 +56,10 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> SkinContac
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """
     parts = track_parts(skin)
+    yield
     drift = drift_of(parts)
     level = level_of(parts, drift)
+    yield
     if groups is None:
         parts = track_parts(skin, floor=level)
         bears = bearing(parts, level, drift)
@@ -65,7 +69,9 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> SkinContac
             groups = _without_brushes(skin, groups, level, drift)
     bears = np.zeros((len(skin.positions), 0), dtype=bool)
     if (groups >= 0).any():
-        bears = bearing(track_parts(skin, groups, level), level, drift)
+        parts = track_parts(skin, groups, level)
+        yield
+        bears = bearing(parts, level, drift)
     return SkinContacts(level * skin.height, drift * skin.height, groups, bears)
 
 
