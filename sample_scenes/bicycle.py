@@ -144,7 +144,7 @@ def shoot(built: Bicycle, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     scene.frame_set(FRAMES)
     stage.add_sun(scene, radians(-115), radians(17))
-    ground = built.bakes["sand"].carrier
+    ground = built.bakes["sand"].display_mesh
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
     camera = stage.add_camera(scene, "Bicycle", lens=36.0)

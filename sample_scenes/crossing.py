@@ -109,7 +109,7 @@ def shoot(built: Crossing, folder: Path, samples: int) -> list[Path]:
     bake = built.bakes["Snow"]
     middle = np.mean([step.position for step in bake.footprints], axis=0)
     stage.aim(camera, middle + np.array((1.9, 3.9, 2.9)), middle + np.array((-0.2, -0.75, 0.4)))
-    low, _ = stage.bounds([bake.carrier])
+    low, _ = stage.bounds([bake.display_mesh])
     stage.add_floor(low[2] - 0.02, scene.collection)
     path = folder / "crossing.jpg"
     stage.render(scene, camera, path, PICTURE, samples)

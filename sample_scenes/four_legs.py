@@ -94,7 +94,7 @@ def shoot(built: FourLegs, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     scene.frame_set(FRAMES)
     stage.add_sun(scene, radians(-150), radians(20))
-    ground = built.bakes["Mud"].carrier
+    ground = built.bakes["Mud"].display_mesh
     stage.add_floor(-0.15, scene.collection)
     stage.add_tray(ground, scene.collection)
     camera = stage.add_camera(scene, "Dogs", lens=40.0)

@@ -119,9 +119,9 @@ class Bake:
     layer_depth: float
 
     @property
-    def carrier(self) -> bpy.types.Object:
+    def display_mesh(self) -> bpy.types.Object:
         """The object that shows the prints: the ground itself or the detail along the trail."""
-        return baked_ground.carrier_of(self.ground)
+        return baked_ground.display_mesh_of(self.ground)
 
     def of(self, name: str) -> tuple[Footprint, ...]:
         """The footprints of one character."""

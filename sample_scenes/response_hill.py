@@ -109,13 +109,13 @@ def shoot(built: ResponseHill, folder: Path, samples: int) -> list[Path]:
     pictures = []
     for name, bake in built.bakes.items():
         for other in built.bakes:
-            for thing in (*copies[other], sides[other], built.bakes[other].carrier):
+            for thing in (*copies[other], sides[other], built.bakes[other].display_mesh):
                 thing.hide_render = other != name
         middle = np.array((built.walkers[name].location.x, -2.35, 0.95))
         stage.aim(camera, middle + np.array((11.8, 0.0, 2.4)), middle)
         pictures.append(folder / f"response_hill_{name}.png")
         stage.render(scene, camera, pictures[-1], PICTURE, samples)
-        bake.carrier.hide_render = False
+        bake.display_mesh.hide_render = False
     return [*pictures, stage.contact_sheet(pictures, 1, folder / "response_hill.jpg")]
 
 

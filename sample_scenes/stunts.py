@@ -115,7 +115,7 @@ def shoot(built: Stunts, folder: Path, samples: int) -> list[Path]:
     stage.add_sun(scene, radians(150), radians(24))
     scene.view_settings.exposure = -0.3
     stage.add_floor(-0.1, scene.collection)
-    stage.add_tray(built.bakes["sand"].carrier, scene.collection)
+    stage.add_tray(built.bakes["sand"].display_mesh, scene.collection)
     camera = stage.add_camera(scene, "Stunts", lens=38.0)
     stage.aim(camera, (3.0, -5.2, 2.4), (0.0, 0.15, 0.55))
     path = folder / "stunts.jpg"

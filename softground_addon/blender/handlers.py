@@ -63,7 +63,7 @@ def compare_bake() -> float | None:
 
 
 def compare_prediction() -> float | None:
-    """Foretell nothing more of what has changed; for a timer, as it may take a while."""
+    """Drop the predictions of what has changed; for a timer, as it may take a while."""
     if session.current().is_baking:
         return SETTLED
     analysis.look_again()

@@ -58,15 +58,15 @@ def main(steps: int, size: float, cell_size: float, radius: float, blend: Path) 
     started = time.process_time()
     report = jobs.run(bake_job.bake(scene)).report
     seconds = time.process_time() - started
-    carrier = baked_ground.carrier_of(options.ground)
+    display_mesh = baked_ground.display_mesh_of(options.ground)
     memory = peak_memory()
     bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=True)
     return {
         "steps": report["totals"]["steps"],
         "seconds": seconds,
         "memory": memory - before,
-        "vertices": len(carrier.data.vertices),
-        "record": len(bytes(carrier.data[ground_mesh.RECORD])),
+        "vertices": len(display_mesh.data.vertices),
+        "record": len(bytes(display_mesh.data[ground_mesh.RECORD])),
         "blend": blend.stat().st_size - without,
     }
 

@@ -134,15 +134,15 @@ def bake(scene, ground, *, detail, cell_size=0.01, shape_keys=False):
     options.frame_start, options.frame_end = scene.frame_start, scene.frame_end
     bpy.context.view_layer.update()
     result = jobs.run(bake_job.bake(scene))
-    return baked_ground.carrier_of(ground), result.report
+    return baked_ground.display_mesh_of(ground), result.report
 
 
-def set_shading(carrier, shading):
+def set_shading(display_mesh, shading):
     """Let the shading attributes follow the time, or play the heights only: what compares with what the others do."""
-    modifier = playback.modifier_of(carrier)
+    modifier = playback.modifier_of(display_mesh)
     socket = next(item for item in modifier.node_group.interface.items_tree if item.name == "Shading")
     modifier[socket.identifier] = shading
-    carrier.update_tag()
+    display_mesh.update_tag()
 
 
 def table(title, rows, bare):
@@ -216,8 +216,8 @@ def detail_costs(scene, size):
     ground = grid(scene, 2, size, f"Plane {size:.0f}")
     kept = {}
     for shape_keys in (True, False):
-        carrier, report = bake(scene, ground, detail="AUTO", shape_keys=shape_keys)
-        kept[shape_keys] = carrier.copy()
+        display_mesh, report = bake(scene, ground, detail="AUTO", shape_keys=shape_keys)
+        kept[shape_keys] = display_mesh.copy()
         del kept[shape_keys][trail_detail.DETAIL_OF]  # so that it stays when the bake is cleared
         bpy.ops.softground.clear_bake()
         scene.collection.objects.link(kept[shape_keys])
@@ -225,8 +225,8 @@ def detail_costs(scene, size):
     print(f"\n{report['totals']['steps']} steps, {len(kept[True].data.vertices):,} vertices")
 
     def play(shown, shading):
-        for carrier in kept.values():
-            carrier.hide_viewport = carrier != shown
+        for display_mesh in kept.values():
+            display_mesh.hide_viewport = display_mesh != shown
         bpy.context.view_layer.update()
         if shown is not None:
             set_shading(shown, shading)
@@ -240,9 +240,9 @@ def detail_costs(scene, size):
             "detail, shading, shape keys": lambda: play(kept[True], True),
         }
     )
-    for carrier in kept.values():
-        mesh = carrier.data
-        bpy.data.objects.remove(carrier)
+    for display_mesh in kept.values():
+        mesh = display_mesh.data
+        bpy.data.objects.remove(display_mesh)
         bpy.data.meshes.remove(mesh)
     return rows
 
@@ -253,10 +253,11 @@ def test_the_cost_of_a_bake_does_not_depend_on_the_size_of_the_ground(scene):
     for size in (100.0, 1000.0, 100.0, 1000.0):
         ground = grid(scene, 2, size, f"Plane {size:.0f}")
         started = time.perf_counter()
-        carrier, report = bake(scene, ground, detail="AUTO", cell_size=0.005)
+        display_mesh, report = bake(scene, ground, detail="AUTO", cell_size=0.005)
         seconds.setdefault(size, []).append(time.perf_counter() - started)
         print(
-            f"\n{size:.0f} m: {seconds[size][-1]:.2f} s, {report['timings']}, {len(carrier.data.vertices):,} vertices"
+            f"\n{size:.0f} m: {seconds[size][-1]:.2f} s, {report['timings']}, "
+            f"{len(display_mesh.data.vertices):,} vertices"
         )
         bpy.ops.softground.clear_bake()
         bpy.data.objects.remove(ground)
@@ -276,11 +277,11 @@ def test_the_file_grows_by_little_with_each_step(scene, tmp_path):
         bpy.context.view_layer.update()
         bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
         without = path.stat().st_size
-        carrier, report = bake(scene, ground, detail="AUTO")
+        display_mesh, report = bake(scene, ground, detail="AUTO")
         bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
         sizes.append(path.stat().st_size - without)
         steps.append(report["totals"]["steps"])
-        records.append(len(bytes(carrier.data[ground_mesh.RECORD])))
+        records.append(len(bytes(display_mesh.data[ground_mesh.RECORD])))
         bpy.ops.softground.clear_bake()
     per_step = (sizes[1] - sizes[0]) / (steps[1] - steps[0])
     record_per_step = (records[1] - records[0]) / (steps[1] - steps[0])

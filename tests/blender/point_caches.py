@@ -20,9 +20,9 @@ def read(path):
 
 def play(ground, path, start, time_stretch=1.0):
     """Let what carries a ground's bake play a cache in place of the nodes; it counts the animation's frames."""
-    carrier = baked_ground.carrier_of(ground)
-    playback.modifier_of(carrier).show_viewport = False
-    modifier = carrier.modifiers.new("Cache", "MESH_CACHE")
+    display_mesh = baked_ground.display_mesh_of(ground)
+    playback.modifier_of(display_mesh).show_viewport = False
+    modifier = display_mesh.modifiers.new("Cache", "MESH_CACHE")
     modifier.cache_format, modifier.filepath, modifier.frame_start = "PC2", str(path), start
     modifier.frame_scale = 1 / time_stretch
-    carrier.modifiers.move(len(carrier.modifiers) - 1, 0)
+    display_mesh.modifiers.move(len(display_mesh.modifiers) - 1, 0)

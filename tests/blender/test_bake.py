@@ -299,7 +299,7 @@ def test_a_created_ground_fits_the_walk_with_a_margin(walk):
 def test_a_created_ground_is_fine_under_the_prints_only(walk):
     result = bake(walk)
     ground = walk.softground.ground
-    assert baked_ground.carrier_of(ground) == ground
+    assert baked_ground.display_mesh_of(ground) == ground
     spacing = walk.softground.cell_size
     area = np.ptp(rest(ground)[:, 0]) * np.ptp(rest(ground)[:, 1])
     assert len(ground.data.vertices) < 0.5 * area / spacing**2
@@ -315,11 +315,11 @@ def test_prints_beside_the_fine_part_of_a_created_ground_get_detail_and_a_word(w
     walk.softground.characters[0].armature.location.x += 0.35
     bpy.context.view_layer.update()
     result = bake(walk)
-    carrier = baked_ground.carrier_of(ground)
-    assert carrier != ground
+    display_mesh = baked_ground.display_mesh_of(ground)
+    assert display_mesh != ground
     footprints, _ = baked_ground.load(ground)
     deepest = max(print_.max_depth_m for print_ in footprints)
-    assert (rest(carrier) - heights(carrier))[:, 2].max() == pytest.approx(deepest, rel=0.02)
+    assert (rest(display_mesh) - heights(display_mesh))[:, 2].max() == pytest.approx(deepest, rel=0.02)
     assert any("'SoftGround Trail'" in warning for warning in result.report["warnings"])
     with pytest.raises(InputError, match="'SoftGround' is too coarse"):
         bake(walk, detail="NEVER")
@@ -349,7 +349,7 @@ def test_a_plane_of_four_vertices_gets_detail_along_the_trail_and_comes_back(wal
     bpy.context.view_layer.update()
     before = fingerprints.of_file()
     bpy.ops.softground.bake()
-    fine = baked_ground.carrier_of(ground)
+    fine = baked_ground.display_mesh_of(ground)
     assert walk.softground.ground == ground
     assert (ground.hide_viewport, ground.hide_render, len(ground.data.vertices)) == (True, True, 4)
     depth = (rest(fine) - heights(fine, DISPLAY_KEY))[:, 2].max()
@@ -357,7 +357,7 @@ def test_a_plane_of_four_vertices_gets_detail_along_the_trail_and_comes_back(wal
     assert depth == pytest.approx(max(print_.max_depth_m for print_ in footprints), rel=0.15)
     first = heights(fine, DISPLAY_KEY)
     bpy.ops.softground.bake()
-    assert np.array_equal(heights(baked_ground.carrier_of(ground), DISPLAY_KEY), first)
+    assert np.array_equal(heights(baked_ground.display_mesh_of(ground), DISPLAY_KEY), first)
     bpy.ops.softground.clear_bake()
     after = fingerprints.of_file()
     after["names"], before["names"] = ({**names, "materials": None} for names in (after["names"], before["names"]))
@@ -369,12 +369,12 @@ def test_detail_survives_a_reload_and_a_bake_after_it(walk, tmp_path):
     ground.location = (0.3, -0.2, 0.0)
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
-    first = heights(baked_ground.carrier_of(ground), DISPLAY_KEY)
+    first = heights(baked_ground.display_mesh_of(ground), DISPLAY_KEY)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     ground = bpy.context.scene.softground.ground
     bpy.ops.softground.bake()
-    assert np.array_equal(heights(baked_ground.carrier_of(ground), DISPLAY_KEY), first)
+    assert np.array_equal(heights(baked_ground.display_mesh_of(ground), DISPLAY_KEY), first)
 
 
 def test_changing_the_choice_of_detail_moves_the_bake(walk):

@@ -290,12 +290,12 @@ def test_an_override_of_a_linked_character_responds(scene, tmp_path):
     assert responders.world_matrices(scene, armature, ["hips", "foot.L"], [10, 40]) == pytest.approx(before, abs=1e-6)
 
 
-def test_the_layer_notes_its_carrier_and_worst_frames(scene):
+def test_the_layer_notes_its_root_control_and_worst_frames(scene):
     armature = shots.walker(scene)
     set_up(armature)
     result = responders.bake(scene)
     notes = nla_layer.notes_of(armature)
-    assert notes[response_job.CARRIER] == "hips"
+    assert notes[response_job.ROOT_CONTROL] == "hips"
     assert json.loads(notes[response_job.WORST]) == result.report["worst_gaps"]
     bpy.ops.softground.show_frame(frame=17.0)
     assert scene.frame_current == 17

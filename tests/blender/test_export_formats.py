@@ -76,9 +76,9 @@ def test_a_point_cache_holds_the_frames_asked_for_and_plays_on_the_ground(scene,
     start, samples = point_caches.read(path)
     assert (start, len(samples)) == (30, 3)
     assert_stands_as_recorded(ground, 31, samples[1])
-    carrier = baked_ground.carrier_of(ground)
+    display_mesh = baked_ground.display_mesh_of(ground)
     point_caches.play(ground, path, 30)
-    assert_stands_as_recorded(ground, 32, played(carrier, 32))
+    assert_stands_as_recorded(ground, 32, played(display_mesh, 32))
 
 
 def test_images_are_named_after_the_file_that_was_chosen(scene, tmp_path):
@@ -116,7 +116,7 @@ def spoil_settings(scene):
 
 
 def spoil_uv(scene):
-    for thing in (scene.softground.ground, baked_ground.carrier_of(scene.softground.ground)):
+    for thing in (scene.softground.ground, baked_ground.display_mesh_of(scene.softground.ground)):
         while thing.data.uv_layers:
             thing.data.uv_layers.remove(thing.data.uv_layers[0])
 
@@ -173,13 +173,13 @@ def test_a_full_disk_is_named_and_leaves_the_older_file(scene, small_disk, kind,
 
 
 def test_the_room_that_alembic_wants_is_what_it_takes_at_most(scene, tmp_path):
-    carrier = baked_ground.carrier_of(scene.softground.ground)
+    display_mesh = baked_ground.display_mesh_of(scene.softground.ground)
     for smooth in (False, True):
-        carrier.data.polygons.foreach_set("use_smooth", np.full(len(carrier.data.polygons), smooth))
+        display_mesh.data.polygons.foreach_set("use_smooth", np.full(len(display_mesh.data.polygons), smooth))
         for end in (20, 40):
             exports.export_alembic(scene, scene.softground.ground, tmp_path / "x.abc", 20, end)
             taken = (tmp_path / "x.abc").stat().st_size
-            wanted = exports.size_of_alembic(carrier.data, end - 19)
+            wanted = exports.size_of_alembic(display_mesh.data, end - 19)
             assert taken <= wanted <= 2 * taken, (smooth, end)
 
 

@@ -97,11 +97,11 @@ def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapp
 def test_the_mesh_cache_plays_the_point_cache_in_place_of_the_nodes(scene, ground, tmp_path):
     path = tmp_path / "ground.pc2"
     exports.export_point_cache(scene, ground, path, *FRAMES)
-    carrier = baked_ground.carrier_of(ground)
-    native = {frame: played(carrier, frame) for frame in (25, 40)}
+    display_mesh = baked_ground.display_mesh_of(ground)
+    native = {frame: played(display_mesh, frame) for frame in (25, 40)}
     point_caches.play(ground, path, FRAMES[0])
     for frame in (25, 40):
-        np.testing.assert_allclose(played(carrier, frame), native[frame], atol=2e-6)
+        np.testing.assert_allclose(played(display_mesh, frame), native[frame], atol=2e-6)
 
 
 def import_and_select(operator, path, **options):
@@ -139,12 +139,12 @@ def write_and_read(kind, scene, ground, folder, start, end):
 
 @pytest.mark.parametrize("kind", ["abc", "usdc"])
 def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, ground, tmp_path, kind):
-    carrier = baked_ground.carrier_of(ground)
-    finer = carrier.modifiers.new("Finer", "SUBSURF")
+    display_mesh = baked_ground.display_mesh_of(ground)
+    finer = display_mesh.modifiers.new("Finer", "SUBSURF")
     finer.levels = finer.render_levels = 1
     copy = write_and_read(kind, scene, ground, tmp_path, *FRAMES)
     for frame in (12, 40):
-        np.testing.assert_allclose(played(copy, frame), played(carrier, frame), atol=1e-5)
+        np.testing.assert_allclose(played(copy, frame), played(display_mesh, frame), atol=1e-5)
 
 
 def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(scene, tmp_path):
@@ -183,21 +183,21 @@ def test_a_hidden_ground_is_exported_and_stays_hidden(scene, ground, tmp_path, k
         "abc": (exports.export_alembic, bpy.ops.wm.alembic_import),
         "usdc": (exports.export_usd, bpy.ops.wm.usd_import),
     }[kind]
-    carrier = baked_ground.carrier_of(ground)
-    carrier.hide_set(True)
-    carrier.hide_viewport = carrier.hide_render = True
+    display_mesh = baked_ground.display_mesh_of(ground)
+    display_mesh.hide_set(True)
+    display_mesh.hide_viewport = display_mesh.hide_render = True
     export(scene, ground, tmp_path / f"ground.{kind}", 10, 12)
-    assert (carrier.hide_get(), carrier.hide_viewport, carrier.hide_render) == (True, True, True)
+    assert (display_mesh.hide_get(), display_mesh.hide_viewport, display_mesh.hide_render) == (True, True, True)
     copy = import_and_select(read, tmp_path / f"ground.{kind}")
-    assert len(copy.data.vertices) == len(carrier.data.vertices)
+    assert len(copy.data.vertices) == len(display_mesh.data.vertices)
 
 
 def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_written(scene, ground, tmp_path):
     hidden = bpy.data.collections.new("Set")
     scene.collection.children.link(hidden)
-    carrier = baked_ground.carrier_of(ground)
-    scene.collection.objects.unlink(carrier)
-    hidden.objects.link(carrier)
+    display_mesh = baked_ground.display_mesh_of(ground)
+    scene.collection.objects.unlink(display_mesh)
+    hidden.objects.link(display_mesh)
     hidden.hide_viewport = True
     with pytest.raises(InputError, match=r"Trail' is hidden with its collection: show"):
         exports.export_alembic(scene, ground, tmp_path / "ground.abc", 10, 12)
@@ -205,9 +205,9 @@ def test_a_ground_that_is_hidden_with_its_collection_is_named_and_nothing_is_wri
 
 
 def test_the_final_mesh_of_a_hidden_ground_is_where_the_ground_is(scene, ground):
-    carrier = baked_ground.carrier_of(ground)
-    carrier.hide_viewport = True
-    carrier.location.x = 2.0
+    display_mesh = baked_ground.display_mesh_of(ground)
+    display_mesh.hide_viewport = True
+    display_mesh.location.x = 2.0
     bpy.context.view_layer.update()
     assert exports.final_mesh(scene, ground).matrix_world.translation.x == pytest.approx(2.0)
 
@@ -271,7 +271,7 @@ def test_images_are_refused_where_prints_would_be_missing(scene, ground, tmp_pat
 
 
 def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground):
-    carrier = baked_ground.carrier_of(ground)
+    display_mesh = baked_ground.display_mesh_of(ground)
     still = exports.final_mesh(scene, ground)
     assert not still.modifiers
     assert still.data.shape_keys is None
@@ -282,7 +282,7 @@ def test_the_final_mesh_is_plain_and_stands_as_the_end_of_the_bake(scene, ground
         "softground_age",
     }
     assert_stands_as_recorded(ground, 1e9, played(still, 1), tolerance=0.0)
-    assert ground_mesh.is_baked(carrier)
+    assert ground_mesh.is_baked(display_mesh)
 
 
 def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
@@ -301,7 +301,7 @@ def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
 
 @pytest.mark.parametrize("spoil", ["cut", "text", "bits"])
 def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, tmp_path, spoil):
-    mesh = ground_mesh.mesh_of(baked_ground.carrier_of(ground))
+    mesh = ground_mesh.mesh_of(baked_ground.display_mesh_of(ground))
     stored = bytes(mesh[ground_mesh.RECORD])
     del mesh[ground_mesh.RECORD]
     mesh[ground_mesh.RECORD] = {
@@ -313,7 +313,7 @@ def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, t
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     scene = bpy.context.scene
     ground = scene.softground.ground
-    assert played(baked_ground.carrier_of(ground), 60)[:, 2].min() < -0.01
+    assert played(baked_ground.display_mesh_of(ground), 60)[:, 2].min() < -0.01
     with pytest.raises(InputError, match=r"damaged|replaced"):
         exports.export_point_cache(scene, ground, tmp_path / "x.pc2", 1, 2)
     bpy.ops.softground.clear_bake()

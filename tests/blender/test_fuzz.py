@@ -357,7 +357,7 @@ PROPERTY_VALUES = st.one_of(
 def test_no_stored_property_makes_a_traceback(count, forgeable):
     scene, mesh, action = forgeable
     names = [(mesh, name) for name in ground_mesh.PROPERTIES]
-    names += [(action, name) for name in (response_job.CARRIER, response_job.SPEED, response_job.WORST)]
+    names += [(action, name) for name in (response_job.ROOT_CONTROL, response_job.SPEED, response_job.WORST)]
     kept = {(owner.name, name): owner[name] for owner, name in names if owner.get(name) is not None}
     kept = {
         key: value

@@ -41,7 +41,7 @@ def heights(scene):
 
 
 def ages(scene):
-    mesh = baked_ground.carrier_of(scene.softground.ground).data
+    mesh = baked_ground.display_mesh_of(scene.softground.ground).data
     age = np.empty(len(mesh.vertices), dtype=np.float32)
     mesh.attributes[ground_mesh.AGE].data.foreach_get("value", age)
     return age
@@ -276,21 +276,21 @@ def coarse_shot(scene):
     live.discard()
 
 
-def carrier_heights(scene):
-    carrier = baked_ground.carrier_of(scene.softground.ground)
-    return ground_mesh.displayed_positions(carrier)[:, 2] - ground_mesh.rest_positions(carrier.data)[:, 2]
+def display_heights(scene):
+    display_mesh = baked_ground.display_mesh_of(scene.softground.ground)
+    return ground_mesh.displayed_positions(display_mesh)[:, 2] - ground_mesh.rest_positions(display_mesh.data)[:, 2]
 
 
 def test_a_plane_of_four_corners_shows_the_prints_that_a_bake_gives_it(coarse_shot):
     bpy.ops.softground.live()
     coarse_shot.frame_set(48)
-    live_depth = carrier_heights(coarse_shot).min()
+    live_depth = display_heights(coarse_shot).min()
     assert coarse_shot.softground.ground.hide_get() or coarse_shot.softground.ground.hide_viewport
     coarse_shot.frame_set(1)
-    assert np.abs(carrier_heights(coarse_shot)).max() == 0.0
+    assert np.abs(display_heights(coarse_shot)).max() == 0.0
     live.discard()
     bpy.ops.softground.bake()
-    assert live_depth == pytest.approx(carrier_heights(coarse_shot).min(), rel=0.05)
+    assert live_depth == pytest.approx(display_heights(coarse_shot).min(), rel=0.05)
 
 
 def test_discarding_live_prints_takes_the_fine_copy_away(coarse_shot):
@@ -308,9 +308,9 @@ def test_kept_live_prints_stay_on_the_fine_copy_until_they_are_cleared(coarse_sh
     before = fingerprints.of_file()
     bpy.ops.softground.live()
     coarse_shot.frame_set(30)
-    shown = carrier_heights(coarse_shot)
+    shown = display_heights(coarse_shot)
     bpy.ops.softground.live(keep=True)
-    assert carrier_heights(coarse_shot) == pytest.approx(shown, abs=3e-4)
+    assert display_heights(coarse_shot) == pytest.approx(shown, abs=3e-4)
     assert baked_ground.load(coarse_shot.softground.ground)[0]
     bpy.ops.softground.clear_bake()
     coarse_shot.frame_set(1)

@@ -52,7 +52,7 @@ def test_a_ground_that_anything_shapes_over_time_is_told_of_and_up_to_date_at_ev
     change(ground, short_walk)
     bpy.context.view_layer.update()
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    (warning,) = ground_mesh.warnings_of(baked_ground.carrier_of(ground))
+    (warning,) = ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
     assert "'Field' changes its shape over time by its modifier 'Theirs'" in warning
     for frame in (1, 20):
         short_walk.frame_set(frame)
@@ -72,14 +72,14 @@ def test_a_file_path_is_the_same_wherever_the_blend_is_saved(short_walk, tmp_pat
         assert bake_report.stale_reasons(bpy.context.scene) == ()
 
 
-def test_a_carrier_whose_playback_was_applied_is_no_longer_up_to_date(short_walk):
+def test_a_display_mesh_whose_playback_was_applied_is_no_longer_up_to_date(short_walk):
     short_walk.softground.shape_keys = False
     ground = field(short_walk)
     bpy.ops.softground.bake()
     assert bake_report.stale_reasons(short_walk) == ()
-    carrier = baked_ground.carrier_of(ground)
+    display_mesh = baked_ground.display_mesh_of(ground)
     short_walk.frame_set(12)
-    with bpy.context.temp_override(object=carrier, active_object=carrier):
+    with bpy.context.temp_override(object=display_mesh, active_object=display_mesh):
         bpy.ops.object.modifier_apply(modifier="SoftGround Playback")
     assert bake_report.stale_reasons(short_walk) == ("'Field Trail' has lost its playback, and shows one moment only",)
     assert bpy.ops.softground.bake() == {"FINISHED"}
@@ -101,13 +101,13 @@ def shrinkwrapped(short_walk):
 
 def test_prints_that_modifiers_would_undo_are_taken_by_a_copy_without_them(short_walk, shrinkwrapped):
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    carrier = baked_ground.carrier_of(shrinkwrapped)
-    assert carrier != shrinkwrapped
+    display_mesh = baked_ground.display_mesh_of(shrinkwrapped)
+    assert display_mesh != shrinkwrapped
     short_walk.frame_set(1)
-    before = as_rendered(carrier)[:, 2]
+    before = as_rendered(display_mesh)[:, 2]
     short_walk.frame_set(30)
-    assert -0.1 < (as_rendered(carrier)[:, 2] - before).min() < -0.02
-    (warning,) = ground_mesh.warnings_of(carrier)
+    assert -0.1 < (as_rendered(display_mesh)[:, 2] - before).min() < -0.02
+    (warning,) = ground_mesh.warnings_of(display_mesh)
     assert "The modifiers of ground 'Field' undo prints on it" in warning
 
 
@@ -119,10 +119,10 @@ def test_prints_that_modifiers_would_undo_are_refused_where_there_may_be_no_copy
 def test_live_prints_show_where_modifiers_would_undo_them(short_walk, shrinkwrapped):
     bpy.ops.softground.live()
     try:
-        carrier = baked_ground.carrier_of(shrinkwrapped)
-        before = as_rendered(carrier)[:, 2]
+        display_mesh = baked_ground.display_mesh_of(shrinkwrapped)
+        before = as_rendered(display_mesh)[:, 2]
         short_walk.frame_set(15)
-        assert -0.1 < (as_rendered(carrier)[:, 2] - before).min() < -0.02
+        assert -0.1 < (as_rendered(display_mesh)[:, 2] - before).min() < -0.02
     finally:
         bpy.ops.softground.live()
 
@@ -136,7 +136,7 @@ def test_modifiers_that_let_prints_through_stay_on_the_ground(short_walk, kind):
         modifier.strength, modifier.mid_level = 0.05, 0.0
     bpy.context.view_layer.update()
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    assert baked_ground.carrier_of(ground) == ground
+    assert baked_ground.display_mesh_of(ground) == ground
 
 
 @pytest.mark.parametrize(("kind", "shape_keys"), [("DISPLACE", True), ("DISPLACE", False), ("SOLIDIFY", True)])
@@ -185,7 +185,7 @@ def test_a_ground_that_nodes_make_of_nothing_gets_a_copy_and_comes_back(short_wa
     before = fingerprints.of_file()
     assert bpy.ops.softground.bake() == {"FINISHED"}
     short_walk.frame_set(30)
-    assert -0.1 < as_rendered(baked_ground.carrier_of(ground))[:, 2].min() < -0.02
+    assert -0.1 < as_rendered(baked_ground.display_mesh_of(ground))[:, 2].min() < -0.02
     assert bake_report.stale_reasons(short_walk) == ()
     short_walk.frame_set(1)
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
@@ -205,5 +205,5 @@ def test_a_modifier_that_only_renders_show_is_told_of_where_a_copy_lacks_it(shor
         modifier.strength, modifier.mid_level, modifier.show_viewport = 0.01, 0.0, is_shown
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
-    (warning,) = ground_mesh.warnings_of(baked_ground.carrier_of(ground))
+    (warning,) = ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
     assert "'Field' lacks what only renders show of 'Bumps': show it" in warning

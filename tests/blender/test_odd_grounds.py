@@ -16,10 +16,10 @@ def test_a_ground_that_rigid_bodies_fall_on_gets_detail_and_comes_back(short_wal
     before = fingerprints.of_file()
     bodies = short_walk.rigidbody_world.collection
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    carrier = baked_ground.carrier_of(ground)
-    assert carrier != ground
-    assert ground_mesh.is_baked(carrier)
-    assert carrier.name in short_walk.objects
+    display_mesh = baked_ground.display_mesh_of(ground)
+    assert display_mesh != ground
+    assert ground_mesh.is_baked(display_mesh)
+    assert display_mesh.name in short_walk.objects
     assert bpy.ops.softground.clear_bake() == {"FINISHED"}
     assert fingerprints.of_file() == before
     assert list(bodies.objects) == [ground]
@@ -43,10 +43,10 @@ def test_a_bake_of_a_rigid_ground_that_is_stopped_leaves_no_draft(short_walk):
 def test_a_fine_copy_in_edit_mode_is_named_and_stays(short_walk):
     ground = field(short_walk)
     bpy.ops.softground.bake()
-    carrier = baked_ground.carrier_of(ground)
-    bpy.context.view_layer.objects.active = carrier
+    display_mesh = baked_ground.display_mesh_of(ground)
+    bpy.context.view_layer.objects.active = display_mesh
     bpy.ops.object.mode_set(mode="EDIT")
-    assert f"'{carrier.name}' is in Edit Mode: leave it" in refusal(bpy.ops.softground.bake)
+    assert f"'{display_mesh.name}' is in Edit Mode: leave it" in refusal(bpy.ops.softground.bake)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert bpy.ops.softground.bake() == {"FINISHED"}
 
@@ -99,9 +99,9 @@ def test_what_is_scattered_on_a_ground_stays_while_a_copy_of_it_takes_the_prints
     assert mesh_is_shown
     assert stones > 20
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    carrier = baked_ground.carrier_of(ground)
+    display_mesh = baked_ground.display_mesh_of(ground)
     assert shown(ground) == (False, stones)
-    assert shown(carrier) == (True, 0)
+    assert shown(display_mesh) == (True, 0)
     assert (ground.hide_render, ground.show_instancer_for_render) == (False, False)
     assert bpy.ops.softground.bake() == {"FINISHED"}
     assert shown(ground) == (False, stones)
@@ -126,9 +126,9 @@ def test_what_collides_with_a_ground_collides_with_its_fine_copy(short_walk):
     ground.modifiers.new("Collision", "COLLISION")
     ground.collision.damping_factor = 0.25
     bpy.ops.softground.bake()
-    carrier = baked_ground.carrier_of(ground)
-    assert [modifier.type for modifier in carrier.modifiers] == ["NODES", "COLLISION"]
-    assert carrier.collision.damping_factor == 0.25
+    display_mesh = baked_ground.display_mesh_of(ground)
+    assert [modifier.type for modifier in display_mesh.modifiers] == ["NODES", "COLLISION"]
+    assert display_mesh.collision.damping_factor == 0.25
     bpy.ops.softground.clear_bake()
     assert ground.collision.damping_factor == 0.25
 
@@ -214,5 +214,5 @@ def test_a_room_with_its_faces_inward_takes_prints_on_its_floor(short_walk):
     bpy.context.view_layer.update()
     assert bpy.ops.softground.bake() == {"FINISHED"}
     short_walk.frame_set(30)
-    height = as_rendered(baked_ground.carrier_of(ground))[:, 2]
+    height = as_rendered(baked_ground.display_mesh_of(ground))[:, 2]
     assert -0.1 < height.min() < -0.02

@@ -133,7 +133,7 @@ class ArtistAtWork(RuleBasedStateMachine):
     @precondition(lambda self: self.options.ground)
     @rule(with_mesh=st.booleans())
     def copy_ground_and_delete_the_copy(self, with_mesh):
-        copy = baked_ground.carrier_of(self.options.ground).copy()
+        copy = baked_ground.display_mesh_of(self.options.ground).copy()
         if with_mesh:
             copy.data = copy.data.copy()
         bpy.context.scene.collection.objects.link(copy)
@@ -146,27 +146,27 @@ class ArtistAtWork(RuleBasedStateMachine):
     @precondition(lambda self: self.options.ground and baked_ground.is_baked(self.options.ground))
     @rule(what=st.sampled_from(("object", "mesh", "modifier", "group")))
     def rename_what_was_made(self, what):
-        carrier = baked_ground.carrier_of(self.options.ground)
-        modifier = playback.modifier_of(carrier)
+        display_mesh = baked_ground.display_mesh_of(self.options.ground)
+        modifier = playback.modifier_of(display_mesh)
         things = {"modifier": modifier, "group": modifier and modifier.node_group}
-        if carrier.name not in FIELDS:
-            things |= {"object": carrier, "mesh": carrier.data}
+        if display_mesh.name not in FIELDS:
+            things |= {"object": display_mesh, "mesh": display_mesh.data}
         if thing := things.get(what):
             thing.name = f"{thing.name}.mine"
 
     @precondition(lambda self: self.options.ground and baked_ground.is_baked(self.options.ground))
     @rule()
     def remove_modifier(self):
-        carrier = baked_ground.carrier_of(self.options.ground)
-        if modifier := playback.modifier_of(carrier):
-            carrier.modifiers.remove(modifier)
+        display_mesh = baked_ground.display_mesh_of(self.options.ground)
+        if modifier := playback.modifier_of(display_mesh):
+            display_mesh.modifiers.remove(modifier)
 
     @precondition(lambda self: self.options.ground)
     @rule()
     def delete_what_was_made(self):
-        carrier = baked_ground.carrier_of(self.options.ground)
-        if carrier.name not in FIELDS:
-            bpy.data.objects.remove(carrier)
+        display_mesh = baked_ground.display_mesh_of(self.options.ground)
+        if display_mesh.name not in FIELDS:
+            bpy.data.objects.remove(display_mesh)
 
     @precondition(lambda self: self.options.ground and self.options.ground.name in FIELDS)
     @rule(place=st.sampled_from((0.0, 0.1)))
@@ -176,13 +176,13 @@ class ArtistAtWork(RuleBasedStateMachine):
     def check_playback(self):
         """What is played is what is recorded, on each vertex, at some frames in no order."""
         ground = self.options.ground
-        carrier = baked_ground.carrier_of(ground)
+        display_mesh = baked_ground.display_mesh_of(ground)
         footprints, about = baked_ground.load(ground)
-        rest = ground_mesh.rest_vertices(carrier, 1.0)
+        rest = ground_mesh.rest_vertices(display_mesh, 1.0)
         cell = about["inputs"]["cell_size_m"]
         for frame in (FRAMES, 9.0, 14.5, 0.0):
             bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
-            shown = world_positions(carrier.evaluated_get(bpy.context.evaluated_depsgraph_get()))[:, 2]
+            shown = world_positions(display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get()))[:, 2]
             pressed = PressedGround.at(
                 footprints,
                 frame=frame,

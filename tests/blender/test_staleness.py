@@ -71,7 +71,7 @@ def move_ground(scene):
 def delete_vertex(scene):
     import bmesh  # only there once bpy is
 
-    for thing in {scene.softground.ground, baked_ground.carrier_of(scene.softground.ground)}:
+    for thing in {scene.softground.ground, baked_ground.display_mesh_of(scene.softground.ground)}:
         edited = bmesh.new()
         edited.from_mesh(thing.data)
         edited.verts.ensure_lookup_table()
@@ -423,7 +423,7 @@ def test_what_a_rigged_character_leans_on_is_compared_as_well(scene, change, mes
 
 
 def test_another_blender_compares_what_it_knows_as_the_one_that_baked(rigged):
-    mesh = baked_ground.carrier_of(rigged.softground.ground).data
+    mesh = baked_ground.display_mesh_of(rigged.softground.ground).data
     noted = json.loads(mesh[staleness.FINGERPRINTS])
     mesh[staleness.FINGERPRINTS] = json.dumps(noted | {"version": "4.1", "surface": "0", "movement:Walker": "0"})
     assert bake_report.stale_reasons(rigged) == ()

@@ -47,7 +47,7 @@ def test_what_the_user_makes_after_the_bake_under_such_a_name_stays_and_is_told_
     short_walk.softground.shape_keys = False  # without which a bake needs fewer attributes
     ground = field(short_walk, **FINE)
     bpy.ops.softground.bake()
-    assert baked_ground.carrier_of(ground) == ground
+    assert baked_ground.display_mesh_of(ground) == ground
     for name in (own_data.SOLE, playback.nodes.LAST_HEIGHT):
         assert name not in ground.data.attributes
         ground.data.attributes.new(name, "FLOAT", "POINT")
@@ -73,7 +73,7 @@ def test_attributes_of_the_users_come_along_to_the_copy_whatever_they_are_called
     ground = field(short_walk, **FINE)
     ground.data.attributes.new("softground_mine", "FLOAT", "POINT")
     bpy.ops.softground.bake()
-    assert "softground_mine" in baked_ground.carrier_of(ground).data.attributes
+    assert "softground_mine" in baked_ground.display_mesh_of(ground).data.attributes
 
 
 def test_the_modifier_that_the_user_works_at_stays_active(short_walk):
@@ -99,12 +99,12 @@ def test_a_fine_ground_whose_modifier_none_may_precede_gets_a_copy(short_walk, k
     assert fingerprints.of_file() == before
     short_walk.softground.detail = "AUTO"
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    carrier = baked_ground.carrier_of(ground)
-    assert carrier != ground
-    assert any("lets nothing play before it" in warning for warning in ground_mesh.warnings_of(carrier))
+    display_mesh = baked_ground.display_mesh_of(ground)
+    assert display_mesh != ground
+    assert any("lets nothing play before it" in warning for warning in ground_mesh.warnings_of(display_mesh))
     bpy.ops.softground.bake()
-    carrier = baked_ground.carrier_of(ground)
-    carrier.modifiers.new("Later", kind)
+    display_mesh = baked_ground.display_mesh_of(ground)
+    display_mesh.modifiers.new("Later", kind)
     baked = fingerprints.of_file()
     assert "'Later' of 'Field Trail' lets nothing play before it" in refusal(bpy.ops.softground.bake)
     assert fingerprints.of_file() == baked

@@ -13,7 +13,7 @@ BETWEEN = 14.25
 
 
 def make(blend: str, heights: str) -> None:
-    """Bake the walker, save the shot, and write what its record says of the carrier's heights."""
+    """Bake the walker, save the shot, and write what its record says of the display mesh's heights."""
     import softground_addon
     from softground_addon.blender import jobs
     from softground_addon.blender.baking import bake_job
@@ -34,9 +34,9 @@ def make(blend: str, heights: str) -> None:
         bpy.context.view_layer.update()
         jobs.run(bake_job.bake(scene))
         set_up_render(scene)
-        carrier = baked_ground.carrier_of(ground)
-        carrier.name = "Carrier"
-        rest = ground_mesh.rest_vertices(carrier, 1.0)
+        display_mesh = baked_ground.display_mesh_of(ground)
+        display_mesh.name = "Carrier"
+        rest = ground_mesh.rest_vertices(display_mesh, 1.0)
         footprints, about = baked_ground.load(ground)
         sigma = baked_ground.baked_with(about, "blur_sigma")
         recorded = {}
@@ -62,10 +62,10 @@ def play(blend: str, out: str, with_addon: str, rendering: str, *frames: str) ->
         scene, shown = bpy.context.scene, {}
         for frame in frames:
             scene.frame_set(int(float(frame)), subframe=float(frame) % 1)
-            carrier = bpy.data.objects["Carrier"].evaluated_get(bpy.context.evaluated_depsgraph_get())
-            positions = np.empty(len(carrier.data.vertices) * 3, dtype=np.float32)
-            carrier.data.attributes["position"].data.foreach_get("vector", positions)
-            matrix = np.array(carrier.matrix_world)
+            display_mesh = bpy.data.objects["Carrier"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+            positions = np.empty(len(display_mesh.data.vertices) * 3, dtype=np.float32)
+            display_mesh.data.attributes["position"].data.foreach_get("vector", positions)
+            matrix = np.array(display_mesh.matrix_world)
             shown[frame] = positions.reshape(-1, 3) @ matrix[2, :3] + matrix[2, 3]
             if rendering == "1":
                 shown[f"pixels {frame}"] = pixels(scene, Path(out).with_suffix(".exr"))

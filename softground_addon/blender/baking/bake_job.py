@@ -89,20 +89,20 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     shot_hash = yield from meanwhile(Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, vertices))
     sampled = time.perf_counter()
 
-    loads, footprints, forces, answers = yield from _press(wanted, shot)
+    loads, footprints, forces, responses = yield from _press(wanted, shot)
     simulated = time.perf_counter()
 
-    gaps = response_job.gap_table(answers)
+    gaps = response_job.gap_table(responses)
     if gaps is None:
         gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, footprints)
-    layers = (yield from response_job.layers_of(wanted, shot.rigs, answers)) if write else []
+    layers = (yield from response_job.layers_of(wanted, shot.rigs, responses)) if write else []
     inputs = wanted.inputs()
     if surface and surface.factors is not None:
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
     ground_name = wanted.ground.name if wanted.ground else "the ground"
     warnings = [*bake_report.warnings(footprints, loads, wanted.cell_size_m, ground_name), *moving]
-    gap_warnings = response_job.warnings(answers)
+    gap_warnings = response_job.warnings(responses)
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -111,13 +111,13 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         offsets_mm=bake_report.offsets_mm(loads),
         forces=forces,
         gaps_mm=gaps,
-        worst_gaps=response_job.worst_gaps(answers),
+        worst_gaps=response_job.worst_gaps(responses),
         suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
     )
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del loads, answers
+    del loads, responses
     written: _Written | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash}
@@ -140,7 +140,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     if written:
         stamped = wanted.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
         told = {"summary": bake_report.summary(result), "warnings": result["warnings"]}
-        sign(written.carrier, written.ground, stamped, movers, **told)
+        sign(written.display_mesh, written.ground, stamped, movers, **told)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(footprints))
 
@@ -150,7 +150,7 @@ class _Written:
     """What was written to the ground, and what carries it."""
 
     ground: bpy.types.Object
-    carrier: bpy.types.Object
+    display_mesh: bpy.types.Object
     error: float
     warnings: list[str]
 
@@ -190,15 +190,15 @@ def _write(
         if shot.surface is None:
             assert shot.plan is not None
             place = yield from _created(drafts, scene, wanted, shot.plan, trail)
-            about["inputs"]["ground"] = place.carrier.name
+            about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, warnings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
         publishing = publish(left, place, wanted)
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
-    ground = settings.found(wanted.ground) if wanted.ground else published.carrier
-    return _Written(ground, published.carrier, published.error, warnings)
+    ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
+    return _Written(ground, published.display_mesh, published.error, warnings)
 
 
 def _created(
@@ -277,8 +277,8 @@ def _press(
         loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions), known)
         footprints, forces = yield from _simulate(wanted, shot, loads)
     check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
-    answers = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
-    return loads, footprints, forces, answers
+    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
+    return loads, footprints, forces, responses
 
 
 def _simulate(

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 class Published:
     """What carries a bake, and the largest error of the heights that it plays [m]."""
 
-    carrier: bpy.types.Object
+    display_mesh: bpy.types.Object
     error: float
 
 
@@ -84,7 +84,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             shape_keys=made_with.shape_keys,
             marks=marks,
         )
-        name, error, show = place.carrier, spans.error, place.publish if place.is_draft else None
+        name, error, show = place.display_mesh, spans.error, place.publish if place.is_draft else None
         del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
         if show:
             yield Progress("write", 0.9)
@@ -93,7 +93,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
 
 
 def sign(
-    carrier: bpy.types.Object,
+    display_mesh: bpy.types.Object,
     ground: bpy.types.Object,
     inputs: Mapping[str, Any],
     hashes: Mapping[str, str],
@@ -105,7 +105,7 @@ def sign(
 
     Parameters
     ----------
-    carrier, ground : bpy.types.Object
+    display_mesh, ground : bpy.types.Object
         What carries it, and the ground that it is of.
     inputs, hashes
         See `staleness.store`.
@@ -113,8 +113,8 @@ def sign(
         From `bake_report`.
     warnings : sequence of str
     """
-    ground_mesh.mesh_of(carrier)[ground_mesh.SUMMARY] = dict(summary)
-    ground_mesh.note_warnings(carrier, warnings)
+    ground_mesh.mesh_of(display_mesh)[ground_mesh.SUMMARY] = dict(summary)
+    ground_mesh.note_warnings(display_mesh, warnings)
     staleness.store(inputs, ground, hashes)
 
 

@@ -22,7 +22,7 @@ from .bake_job import BakeResult, bake
 def floating_mm(scene: bpy.types.Scene) -> float:
     """How far the feet float above the prints of the scene's last bake [mm]; 0 where there is none."""
     ground = scene.softground.ground
-    summary = ground_mesh.summary_of(baked_ground.carrier_of(ground)) if ground else {}
+    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(ground)) if ground else {}
     return float(summary.get(bake_report.FLOATING, 0.0))
 
 
@@ -50,8 +50,8 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
 
 def _note(ground: bpy.types.Object, wanted: BakeSettings, result: BakeResult, hashes: Mapping[str, str]) -> None:
     """Note with the ground's bake that nothing floats any more; with the same prints as before it is up to date."""
-    mesh = ground_mesh.mesh_of(baked_ground.carrier_of(ground))
-    was, now = ground_mesh.summary_of(baked_ground.carrier_of(ground)), bake_report.summary(result.report)
+    mesh = ground_mesh.mesh_of(baked_ground.display_mesh_of(ground))
+    was, now = ground_mesh.summary_of(baked_ground.display_mesh_of(ground)), bake_report.summary(result.report)
     mesh[ground_mesh.SUMMARY] = was | {bake_report.FLOATING: now[bake_report.FLOATING]}
     if hashes and all(was.get(key) == now[key] for key in ("steps", "max_depth_m", "peak_force_n")):
         staleness.store(wanted.inputs(Acts.WRITING), ground, hashes)

@@ -34,37 +34,37 @@ class Place:
     Attributes
     ----------
     index : (K,) int array
-        Vertices of the carrier's mesh that the bake moves.
+        Vertices of the display mesh that the bake moves.
     position : (K, 3) float array
         Their undisturbed world positions [m].
-    carrier : bpy.types.Object
+    display_mesh : bpy.types.Object
         What takes the prints.
     publish : callable
-        Takes away what stands in its way, and shows the carrier.
+        Takes away what stands in its way, and shows the display_mesh.
     is_draft : bool
-        Whether the carrier is a new object, in no scene yet.
+        Whether the display_mesh is a new object, in no scene yet.
     """
 
     index: Indices
     position: Array
-    carrier: ObjectName
+    display_mesh: ObjectName
     publish: Callable[[], object]
     is_draft: bool = False
 
 
-def carrier_of(ground: bpy.types.Object) -> bpy.types.Object:
+def display_mesh_of(ground: bpy.types.Object) -> bpy.types.Object:
     """The object that carries the ground's bake: the detail along the trail where there is one, else the ground."""
     return trail_detail.detail_of(ground) or ground
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground."""
-    return ground_mesh.is_baked(carrier_of(ground))
+    return ground_mesh.is_baked(display_mesh_of(ground))
 
 
 def has_remains(ground: bpy.types.Object) -> bool:
     """Whether `clear` has something to take away: a bake, or what is left of one that was deleted in part."""
-    return ground_mesh.has_remains(carrier_of(ground)) or hidden_ground.hides(ground)
+    return ground_mesh.has_remains(display_mesh_of(ground)) or hidden_ground.hides(ground)
 
 
 def clear(ground: bpy.types.Object) -> None:
@@ -75,7 +75,7 @@ def clear(ground: bpy.types.Object) -> None:
     InputError
         If the ground or the copy that carries the bake cannot be changed.
     """
-    for thing in dict.fromkeys((ground, carrier_of(ground))):
+    for thing in dict.fromkeys((ground, display_mesh_of(ground))):
         ground_checks.check_writable(thing)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
@@ -145,23 +145,23 @@ def write(
         See `ground_mesh.write_soles`.
     """
     found(table)  # or nothing is written
-    ground_checks.check_playable(found(place.carrier))
+    ground_checks.check_playable(found(place.display_mesh))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
-    up = ground_mesh.up_of(found(place.carrier), unit_scale)
+    up = ground_mesh.up_of(found(place.display_mesh), unit_scale)
     if not place.is_draft:
         place.publish()
     try:
-        ground_mesh.write(found(place.carrier), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
+        ground_mesh.write(found(place.display_mesh), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.9)
-        carrier = found(place.carrier)
-        playback.attach(carrier, place.index[spans.point], spans, found(table), up=up)
-        ground_mesh.write_soles(carrier, place.index, marks)
+        display_mesh = found(place.display_mesh)
+        playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
+        ground_mesh.write_soles(display_mesh, place.index, marks)
     except BaseException:
         if not place.is_draft:  # which whoever made it takes away
-            ground_mesh.restore(found(place.carrier))
+            ground_mesh.restore(found(place.display_mesh))
         raise
-    return carrier
+    return display_mesh
 
 
 def stored_record(ground: bpy.types.Object) -> memoryview:
@@ -172,7 +172,7 @@ def stored_record(ground: bpy.types.Object) -> memoryview:
     InputError
         If there is no bake, or its record is something else.
     """
-    stored = ground_mesh.mesh_of(carrier_of(ground)).get(ground_mesh.RECORD)
+    stored = ground_mesh.mesh_of(display_mesh_of(ground)).get(ground_mesh.RECORD)
     if stored is None:
         raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
     try:

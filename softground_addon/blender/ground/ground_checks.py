@@ -22,11 +22,11 @@ def check_writable(ground: bpy.types.Object) -> None:
         raise InputError(f"Ground '{name}' is in Edit Mode: leave it with Tab first.")
 
 
-def check_playable(carrier: bpy.types.Object) -> None:
+def check_playable(display_mesh: bpy.types.Object) -> None:
     """Raise InputError, naming the modifier, if no playback could come before this object's modifiers."""
-    if barrier := playback.barrier_on(carrier):
+    if barrier := playback.barrier_on(display_mesh):
         raise InputError(
-            f"The modifier '{barrier.name}' of '{carrier.name}' lets nothing play before it: apply it, or take it off."
+            f"The modifier '{barrier.name}' of '{display_mesh.name}' lets nothing play before it: apply or remove it."
         )
 
 

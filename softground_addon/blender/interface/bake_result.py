@@ -18,7 +18,7 @@ from ..response import response_job
 def draw(layout: Any, options: Any, summary: Any) -> None:
     """Show the summary of a bake, how many warnings there are, and feet that float."""
     _result(layout, summary)
-    _warnings(layout, ground_mesh.warnings_of(baked_ground.carrier_of(options.ground)))
+    _warnings(layout, ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground)))
     _floating_feet(layout, options, summary)
 
 
@@ -95,7 +95,7 @@ _WARNING_WIDTH = 90
 def warnings_of(scene: bpy.types.Scene) -> list[str]:
     """What the user should know of the bake on the scene's ground."""
     ground = scene.softground.ground
-    return ground_mesh.warnings_of(baked_ground.carrier_of(ground)) if ground else []
+    return ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if ground else []
 
 
 CLASSES = (SOFTGROUND_OT_show_warnings,)

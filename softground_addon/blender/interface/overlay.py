@@ -66,10 +66,10 @@ def draw_shapes() -> None:
     context: Any = bpy.context
     if not state.show_overlay or context.scene is None or not context.space_data.overlay.show_overlays:
         return
-    foretold = prediction.of(settings.scene_of(context))
-    if foretold is None:
+    predicted = prediction.of(settings.scene_of(context))
+    if predicted is None:
         return
-    known = foretold.analysis
+    known = predicted.analysis
     import gpu  # noqa: PLC0415  (not there in background)
 
     scene = settings.scene_of(context)
@@ -100,10 +100,10 @@ def draw_numbers() -> None:
     context: Any = bpy.context
     if not (state.show_overlay and state.show_footfalls) or not context.space_data.overlay.show_overlays:
         return
-    foretold = prediction.of(settings.scene_of(context))
-    if foretold is None:
+    predicted = prediction.of(settings.scene_of(context))
+    if predicted is None:
         return
-    known = foretold.analysis
+    known = predicted.analysis
     import blf  # noqa: PLC0415
     from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
 
@@ -142,7 +142,7 @@ def _baked(ground: bpy.types.Object | None) -> tuple[Sequence[Footprint], float]
         return (), 0.0
     try:
         tail = bytes(baked_ground.stored_record(ground)[-record.TAIL :])
-        key = (baked_ground.carrier_of(ground).data.session_uid, tail)
+        key = (baked_ground.display_mesh_of(ground).data.session_uid, tail)
         if key not in _bake:
             footprints, about = baked_ground.load(ground)
             _bake.clear()

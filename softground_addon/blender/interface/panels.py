@@ -180,9 +180,9 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         column.prop(options, "cell_size_cm")
         column.prop(options, "detail")
         column.prop(options, "shape_keys")
-        foretold = prediction.of(settings.scene_of(context))
-        if foretold:
-            _note(layout, _estimate(foretold.analysis.area, settings.scene_of(context).softground.cell_size))
+        predicted = prediction.of(settings.scene_of(context))
+        if predicted:
+            _note(layout, _estimate(predicted.analysis.area, settings.scene_of(context).softground.cell_size))
 
 
 class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
@@ -203,17 +203,17 @@ class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
         column.prop(material, "stiffness_mpa")
         column.prop(material, "poisson_ratio")
         column.prop(material, "characteristic_time")
-        foretold = prediction.of(scene)
+        predicted = prediction.of(scene)
         row = layout.row(align=True)
-        if foretold is None:
+        if predicted is None:
             row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
             return
-        depth = "…" if foretold.depth is None else f"{foretold.depth * 100:.1f} cm"
+        depth = "…" if predicted.depth is None else f"{predicted.depth * 100:.1f} cm"
         split = row.split(factor=0.4)
         split.alignment = "RIGHT"
         split.label(text="Deepest Print")
         row = split.row(align=True)
-        row.active = foretold.is_current
+        row.active = predicted.is_current
         row.operator("softground.match_depth", text=depth, icon="DRIVER_DISTANCE", translate=False)
         row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
 
@@ -256,7 +256,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         _live_buttons(layout, state)
         layout.operator("softground.clear_bake", icon="TRASH")
-        summary = ground_mesh.summary_of(baked_ground.carrier_of(options.ground)) if options.ground else {}
+        summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
         if summary:
             bake_result.draw(layout, options, summary)
             for reason in state.stale.splitlines():

@@ -1,4 +1,4 @@
-"""The sidebar's part on how characters answer the ground, and its small operators."""
+"""The sidebar's part on how characters respond to the ground, and its small operators."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
 
 
 class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
-    """How the character answers the ground that gives way"""
+    """How the character responds to the ground that gives way"""
 
     bl_label = "Response"
     bl_parent_id = "SOFTGROUND_PT_character"
@@ -134,7 +134,7 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     box = layout.box().column(align=True)
     row = box.row()
     row.label(text="Keyed On", icon="BONE_DATA")
-    row.label(text=notes.get(response_job.CARRIER, ""), translate=False)
+    row.label(text=notes.get(response_job.ROOT_CONTROL, ""), translate=False)
     speed = f"{response_job.speed_in(notes):.0%}"
     row = box.split(factor=0.72)
     row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)

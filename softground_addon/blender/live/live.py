@@ -68,7 +68,7 @@ class LiveMode:
         self.scene = scene.session_uid
         self.rendering = False
         self._owner = wanted.ground
-        self._ground = _carrier(wanted, known)
+        self._ground = _display_mesh(wanted, known)
         self._begin(wanted, known)
 
     def _begin(self, wanted: BakeSettings, known: analysis.Analysis) -> None:
@@ -92,7 +92,7 @@ class LiveMode:
 
     def _object(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
         ground = scene.softground.ground
-        return self._ground.object(ground and baked_ground.carrier_of(ground))
+        return self._ground.object(ground and baked_ground.display_mesh_of(ground))
 
     def show_anew(self, scene: bpy.types.Scene) -> bool:
         """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
@@ -143,7 +143,7 @@ class LiveMode:
         if len(pressed) > 1:  # no setting gives this ground again
             inputs["material"] = [asdict(material) for material in pressed]
         sign(
-            published.carrier,
+            published.display_mesh,
             settings.found(self._owner),
             inputs,
             staleness.of_movers(scene, made_with),
@@ -158,7 +158,7 @@ class LiveMode:
             baked_ground.clear(ground)
 
 
-def _carrier(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
+def _display_mesh(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
     """What takes the prints: the ground, or a copy that is fine where its characters will step.
 
     Raises

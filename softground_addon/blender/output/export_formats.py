@@ -161,7 +161,7 @@ def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
     ground: bpy.types.Object | None = scene.softground.ground
     if ground is None:
         raise InputError(f"Scene '{scene.name}' has no ground with a bake: press Bake Footprints first.")
-    exports.baked_carrier(ground)
+    exports.baked_display_mesh(ground)
     reasons = () if outdated else bake_report.stale_reasons(scene)
     if reasons:
         raise InputError(

@@ -28,13 +28,13 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
         If there is no bake, its record is damaged, or the file cannot be written.
     """
     unit_scale = scene.unit_settings.scale_length
-    carrier = baked_carrier(ground)
-    rest = ground_mesh.rest_positions(ground_mesh.mesh_of(carrier))
-    moved = playback.moved_vertices(ground_mesh.mesh_of(carrier))
-    world = ground_mesh.rest_vertices(carrier, unit_scale)[moved]
+    display_mesh = baked_display_mesh(ground)
+    rest = ground_mesh.rest_positions(ground_mesh.mesh_of(display_mesh))
+    moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
+    world = ground_mesh.rest_vertices(display_mesh, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
     over_time = vertex_histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
-    up = ground_mesh.up_of(carrier, unit_scale)
+    up = ground_mesh.up_of(display_mesh, unit_scale)
 
     def samples() -> Iterator[NDArray[np.float32]]:
         for frame in range(start, end + 1):
@@ -54,9 +54,9 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
     InputError
         If there is no bake, or the file cannot be written.
     """
-    carrier = baked_carrier(ground)
-    with _only(scene, carrier, start, end), replacing(path) as partial:
-        shown = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    display_mesh = baked_display_mesh(ground)
+    with _only(scene, display_mesh, start, end), replacing(path) as partial:
+        shown = display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
         check_room(path, size_of_alembic(ground_mesh.mesh_of(shown), end - start + 1))  # else Blender ends
         options = {
             "selected": True,
@@ -94,7 +94,7 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
         raise InputError(
             f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
         )
-    with _only(scene, baked_carrier(ground), start, end), replacing(path) as partial:
+    with _only(scene, baked_display_mesh(ground), start, end), replacing(path) as partial:
         options = {
             "selected_objects_only": True,
             "export_subdivision": "TESSELLATE",
@@ -116,20 +116,20 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     InputError
         If there is no bake.
     """
-    carrier = baked_carrier(ground)
-    mesh = ground_mesh.mesh_of(carrier).copy()
+    display_mesh = baked_display_mesh(ground)
+    mesh = ground_mesh.mesh_of(display_mesh).copy()
     display_key.drop_all(mesh)
-    ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(carrier))
+    ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(display_mesh))
     own_data.remove(mesh, (own_data.REST, *own_data.OF_PLAYBACK))  # those for shading stay
-    if any(item.show_viewport for item in ground_mesh.users_modifiers(carrier)):
-        with ground_mesh.stand_in(carrier, mesh) as evaluated:
+    if any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
+        with ground_mesh.stand_in(display_mesh, mesh) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
         mesh.name = plain.name
         bpy.data.meshes.remove(plain)
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
     for key in own_data.PROPERTIES:
         mesh.pop(key, None)
-    still.matrix_world = Matrix(ground_mesh.to_world_of(carrier, 1.0).tolist())
+    still.matrix_world = Matrix(ground_mesh.to_world_of(display_mesh, 1.0).tolist())
     scene.collection.objects.link(still)
     return still
 
@@ -152,7 +152,7 @@ def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -
         bpy.data.meshes.remove(mesh)
 
 
-def baked_carrier(ground: bpy.types.Object) -> bpy.types.Object:
+def baked_display_mesh(ground: bpy.types.Object) -> bpy.types.Object:
     """The object that carries the ground's bake.
 
     Raises
@@ -160,38 +160,38 @@ def baked_carrier(ground: bpy.types.Object) -> bpy.types.Object:
     InputError
         If there is no bake.
     """
-    carrier = baked_ground.carrier_of(ground)
-    if not ground_mesh.is_baked(carrier):
+    display_mesh = baked_ground.display_mesh_of(ground)
+    if not ground_mesh.is_baked(display_mesh):
         raise InputError(f"There is no bake on ground '{ground.name}': press Bake Footprints first.")
-    return carrier
+    return display_mesh
 
 
 @contextmanager
-def _only(scene: bpy.types.Scene, carrier: bpy.types.Object, start: int, end: int) -> Iterator[None]:
+def _only(scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, end: int) -> Iterator[None]:
     """An object as all that is selected, shown if it is hidden, and the frames as the scene's; then all as before."""
     layer = bpy.context.view_layer
     layer.update()
-    if carrier.name not in layer.objects:
-        raise InputError(f"'{carrier.name}' is not in the current view layer: include its collection first.")
-    hidden = carrier.hide_get(), carrier.hide_viewport, carrier.hide_render
+    if display_mesh.name not in layer.objects:
+        raise InputError(f"'{display_mesh.name}' is not in the current view layer: include its collection first.")
+    hidden = display_mesh.hide_get(), display_mesh.hide_viewport, display_mesh.hide_render
     selected = [thing for thing in layer.objects if thing.select_get()]
     active, frames = layer.objects.active, (scene.frame_start, scene.frame_end)
     frame, subframe = scene.frame_current, scene.frame_subframe
     try:
         for thing in selected:
             thing.select_set(False)
-        carrier.hide_viewport = carrier.hide_render = False
+        display_mesh.hide_viewport = display_mesh.hide_render = False
         layer.update()
-        carrier.hide_set(False)
-        carrier.select_set(True)
-        if not carrier.select_get():
-            raise InputError(f"'{carrier.name}' is hidden with its collection: show the collection first.")
+        display_mesh.hide_set(False)
+        display_mesh.select_set(True)
+        if not display_mesh.select_get():
+            raise InputError(f"'{display_mesh.name}' is hidden with its collection: show the collection first.")
         scene.frame_start, scene.frame_end = start, end
         yield
     finally:
-        carrier.select_set(False)
-        carrier.hide_set(hidden[0])
-        carrier.hide_viewport, carrier.hide_render = hidden[1:]
+        display_mesh.select_set(False)
+        display_mesh.hide_set(hidden[0])
+        display_mesh.hide_viewport, display_mesh.hide_render = hidden[1:]
         for thing in selected:
             thing.select_set(True)
         layer.objects.active = active

@@ -19,7 +19,7 @@ from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint
 from .. import settings
 from ..ground import baked_ground, ground_mesh, refined_mesh
-from .exports import baked_carrier, written_by_blender
+from .exports import baked_display_mesh, written_by_blender
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -68,7 +68,7 @@ def export_images(
     InputError
         If there is no bake, no such UV map, prints lie outside of its image, or the files cannot be written.
     """
-    baked_carrier(ground)
+    baked_display_mesh(ground)
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)

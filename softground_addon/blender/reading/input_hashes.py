@@ -42,7 +42,7 @@ _NO_INPUT = frozenset(
 """Settings that change nothing of what their owner does."""
 
 _ANSWERS = (nla_layer.RESPONSE, nla_layer.EXTRA, nla_layer.STANDING)
-"""Tracks that hold the ground's answer to the rig, and not what the rig was animated to do."""
+"""Tracks that hold the ground's response to the rig, and not what the rig was animated to do."""
 
 _LOOKED_AT = 5000
 """Vertices whose weights are compared, spread over the mesh: Blender reads weights one by one."""
@@ -195,7 +195,7 @@ def animated_paths_of(thing: bpy.types.Object) -> set[str]:
 
 
 def _animated(thing: bpy.types.Object) -> set[tuple[str, int]]:
-    """Data paths and indices that something sets at each frame, the ground's answer to the rig included."""
+    """Data paths and indices that something sets at each frame, the ground's response to the rig included."""
     animation = thing.animation_data
     action = animation and animation.action
     answer = action_curves(action, slot_of(animation)) if action else ()

@@ -19,7 +19,7 @@ from ..characters.rig_sampling import object_named
 from ..characters.sole_extraction import meshes_on
 from ..compat import SERIES
 from ..ground import ground_mesh, painted_ground, playback
-from ..ground.baked_ground import carrier_of
+from ..ground.baked_ground import display_mesh_of
 from ..ground.own_data import FINGERPRINTS
 from . import input_hashes
 
@@ -53,7 +53,7 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
     """
     painted = inputs["painted"]
     stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, painted), **hashes}
-    ground_mesh.mesh_of(carrier_of(ground))[FINGERPRINTS] = json.dumps(stamp)
+    ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(stamp)
 
 
 def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
@@ -68,15 +68,17 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     if wanted.ground is None:
         return ()
     ground = settings.found(wanted.ground)
-    carrier = carrier_of(ground)
-    if not ground_mesh.is_baked(carrier):
+    display_mesh = display_mesh_of(ground)
+    if not ground_mesh.is_baked(display_mesh):
         return ()
-    if edited := next((thing for thing in (ground, carrier, *_bodies_of(scene, wanted)) if thing.mode == "EDIT"), None):
+    if edited := next(
+        (thing for thing in (ground, display_mesh, *_bodies_of(scene, wanted)) if thing.mode == "EDIT"), None
+    ):
         return (f"'{edited.name}' is in Edit Mode",)
-    if playback.modifier_of(carrier) is None:
-        return (f"'{carrier.name}' has lost its playback, and shows one moment only",)
+    if playback.modifier_of(display_mesh) is None:
+        return (f"'{display_mesh.name}' has lost its playback, and shows one moment only",)
     try:
-        then: dict[str, str] = json.loads(ground_mesh.mesh_of(carrier)[FINGERPRINTS])
+        then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         inputs = wanted.inputs(Acts.WRITING)
         now = {**_of_settings(inputs), **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
         if SETTINGS in then:
@@ -91,7 +93,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         _WRITING: "The settings have changed",
         GROUND: f"The mesh or the place of '{ground.name}' has changed",
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
-        PRINTS: f"The mesh of '{carrier.name}' has been edited",
+        PRINTS: f"The mesh of '{display_mesh.name}' has been edited",
     }
     of_things = {
         ANIMATION: "The animation of '{}' has changed",
@@ -148,7 +150,7 @@ def _of_bake(ground: bpy.types.Object, painted: Sequence[str]) -> dict[str, str]
     return {
         GROUND: f"{_of_ground(ground)}-{_modifiers_of(ground)}",
         SURFACE: _of_surface(ground, painted),
-        PRINTS: input_hashes.of_topology(ground_mesh.mesh_of(carrier_of(ground))),
+        PRINTS: input_hashes.of_topology(ground_mesh.mesh_of(display_mesh_of(ground))),
     }
 
 
@@ -191,7 +193,7 @@ def _of_movement(mover: bpy.types.Object, ground: bpy.types.Object | None) -> st
     """What moves an object beside its own keys and the places of its parents: its rig, and all that it follows."""
     told = [input_hashes.of_animation(mover)]
     parents = ancestors(mover)
-    known = {mover, *((ground, carrier_of(ground)) if ground else ())}
+    known = {mover, *((ground, display_mesh_of(ground)) if ground else ())}
     waiting = [*parents, *leaders(mover)]
     while waiting:
         one = waiting.pop()

@@ -119,13 +119,13 @@ def _bone_curves(
 ) -> list[LayerCurve]:
     bone, pose = armature.pose.bones[control.bone], poses.bones[control.bone]
     basis = _basis(bone.rotation_mode, pose)
-    carrier = moved.get(control.carried_by)
-    if carrier is None:
-        carrier = np.broadcast_to(np.eye(4), pose.matrix.shape)
+    root_control = moved.get(control.carried_by)
+    if root_control is None:
+        root_control = np.broadcast_to(np.eye(4), pose.matrix.shape)
     elif not bone.bone.use_inherit_rotation:
-        carrier = _translation_at(carrier, pose.matrix[:, :3, 3])
-    # The parent's frame T satisfies matrix = T·basis and moves with the carrier, whatever the bone inherits from it.
-    new = basis @ np.linalg.inv(pose.matrix) @ np.linalg.inv(carrier) @ moved[control.part] @ pose.matrix
+        root_control = _translation_at(root_control, pose.matrix[:, :3, 3])
+    # The parent's frame T satisfies matrix = T·basis and moves with the root control, whatever the bone inherits.
+    new = basis @ np.linalg.inv(pose.matrix) @ np.linalg.inv(root_control) @ moved[control.part] @ pose.matrix
     size = float(np.linalg.norm(poses.world[0, :3, 0])) * metre
     path = f'pose.bones["{bpy.utils.escape_identifier(control.bone)}"].'
     curves = []

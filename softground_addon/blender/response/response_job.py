@@ -71,7 +71,7 @@ class CharacterResponse:
 
 
 def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
-    """Those that can answer the ground, with their armatures: things without a rig cannot."""
+    """Those that can respond to the ground, with their armatures: things without a rig cannot."""
     return [(one, settings.found(one.armature)) for one in characters if one.armature]
 
 
@@ -140,10 +140,10 @@ def responses_of(
     options: ResponseOptions | None,
 ) -> Job[list[CharacterResponse]]:
     """Each rigged character's response to the pressed ground, on top of its source."""
-    answers: list[CharacterResponse] = []
+    responses: list[CharacterResponse] = []
     now = Progress("simulate", 1.0)
     if options is None:
-        return answers
+        return responses
     for of_character, motion in zip(loads, motions, strict=True):
         if motion.centre is not None:
             continue
@@ -153,30 +153,32 @@ def responses_of(
         response = yield from meanwhile(now, work)
         before = yield from meanwhile(now, gaps.slices(motion, *pressed))
         after = yield from meanwhile(now, gaps.slices(responding(motion, response), *pressed))
-        answers.append(CharacterResponse(motion, response, before, after, mean_sinkage(footprints, motion.name)))
-    return answers
+        responses.append(CharacterResponse(motion, response, before, after, mean_sinkage(footprints, motion.name)))
+    return responses
 
 
-def layers_of(wanted: BakeSettings, rigs: Sequence[ReadRig], answers: Sequence[CharacterResponse]) -> Job[list[Layer]]:
-    """The keys of each character's layer, of rigs as they were read; none without answers."""
+def layers_of(
+    wanted: BakeSettings, rigs: Sequence[ReadRig], responses: Sequence[CharacterResponse]
+) -> Job[list[Layer]]:
+    """The keys of each character's layer, of rigs as they were read; none without responses."""
     layers: list[Layer] = []
     names = [one.armature for one in wanted.characters if one.armature]
-    for number, (name, rig, answer) in enumerate(zip(names, rigs, answers, strict=False)):
+    for number, (name, rig, character) in enumerate(zip(names, rigs, responses, strict=False)):
         work = response_curves(
             name,
             rig,
-            answer.motion,
-            answer.response,
+            character.motion,
+            character.response,
             metre=wanted.unit_scale_m,
             stretch=wanted.time_stretch,
         )
-        count, parts = len(rig.controls), len(answers)
+        count, parts = len(rig.controls), len(responses)
         curves = yield from counted(work, "write", count, part=number, parts=parts, share=SHARE_OF_WRITING)
-        layers.append(Layer(curves, _notes(rig.controls[0].bone, answer)))
+        layers.append(Layer(curves, _notes(rig.controls[0].bone, character)))
     return layers
 
 
-CARRIER = "softground_carrier"
+ROOT_CONTROL = "softground_carrier"
 """Note of the bone that carries the body."""
 SPEED = "softground_suggested_speed"
 """Note of the speed that people would choose on this ground, over that on hard ground."""
@@ -202,11 +204,11 @@ def worst_gaps_in(notes: Mapping[str, str]) -> list[tuple[float, float, str]]:
         return []
 
 
-def _notes(carrier: str, answer: CharacterResponse) -> dict[str, str]:
+def _notes(root_control: str, character: CharacterResponse) -> dict[str, str]:
     return {
-        CARRIER: carrier,
-        WORST: json.dumps(worst_gaps([answer])),
-        SPEED: f"{suggested_speed(answer.sinkage):.3f}",
+        ROOT_CONTROL: root_control,
+        WORST: json.dumps(worst_gaps([character])),
+        SPEED: f"{suggested_speed(character.sinkage):.3f}",
     }
 
 
@@ -248,12 +250,12 @@ def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
     return (armature for armature in armatures if nla_layer.has_layer(armature))
 
 
-def gap_table(answers: Sequence[CharacterResponse]) -> dict[str, object] | None:
+def gap_table(responses: Sequence[CharacterResponse]) -> dict[str, object] | None:
     """Penetration and float of the standing soles before and after [mm], for the report; None without a response."""
-    if not answers:
+    if not responses:
         return None
     return {
-        when: {answer.motion.name: _statistics(getattr(answer, when)) for answer in answers}
+        when: {character.motion.name: _statistics(getattr(character, when)) for character in responses}
         for when in ("before", "after")
     }
 
@@ -264,7 +266,7 @@ def gaps_left(
     terrain: Terrain,
     footprints: Sequence[Footprint],
 ) -> Job[dict[str, object]]:
-    """Penetration and float of the standing soles of characters that do not answer [mm], for the report."""
+    """Penetration and float of the standing soles of characters that do not respond [mm], for the report."""
     table = {}
     for of_character, motion in zip(loads, motions, strict=True):
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
@@ -296,12 +298,14 @@ WORST_GAPS = 10
 """Frames that the report lists as the worst."""
 
 
-def worst_gaps(answers: Sequence[CharacterResponse]) -> list[dict[str, object]]:
+def worst_gaps(responses: Sequence[CharacterResponse]) -> list[dict[str, object]]:
     """The largest gaps that are left, largest first, one for each character, sole and frame."""
     gaps_left = [
-        (abs(height), answer.motion.name, answer.motion.soles[sole].sole.name, frame, height)
-        for answer in answers
-        for frame, sole, height in zip(answer.after.frames, answer.after.soles, answer.after.heights, strict=True)
+        (abs(height), character.motion.name, character.motion.soles[sole].sole.name, frame, height)
+        for character in responses
+        for frame, sole, height in zip(
+            character.after.frames, character.after.soles, character.after.heights, strict=True
+        )
     ]
     return [
         {"character": name, "contact": sole, "frame": round(float(frame), 3), "gap_mm": round(float(height) * 1e3, 3)}
@@ -309,13 +313,13 @@ def worst_gaps(answers: Sequence[CharacterResponse]) -> list[dict[str, object]]:
     ]
 
 
-def warnings(answers: Sequence[CharacterResponse]) -> list[str]:
+def warnings(responses: Sequence[CharacterResponse]) -> list[str]:
     """What the user should know about the responses."""
     return [
-        f"'{answer.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its joints in "
-        "the Character panel."
-        for answer in answers
-        if not answer.response.legs
+        f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its "
+        "joints in the Character panel."
+        for character in responses
+        if not character.response.legs
     ]
 
 

@@ -41,11 +41,11 @@ def animal(
     body = chance.uniform((0.2, -0.2, 0.6), (0.6, 0.2, 1.0), (20, 3))
     trunk = np.broadcast_to(body, (FRAMES, 20, 3)).copy()
     trunk[:, :, 0] += (0.0 if on_the_spot else 1.0) * np.arange(FRAMES)[:, None] / PERIOD * stride
-    carriers = chance.integers(0, legs, leaves)
-    points = [*np.moveaxis(feet, 1, 0), *(feet[:, leg, :4] + (0, 0, 0.001) for leg in carriers), trunk]
+    display_meshes = chance.integers(0, legs, leaves)
+    points = [*np.moveaxis(feet, 1, 0), *(feet[:, leg, :4] + (0, 0, 0.001) for leg in display_meshes), trunk]
     part = np.repeat(np.arange(len(points)), [piece.shape[1] for piece in points])
     links = np.zeros((len(points), len(points)), dtype=bool)
-    for number, leg in enumerate(carriers):
+    for number, leg in enumerate(display_meshes):
         links[legs + number, leg] = links[leg, legs + number] = True
     positions = np.concatenate(points, axis=1)
     height = float(np.median(np.ptp(positions[..., 2], axis=1)))
