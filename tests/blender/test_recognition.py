@@ -94,3 +94,11 @@ def test_what_a_hand_carries_is_no_part_of_the_body(scene):
     sword.parent, sword.parent_type, sword.parent_bone = armature, "BONE", "Slot"
     character = add_character(scene, armature)
     assert {sole.bone for sole in character.soles} == set(LEGS)
+
+
+def test_skin_that_no_bone_moves_is_no_contact(scene):
+    armature = stool()
+    box("runner", 0.1, (0, 0.2, 0.11), armature, "Pm")
+    bpy.data.objects["runner"].vertex_groups.clear()
+    character = add_character(scene, armature)
+    assert {sole.bone for sole in character.soles} == set(LEGS)

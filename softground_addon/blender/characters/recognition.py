@@ -78,18 +78,23 @@ def _contacts_of_skin(
     reading = record(scene, armature, range(first, min(last, first + MOST_FRAMES) + 1), skin.bones)
     recording = jobs.run(jobs.counted(reading, "sample", MOST_FRAMES))
     followed = followed_skin(skin, armature, recording, frame_rate_of(scene))
+    if followed is None:
+        return ()
     found = find_contacts(followed.motion)
-    return tuple(_source(number, found, followed, recording) for number in range(found.bears.shape[1]))
+    sources = (_source(number, found, followed, recording) for number in np.flatnonzero(found.bears.any(axis=0)))
+    return tuple(source for source in sources if source)
 
 
-def _source(number: int, found: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource:
-    """One contact, carried by the bone with most of the skin that bears."""
-    parts = np.flatnonzero(found.group == number)
+def _source(number: int, found: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:
+    """One contact, carried by the bone with most of the skin that bears; None where no bone carries it."""
+    parts = np.flatnonzero((found.group == number) & np.array([*map(bool, followed.bones)]))
+    if not len(parts):
+        return None
     bears = found.bears[:, number]
     height = followed.motion.positions[bears][..., 2] - found.level
     low = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=0)
     weight = np.bincount(followed.motion.part, low, len(followed.bones))
-    bones = [followed.bones[part] for part in parts if followed.bones[part]]
+    bones = [followed.bones[part] for part in parts]
     main = followed.bones[int(parts[weight[parts].argmax()])]
     return SoleSource(main, "", main, limb=_turns(recording, main, bears), parts=tuple(bones))
 

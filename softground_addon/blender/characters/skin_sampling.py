@@ -225,8 +225,10 @@ class FollowedSkin:
 
 
 @sliced
-def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float) -> Slices[FollowedSkin]:
-    """Some vertices over time, by which the contacts of a rig are found.
+def followed_skin(
+    skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float
+) -> Slices[FollowedSkin | None]:
+    """Some vertices over time, by which the contacts of a rig are found, or None where it is flat or nowhere.
 
     Parameters
     ----------
@@ -242,6 +244,8 @@ def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recordin
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
     height = skinned(skin, armature, probes, body)[..., 2]
     size = float(np.median(np.ptp(height, axis=1)))
+    if not 0 < size < np.inf:
+        return None
     above = (height - height.min(axis=1, keepdims=True)).min(axis=0)
     chosen = body[above < _NEAR * size]
     most = min(_MOST_POINTS, max(_MOST_PLACES // len(recording.frames), 1))
@@ -251,6 +255,8 @@ def followed_skin(skin: RigSkin, armature: bpy.types.Object, recording: Recordin
     used, part = np.unique(skin.part[chosen], return_inverse=True)
     yield
     places = skinned(skin, found(rig), recording, chosen)
+    if not np.isfinite(places).all():
+        return None
     yield
     motion = SkinMotion(places, part, _links(skin, found(rig))[np.ix_(used, used)], rate, size)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))

@@ -71,6 +71,8 @@ def skin_stances(
     """
     rig = name_of(armature)
     followed = yield from followed_skin.slices(skin, armature, recording, rate)
+    if followed is None:
+        return None
     yield
     armature = found(rig)
     sources = [source for source in mapping.soles if source.bone and not source.object]

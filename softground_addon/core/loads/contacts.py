@@ -315,7 +315,7 @@ def _beside(touching: Mask, others: Mask, velocity: Array, motion: CharacterMoti
     long after it has begun to rise, as its toes speed away.
     """
     unit = motion.pendulum_time / motion.time_step
-    overlap, beside, swing = (round(time * unit) for time in (SHORTEST_CONTACT, BESIDE, SWING))
+    overlap, beside, swing = (max(round(time * unit), 1) for time in (SHORTEST_CONTACT, BESIDE, SWING))
     along, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
     dated = touching.copy()
     for first, last in zip(*runs(touching), strict=True):
