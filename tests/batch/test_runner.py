@@ -36,11 +36,11 @@ WORKER = """
     say("write", 0.9)
     save = Path(options["save"])
     own = [option for option in sys.argv[2:] if not option.startswith(("--progress", "--receipt", "--parent"))]
-    with files.replacing(save) as partial:
+    with files.replacing(Path(options["receipt"])) as receipt, files.replacing(save) as partial:
         partial.write_text(f"baked {shot.name}")
         wrote = {str(save): receipts.checksum(partial)}
-        receipts.write(Path(options["receipt"]), made_by="test", options=own, read=receipts.checksums([shot]),
-                       wrote=wrote, totals={"steps": 3})
+        receipt.write_text(receipts.dump(made_by="test", options=own, read=receipts.checksums([shot]), wrote=wrote,
+                                         totals={"steps": 3}))
     print(json.dumps({"stage": "done", "overall": 1.0, "totals": {"steps": 3}}), flush=True)
     exec(os.environ.get("AFTER", ""))
 """
