@@ -77,7 +77,7 @@ def _contacts_of_skin(
     first, last = (round(frame / time_stretch_of(scene)) for frame in frames)
     reading = record(scene, armature, range(first, min(last, first + MOST_FRAMES) + 1), skin.bones)
     recording = jobs.run(jobs.counted(reading, "sample", MOST_FRAMES))
-    followed = followed_skin(skin, armature, recording, frame_rate_of(scene))
+    followed = followed_skin(skin, armature, recording, frame_rate_of(scene), linked=True)
     if followed is None:
         return ()
     found = find_contacts(followed.motion)

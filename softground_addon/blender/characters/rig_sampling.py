@@ -28,6 +28,7 @@ from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource, require_armature
 from .skin_sampling import read_skin
 from .skin_stances import LONGEST, skin_stances
+from .sole_extraction import meshes_on
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -96,9 +97,11 @@ def sample_character(
     bones = [bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)]
     bones += recorder.bones if recorder else ()
     on_bones = any(source.bone and not source.object for source in mapping.soles)
-    skin = read_skin(scene, armature) if on_bones and len(frames) <= LONGEST else None
     things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
-    rig = name_of(armature)
+    rig, skin = name_of(armature), None
+    if on_bones and len(frames) <= LONGEST and meshes_on(scene, armature):
+        skin = yield from meanwhile(0, read_skin.slices(scene, armature))
+        armature = found(rig)
     recording = yield from record(scene, armature, frames, [*bones, *(skin.bones if skin else ())], things, recorder)
     armature = found(rig)
     _check_recording(armature.name, recording)

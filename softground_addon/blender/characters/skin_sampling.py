@@ -17,7 +17,7 @@ from ...core.motion.motion import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.skin.skin_motion import SkinMotion
 from .. import mesh_arrays
-from ..settings import found, name_of
+from ..settings import ObjectName, found, name_of
 from .recording import Recording
 from .sole_extraction import meshes_on
 
@@ -25,6 +25,9 @@ Indices = NDArray[np.intp]
 
 _WELD = 1e-5
 """Vertices nearer than this over the size of the mesh are one."""
+
+_SLICE = 10_000
+"""Vertices whose weights are read in one slice."""
 
 _LEAST_WEIGHT = 1e-4
 """Weights that come to less leave a vertex where its object is, as in Blender's armature deformation."""
@@ -57,7 +60,8 @@ class RigSkin:
     hung: NDArray[np.bool_]
 
 
-def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> RigSkin | None:
+@sliced
+def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigSkin | None]:
     """The rendered meshes on an armature, or None where there is none.
 
     Raises
@@ -65,18 +69,20 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> RigSkin | N
     InputError
         If one is being edited.
     """
-    pieces = []
-    for thing in meshes_on(scene, armature):
+    pieces, rig = [], name_of(armature)
+    for name in [name_of(thing) for thing in meshes_on(scene, armature)]:
+        thing, armature = found(name), found(rig)
         if thing.mode == "EDIT":
             raise InputError(
                 f"'{thing.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first."
             )
-        mesh = thing.data
-        assert isinstance(mesh, bpy.types.Mesh), thing.name
-        if not len(mesh.polygons):
+        if not len(_mesh_of(thing).polygons):
             continue
-        hung = thing.parent == armature and thing.parent_type == "BONE"
-        pieces.append(_hung(thing, mesh, armature) if hung else _deformed(thing, mesh, armature))
+        if thing.parent == armature and thing.parent_type == "BONE":
+            pieces.append(_hung(thing, armature))
+        else:
+            pieces.append((yield from _deformed(name, rig)))
+        yield
     if not pieces:
         return None
     bones = tuple(dict.fromkeys(name for piece in pieces for name in piece.names))
@@ -109,8 +115,14 @@ class _Piece:
     hung: bool = False
 
 
-def _hung(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types.Object) -> _Piece:
-    bone = armature.data.bones[thing.parent_bone]
+def _mesh_of(thing: bpy.types.Object) -> bpy.types.Mesh:
+    mesh = thing.data
+    assert isinstance(mesh, bpy.types.Mesh), thing.name
+    return mesh
+
+
+def _hung(thing: bpy.types.Object, armature: bpy.types.Object) -> _Piece:
+    mesh, bone = _mesh_of(thing), armature.data.bones[thing.parent_bone]
     parent = np.eye(4)
     if not bone.use_relative_parent:
         parent = np.array(bone.matrix_local)
@@ -128,17 +140,18 @@ def _hung(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types.Obj
     )
 
 
-def _deformed(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types.Object) -> _Piece:
-    bones = armature.data.bones
+def _deformed(name: ObjectName, rig: ObjectName) -> Slices[_Piece]:
+    vertex, group, weight = yield from _weights(name)
+    thing, armature = found(name), found(rig)
+    mesh, bones = _mesh_of(thing), armature.data.bones
+    count = len(mesh.vertices)
     names = tuple(group.name for group in thing.vertex_groups)
-    deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])
-    entries = [(vertex.index, each.group, each.weight) for vertex in mesh.vertices for each in vertex.groups]
-    table = np.array(entries, dtype=float).reshape(-1, 3)
-    group = table[:, 1].astype(np.intp)
-    table, group = table[deforms[group]], group[deforms[group]]
-    vertex = table[:, 0].astype(np.intp)
+    if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
+        raise InputError(f"'{thing.name}' was changed while it was read: try again.")
+    deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])[group]
+    vertex, group, weight = vertex[deforms], group[deforms], weight[deforms]
     used, group = np.unique(group, return_inverse=True)
-    total = np.bincount(vertex, table[:, 2], len(mesh.vertices))
+    total = np.bincount(vertex, weight, count)
     held = total[vertex] > _LEAST_WEIGHT
     to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
     return _Piece(
@@ -147,8 +160,21 @@ def _deformed(thing: bpy.types.Object, mesh: bpy.types.Mesh, armature: bpy.types
         tuple(names[number] for number in used),
         vertex[held],
         group[held],
-        table[held, 2] / total[vertex[held]],
+        weight[held] / total[vertex[held]],
     )
+
+
+def _weights(name: ObjectName) -> Slices[tuple[Indices, Indices, Array]]:
+    """Vertex, group and weight of every weight of a mesh, which can only be read one by one."""
+    read, tables = 0, [np.empty((0, 3))]
+    while read < len(vertices := _mesh_of(found(name)).vertices):
+        some = enumerate(vertices[read : read + _SLICE], read)
+        entries = [x for index, vertex in some for each in vertex.groups for x in (index, each.group, each.weight)]
+        tables.append(np.array(entries, dtype=float).reshape(-1, 3))
+        read += _SLICE
+        yield
+    table = np.concatenate(tables)
+    return table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2]
 
 
 def _moved(transform: Array, points: NDArray[np.float32]) -> Array:
@@ -164,7 +190,10 @@ def _dominant(vertex: Indices, bone: Indices, weight: Array, count: int, none: i
     return part
 
 
-def skinned(skin: RigSkin, armature: bpy.types.Object, recording: Recording, chosen: Indices) -> NDArray[np.float32]:
+@sliced
+def skinned(
+    skin: RigSkin, armature: bpy.types.Object, recording: Recording, chosen: Indices
+) -> Slices[NDArray[np.float32]]:
     """World positions of the chosen vertices over time, (F, N, 3) [m].
 
     Parameters
@@ -178,22 +207,23 @@ def skinned(skin: RigSkin, armature: bpy.types.Object, recording: Recording, cho
     place = np.full(len(skin.vertices), -1, dtype=np.intp)
     place[chosen] = np.arange(len(chosen))
     rest = np.column_stack([skin.vertices, np.ones(len(skin.vertices))])
-    result = np.zeros((len(recording.frames), len(chosen), 3), dtype=np.float32)
+    backs = [np.linalg.inv(np.array(armature.data.bones[name].matrix_local, dtype=float)) for name in skin.bones]
+    frames = len(recording.frames)
+    result = np.zeros((frames, 3, len(chosen)), dtype=np.float32)  # one product for all frames is the fastest
     held = np.zeros(len(chosen), dtype=bool)
-    for name, (moved_by, weights) in zip(skin.bones, skin.weights, strict=True):
+    for name, back, (moved_by, weights) in zip(skin.bones, backs, skin.weights, strict=True):
         here = place[moved_by] >= 0
         if not here.any():
             continue
         vertex, weight = moved_by[here], weights[here]
-        back = np.linalg.inv(np.array(armature.data.bones[name].matrix_local, dtype=float))
-        moved = recording.bone(name) @ back
-        result[:, place[vertex]] += ((weight[:, None] * rest[vertex]) @ np.swapaxes(moved[:, :3], -1, -2)).astype(
-            np.float32
-        )
+        moved = (recording.bone(name) @ back)[:, :3].reshape(-1, 4)
+        result[..., place[vertex]] += (moved @ (weight[:, None] * rest[vertex]).T).reshape(frames, 3, -1)
         held[place[vertex]] = True
+        yield
     if not held.all():
-        result[:, ~held] = rest[chosen[~held]] @ np.swapaxes(recording.armature[:, :3], -1, -2)
-    return result
+        moved = recording.armature[:, :3].reshape(-1, 4)
+        result[..., ~held] = (moved @ rest[chosen[~held]].T).reshape(frames, 3, -1)
+    return np.swapaxes(result, 1, 2)
 
 
 _PROBES = 8
@@ -226,7 +256,7 @@ class FollowedSkin:
 
 @sliced
 def followed_skin(
-    skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float
+    skin: RigSkin, armature: bpy.types.Object, recording: Recording, rate: float, *, linked: bool = False
 ) -> Slices[FollowedSkin | None]:
     """Some vertices over time, by which the contacts of a rig are found, or None where it is flat or nowhere.
 
@@ -238,11 +268,13 @@ def followed_skin(
         Of all `skin.bones`.
     rate : float
         Samples per second [Hz].
+    linked : bool
+        Whether to tell which parts hang together.
     """
     rig = name_of(armature)
     body = np.flatnonzero(~_carried(skin, armature))
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
-    height = skinned(skin, armature, probes, body)[..., 2]
+    height = (yield from skinned.slices(skin, armature, probes, body))[..., 2]
     size = float(np.median(np.ptp(height, axis=1)))
     if not 0 < size < np.inf:
         return None
@@ -254,11 +286,12 @@ def followed_skin(
     chosen = chosen[np.argsort(skin.part[chosen], kind="stable")]
     used, part = np.unique(skin.part[chosen], return_inverse=True)
     yield
-    places = skinned(skin, found(rig), recording, chosen)
+    places = yield from skinned.slices(skin, found(rig), recording, chosen)
     if not np.isfinite(places).all():
         return None
     yield
-    motion = SkinMotion(places, part, _links(skin, found(rig))[np.ix_(used, used)], rate, size)
+    links = _links(skin, found(rig))[np.ix_(used, used)] if linked else None
+    motion = SkinMotion(places, part, links, rate, size)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
 
 

@@ -55,22 +55,21 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     groups : (P,) int array, optional
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """
-    parts = track_parts(skin)
-    yield
+    parts = yield from track_parts.slices(skin)
     drift = drift_of(parts)
-    level = level_of(parts, drift)
     yield
+    level = yield from level_of.slices(parts, drift)
     if groups is None:
-        parts = track_parts(skin, floor=level)
+        assert skin.links is not None, "without them no parts can be told to be one contact"
+        parts = yield from track_parts.slices(skin, floor=level)
         bears = bearing(parts, level, drift)
         groups = merged(parts, bears, skin.links)
         groups = _numbered(groups)
         if (groups >= 0).any():
-            groups = _without_brushes(skin, groups, level, drift)
+            groups = yield from _without_brushes(skin, groups, level, drift)
     bears = np.zeros((len(skin.positions), 0), dtype=bool)
     if (groups >= 0).any():
-        parts = track_parts(skin, groups, level)
-        yield
+        parts = yield from track_parts.slices(skin, groups, level)
         bears = bearing(parts, level, drift)
     return SkinContacts(level * skin.height, drift * skin.height, groups, bears)
 
@@ -80,9 +79,9 @@ def _numbered(groups: Indices) -> Indices:
     return np.asarray(numbers - (values[0] == -1), dtype=np.intp)
 
 
-def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Array) -> Indices:
+def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Array) -> Slices[Indices]:
     """The groups less those that only brush the ground: short, and slipping or rare, while others bear."""
-    tracks = track_parts(skin, groups, level)
+    tracks = yield from track_parts.slices(skin, groups, level)
     bears, slip = bearing(tracks, level, drift), tracks.slip(drift)
     fast, time = np.percentile(slip, 90, axis=0), bears.sum(axis=0)
     keeps = np.zeros(len(time), dtype=bool)

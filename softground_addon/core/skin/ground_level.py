@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.slices import Slices, sliced
 from .skin_motion import Array, PartTracks
 
 REACH = 0.05
@@ -24,6 +25,8 @@ STANDING_SHARE = 0.8
 """A ground that stands wins with this share of the votes of one that moves."""
 MOST_VOTES = 500
 """Moments of parts that are asked at most."""
+_SLICE = 200_000
+"""Times levels that are asked in one slice."""
 
 
 def drift_of(tracks: PartTracks) -> Array:
@@ -58,7 +61,8 @@ def _width(way: Array) -> Array:
     return np.maximum(SAME_WAY, SAME_WAY * np.linalg.norm(way, axis=-1))
 
 
-def level_of(tracks: PartTracks, drift: Array) -> float:
+@sliced
+def level_of(tracks: PartTracks, drift: Array) -> Slices[float]:
     """Height of the ground [H]: where calm skin that moves with the ground is most often."""
     lowest = tracks.lowest
     speed = max(float(np.linalg.norm(drift)), 1.0)
@@ -67,9 +71,14 @@ def level_of(tracks: PartTracks, drift: Array) -> float:
     if not weight.any():
         return float(np.percentile(lowest, 20))
     levels = np.arange(lowest.min(), (tracks.low[weight > 0]).max() + BIN, BIN)
-    near = np.clip(1.5 - np.abs(tracks.low - levels[:, None, None]) / BIN, 0.0, 1.0) * weight
-    votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > 0.3).sum(axis=2) - 1, 0, 3))
-    score = votes.sum(axis=1) - AGAINST * (lowest < levels[:, None] - BELOW).sum(axis=1)
+    score = np.empty(len(levels))
+    count = max(_SLICE // weight.size, 1)
+    for start in range(0, len(levels), count):
+        here = slice(start, start + count)
+        near = np.clip(1.5 - np.abs(tracks.low - levels[here, None, None]) / BIN, 0.0, 1.0) * weight
+        votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > 0.3).sum(axis=2) - 1, 0, 3))
+        score[here] = votes.sum(axis=1) - AGAINST * (lowest < levels[here, None] - BELOW).sum(axis=1)
+        yield
     best = levels[int(score.argmax())]
     here = weight * (np.abs(tracks.low - best) < 1.5 * BIN)
     return float((tracks.low * here).sum() / here.sum()) if here.any() else float(best)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.slices import Slices, sliced
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -26,6 +28,9 @@ BURIED = 0.015
 LOW = 0.15
 """A part lower than this above the lowest skin is low, in body heights."""
 
+_SLICE = 300_000
+"""Places that are looked at in one slice."""
+
 
 @dataclass(frozen=True)
 class SkinMotion:
@@ -38,7 +43,7 @@ class SkinMotion:
     part : (V,) int array
         Part of each point, rising; every part has one.
     links : (P, P) bool array
-        Which parts hang together: welded skin, parent and child.
+        Which parts hang together: welded skin, parent and child. Not needed where the parts of each contact are known.
     rate : float
         Samples per second [Hz].
     height : float
@@ -47,7 +52,7 @@ class SkinMotion:
 
     positions: NDArray[np.floating]
     part: Indices
-    links: Mask
+    links: Mask | None
     rate: float
     height: float
 
@@ -95,7 +100,8 @@ class PartTracks:
         )
 
 
-def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -np.inf) -> PartTracks:
+@sliced
+def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -np.inf) -> Slices[PartTracks]:
     """What the lowest patch of each part does.
 
     Parameters
@@ -109,25 +115,36 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     part = skin.part if group is None else group[skin.part]
     used = np.flatnonzero(part >= 0)
     used = used[np.argsort(part[used], kind="stable")]
-    place = np.asarray(skin.positions[:, used], dtype=float) / skin.height
     part = part[used]
     first = np.flatnonzero(np.diff(part, prepend=-1))
-    height = place[..., 2]
-    low = np.minimum.reduceat(np.where(height < floor - BURIED, np.inf, height), first, axis=1)
-    low = np.where(np.isfinite(low), low, np.maximum.reduceat(height, first, axis=1))
     number = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(part))))
-    patch = np.abs(height - low[:, number]) <= PATCH
-    size = np.add.reduceat(patch.astype(float), first, axis=1)[..., None]
-    middle = np.add.reduceat(place[..., :2] * patch[..., None], first, axis=1) / size
-    ways = np.zeros((2, *low.shape, 3))
-    rises = np.zeros_like(height)
-    if len(place) > 1:
-        steps = np.diff(place, axis=0) * skin.rate
-        both = np.concatenate([steps[:1], steps]), np.concatenate([steps, steps[-1:]])
-        rises = np.minimum(*(np.abs(step[..., 2]) for step in both))
-        for side, step in enumerate(both):
-            ways[side] = np.add.reduceat(step * patch[..., None], first, axis=1) / size
-    rise = np.minimum.reduceat(np.where(patch, rises, np.inf), first, axis=1)
+    count = len(skin.positions)
+    low, rise = np.empty((2, count, len(first)))
+    middle, ways = np.empty((count, len(first), 2)), np.empty((2, count, len(first), 3))
+    frames = max(_SLICE // max(len(used), 1), 1)
+    for start in range(0, count, frames):
+        here = slice(start, start + frames)
+        height = skin.positions[here, used, 2].astype(float) / skin.height
+        lowest = np.minimum.reduceat(np.where(height < floor - BURIED, np.inf, height), first, axis=1)
+        lowest = np.where(np.isfinite(lowest), lowest, np.maximum.reduceat(height, first, axis=1))
+        frame, point = np.nonzero(~(np.abs(height - lowest[:, number]) > PATCH))
+        patch = np.flatnonzero(np.diff(frame * len(first) + number[point], prepend=-1))
+        size = np.diff(np.append(patch, len(frame)))[:, None]
+        frame, point = frame + start, used[point]
+        before, place, after = (
+            skin.positions[np.clip(frame + step, 0, count - 1), point].astype(float) / skin.height
+            for step in (-1, 0, 1)
+        )
+        low[here] = lowest
+        middle[here] = (np.add.reduceat(place[:, :2], patch) / size).reshape(*lowest.shape, 2)
+        # The first sample has no step before it and the last none after it: each has its one step on both sides.
+        before, after = (place - before) * skin.rate, (after - place) * skin.rate
+        steps = np.where((frame > 0)[:, None], before, after), np.where((frame < count - 1)[:, None], after, before)
+        for side, step in enumerate(steps):
+            ways[side, here] = (np.add.reduceat(step, patch) / size).reshape(*lowest.shape, 3)
+        rises = np.minimum(*(np.abs(step[:, 2]) for step in steps))
+        rise[here] = np.minimum.reduceat(rises, patch).reshape(lowest.shape)
+        yield
     near = low < low.min() + LOW
     speed = np.linalg.norm(ways, axis=-1).min(axis=0)
     calm = max(CALM_SPEED, CALM_SHARE * float(np.percentile(speed[near], 95)))
