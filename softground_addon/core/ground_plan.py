@@ -150,7 +150,7 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
         _terrain(height, slope),
         np.concatenate(footfalls),
         raster,
-        tuple(advice(name, steps, "the created ground") for name, steps in missed if steps),
+        tuple(advice(name, steps, "the created ground").text for name, steps in missed if steps),
     )
 
 

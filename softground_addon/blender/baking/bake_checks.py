@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import BakeError, InputError
+from ...core.findings import Finding
 from ...core.ground.material import GroundMaterial
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
@@ -109,22 +110,30 @@ def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_si
     return False
 
 
-def coverage_warnings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[str]:
+def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float) -> list[Finding]:
     """What the user should know about prints that leave the fine part of a ground."""
     if not (cover.is_fine_somewhere and cover.is_coarse(cell_size)):
         return []
     if detail == "NEVER":
         return [
-            f"Prints lie where ground '{ground.name}' is too coarse to show them: set Detail to Automatic in the "
-            "Ground panel, or create the ground anew."
+            Finding(
+                "coarse_ground",
+                "warning",
+                f"Prints lie where ground '{ground.name}' is too coarse to show them",
+                "set Detail to Automatic in the Ground panel, or create the ground anew.",
+            )
         ]
     return [
-        f"Prints lie where ground '{ground.name}' is coarse: a finer copy, '{ground.name} Trail', takes them. To have "
-        f"them on '{ground.name}' itself, clear the bake and create the ground anew."
+        Finding(
+            "finer_copy",
+            "note",
+            f"Prints lie where ground '{ground.name}' is coarse: a finer copy, '{ground.name} Trail', takes them.",
+            f"To have them on '{ground.name}' itself, clear the bake and create the ground anew.",
+        )
     ]
 
 
-def copy_warnings(ground: bpy.types.Object) -> list[str]:
+def copy_findings(ground: bpy.types.Object) -> list[Finding]:
     """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
     # Nodes may scatter things for renders only, and those stay.
     hidden = (one for one in ground.modifiers if one.show_render and not one.show_viewport)
@@ -132,8 +141,12 @@ def copy_warnings(ground: bpy.types.Object) -> list[str]:
     if not names:
         return []
     return [
-        f"The finer copy of ground '{ground.name}' lacks what only renders show of {' and '.join(names)}: show it in "
-        "the viewport too (the modifier's screen icon), and bake again."
+        Finding(
+            "render_modifiers",
+            "warning",
+            f"The finer copy of ground '{ground.name}' lacks what only renders show of {' and '.join(names)}",
+            "show it in the viewport too (the modifier's screen icon), and bake again.",
+        )
     ]
 
 

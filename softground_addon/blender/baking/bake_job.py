@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.files import report
+from ...core.findings import Finding
 from ...core.ground_plan import GroundPlan
 from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
@@ -27,18 +28,19 @@ from ...core.meshing.region import Region
 from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
+from ...core.self_check import self_check
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import settings
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.materials import drafted
-from ..ground.modified_prints import are_undone, undone_warning
+from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 from ..response import response_job
 from . import bake_report
-from .bake_checks import check_volumes, copy_warnings, coverage, coverage_warnings, shortest_sole, wants_detail
+from .bake_checks import check_volumes, copy_findings, coverage, coverage_findings, shortest_sole, wants_detail
 from .publish import at_the_end, publish, sign
 
 Array = NDArray[np.float64]
@@ -81,7 +83,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     """
     wanted = wanted or settings_of(scene)
     started = time.perf_counter()
-    moving = bake_report.ground_warnings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
+    moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
     movers = staleness.of_movers(scene, wanted)
     surface = shot.surface
@@ -101,8 +103,9 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
     ground_name = wanted.ground.name if wanted.ground else "the ground"
-    warnings = [*bake_report.warnings(footprints, loads, wanted.cell_size_m, ground_name), *moving]
-    gap_warnings = response_job.warnings(responses)
+    checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
+    findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving]
+    of_responses = response_job.findings(responses)
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -122,7 +125,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash}
         written = yield from _write(scene, wanted, shot, footprints, about, sole_length)
-        warnings += written.warnings
+        findings += written.findings
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()
@@ -135,7 +138,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=written.error if written else None,
-        warnings=[*warnings, *gap_warnings],
+        findings=[*findings, *of_responses],
     )
     if written:
         stamped = wanted.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
@@ -152,7 +155,7 @@ class _Written:
     ground: bpy.types.Object
     display_mesh: bpy.types.Object
     error: float
-    warnings: list[str]
+    findings: list[Finding]
 
 
 def _write(
@@ -186,19 +189,19 @@ def _write(
         yield Progress("write", 0.1)
         trail = pressed.trail(trail_detail.FLOOR)
         del pressed
-        warnings: list[str] = []
+        findings: list[Finding] = []
         if shot.surface is None:
             assert shot.plan is not None
             place = yield from _created(drafts, scene, wanted, shot.plan, trail)
             about["inputs"]["ground"] = place.display_mesh.name
         else:
-            place, warnings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
+            place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
         publishing = publish(left, place, wanted)
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
     ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
-    return _Written(ground, published.display_mesh, published.error, warnings)
+    return _Written(ground, published.display_mesh, published.error, findings)
 
 
 def _created(
@@ -223,8 +226,8 @@ def _given(
     surface: ground_mesh.GroundSurface,
     trail: Trail,
     sole_length: float,
-) -> Job[tuple[baked_ground.Place, list[str]]]:
-    """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; warnings."""
+) -> Job[tuple[baked_ground.Place, list[Finding]]]:
+    """The user's ground, or a draft of it that is fine along the trail, as the place for a bake; what it lacks."""
     assert wanted.ground is not None
     name, vertices = wanted.ground, surface.vertices
     detail, cell_size, unit_scale = wanted.detail, wanted.cell_size_m, wanted.unit_scale_m
@@ -233,11 +236,11 @@ def _given(
     )
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
-    warnings = coverage_warnings(ground, cover, detail, cell_size)
+    findings = coverage_findings(ground, cover, detail, cell_size)
     if not wants_detail(ground, cover, detail, cell_size, sole_length):
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
-            return baked_ground.on_itself(ground, index, vertices), warnings
-        warnings = [*warnings, undone_warning(ground)]
+            return baked_ground.on_itself(ground, index, vertices), findings
+        findings = [*findings, undone_prints(ground)]
     coarse = trail_detail.surface_of(ground, unit_scale)
     refinement = yield from meanwhile(
         Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), cell_size)
@@ -250,7 +253,7 @@ def _given(
         Progress("write", 0.4), ground_mesh.pressed_vertices.slices(vertices, trail, shot.terrain)
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
-    return baked_ground.on_detail(ground, draft, index, vertices), [*warnings, *copy_warnings(ground)]
+    return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]
 
 
 def _press(

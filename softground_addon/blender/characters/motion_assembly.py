@@ -122,6 +122,7 @@ def assemble_motion(
         gravity=gravity,
         four_legged=rest.is_four_legged(mapping),
         ground_level=stances.level if stances else None,
+        skin=stances.skin if stances else None,
     )
 
 

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.motion.motion import LowSkin
 from ...core.numerics.slices import Slices
 from ...core.skin.contacts import find_contacts
 from ..settings import found, name_of
@@ -41,12 +42,15 @@ class SkinStances:
         The sample at which most of a foot's underside is on the ground.
     meshes : mapping of str to FootMesh
         The foot's skin as it is then.
+    skin : LowSkin
+        Where all of it is lowest.
     """
 
     level: float
     bears: Mapping[str, NDArray[np.bool_]]
     standing: Mapping[str, int]
     meshes: Mapping[str, FootMesh]
+    skin: LowSkin
 
 
 def skin_stances(
@@ -103,7 +107,10 @@ def skin_stances(
         mesh = _mesh(skin, armature, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
         if mesh is not None:
             meshes[source.name] = mesh
-    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes)
+    height, tracks = followed.motion.height, contacts.tracks
+    lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
+    skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height)
+    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, skin_there)
 
 
 def _bones_of(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
+from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.ground.terrain import MeshTerrain
 from .. import mesh_arrays
@@ -77,15 +78,20 @@ def are_undone(
     return True
 
 
-def undone_warning(ground: bpy.types.Object) -> str:
+def undone_prints(ground: bpy.types.Object) -> Finding:
     """What to tell the user of such a ground."""
     if barrier := playback.barrier_on(ground):
-        return (
+        return Finding(
+            "blocking_modifier",
+            "note",
             f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: a copy without it, "
-            f"'{ground.name} Trail', takes the prints. To have them on '{ground.name}' itself, clear the bake and "
-            "apply it."
+            f"'{ground.name} Trail', takes the prints.",
+            f"To have them on '{ground.name}' itself, clear the bake and apply it.",
         )
-    return (
+    return Finding(
+        "undoing_modifiers",
+        "note",
         f"The modifiers of ground '{ground.name}' undo prints on it: a copy without them, '{ground.name} Trail', takes "
-        f"the prints. To have them on '{ground.name}' itself, clear the bake and apply the modifiers."
+        "the prints.",
+        f"To have them on '{ground.name}' itself, clear the bake and apply the modifiers.",
     )

@@ -115,7 +115,10 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
     painted = painted_ground.names_of(ground, wanted.painted)
     surface = ground_mesh.undisturbed_surface(ground, wanted.unit_scale_m, painted)
     yield Progress("sample", 1.0)
-    work = ground_mesh.terrain_of.slices(surface, np.stack([lower, upper]))
+    # What rests without a sole is seen on the ground too.
+    skins = [motion.skin.position[..., :2].reshape(-1, 2) for motion in motions if motion.skin is not None]
+    places = np.concatenate([[lower, upper], *skins])
+    work = ground_mesh.terrain_of.slices(surface, np.stack([places.min(axis=0), places.max(axis=0)]))
     terrain = yield from meanwhile(Progress("sample", 1.0), work)
     return Shot(tuple(motions), lower, upper, None, surface, terrain, rigs)
 

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
@@ -313,11 +314,15 @@ def worst_gaps(responses: Sequence[CharacterResponse]) -> list[dict[str, object]
     ]
 
 
-def warnings(responses: Sequence[CharacterResponse]) -> list[str]:
+def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
     """What the user should know about the responses."""
     return [
-        f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds. Complete its "
-        "joints in the Character panel."
+        Finding(
+            "no_legs",
+            "warning",
+            f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
+            "Complete its joints in the Character panel.",
+        )
         for character in responses
         if not character.response.legs
     ]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
 from ..record.edits import step_id
 from ..record.footprints import Footprint
@@ -25,7 +26,7 @@ def build(
     offsets_mm: Mapping[str, Mapping[str, float]],
     timings: Mapping[str, float],
     playback_error_m: float | None = None,
-    warnings: Sequence[str] = (),
+    findings: Sequence[Finding] = (),
     forces: Mapping[str, object] | None = None,
     gaps_mm: Mapping[str, object] | None = None,
     worst_gaps: Sequence[Mapping[str, object]] = (),
@@ -47,8 +48,8 @@ def build(
         Seconds by stage, and frames per second.
     playback_error_m : float, optional
         Largest error of the played heights against the record's [m].
-    warnings : sequence of str
-        What the user should know.
+    findings : sequence of Finding
+        What is wrong, and what to do.
     forces : mapping, optional
         Force per frame and sole [N], on request.
     gaps_mm : mapping, optional
@@ -88,7 +89,8 @@ def build(
         },
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
         "timings": dict(timings),
-        "warnings": list(warnings),
+        "self_check": [finding.as_dict() for finding in worst_first(findings)],
+        "warnings": [finding.text for finding in worst_first(findings)],
     }
     if playback_error_m is not None:
         report["playback_error_mm"] = playback_error_m * 1e3

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..findings import Finding
 from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
@@ -80,7 +81,7 @@ def _rests(sole: SoleMotion, motion: CharacterMotion) -> Mask:
     return np.asarray(speed < REST_SPEED * motion.froude_speed)
 
 
-def advice(name: str, missed: Sequence[MissedStep], ground: str) -> str:
+def advice(name: str, missed: Sequence[MissedStep], ground: str) -> Finding:
     """What to tell the user of a character's missed steps: how many, from when on, and what to do."""
     many = len(missed) > 1
     count, meet, leave = (f"{len(missed)} steps", "meet", "leave") if many else ("1 step", "meets", "leaves")
@@ -88,7 +89,10 @@ def advice(name: str, missed: Sequence[MissedStep], ground: str) -> str:
     heights = [step.clearance for step in missed if np.isfinite(step.clearance)]
     where = [f"{beyond} beyond its edge or on its walls"] if beyond else []
     where += [f"{len(heights)} up to {max(heights) * 100:.0f} cm above it"] if heights else []
-    return (
+    return Finding(
+        "missed_steps",
+        "warning",
         f"{count} of '{name}' {meet} no ground on {ground} and {leave} no print, from frame {missed[0].frame:.0f} on "
-        f"({', '.join(where)}): extend or move the ground, or choose a mesh of the stairs or hill under the feet."
+        f"({', '.join(where)})",
+        "extend or move the ground, or choose a mesh of the stairs or hill under the feet.",
     )

@@ -167,6 +167,31 @@ class SoleMotion:
 
 
 @dataclass(frozen=True)
+class LowSkin:
+    """The lowest skin of each part of a body over time.
+
+    Attributes
+    ----------
+    frames : (F,) float array
+        Scene frames.
+    position : (F, P, 3) float array
+        Middle of the lowest patch of each part, at the height of its lowest point [m].
+    rise : (F, P) float array
+        Speed at which it rises or falls [m/s].
+    calm : float
+        Slower than this it may rest: the faster the body, the faster [m/s].
+    height : float
+        Of the body [m].
+    """
+
+    frames: Array
+    position: Array
+    rise: Array
+    calm: float
+    height: float
+
+
+@dataclass(frozen=True)
 class CharacterMotion:
     """Everything the core knows about one character.
 
@@ -194,6 +219,8 @@ class CharacterMotion:
         An animal on four legs: its mass is distributed otherwise than a man's.
     ground_level : float or None
         Height at which its skin rests on level ground [m], where that was seen.
+    skin : LowSkin or None
+        Where its skin is lowest, at the frames that were read.
     """
 
     name: str
@@ -207,6 +234,7 @@ class CharacterMotion:
     centre: Array | None = None
     four_legged: bool = False
     ground_level: float | None = None
+    skin: LowSkin | None = None
 
     @property
     def times(self) -> Array:

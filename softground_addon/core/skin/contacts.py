@@ -11,7 +11,7 @@ from ..numerics.slices import Slices, sliced
 from .bearing import bearing
 from .ground_level import drift_of, level_of
 from .merging import merged
-from .skin_motion import Array, Indices, Mask, SkinMotion, track_parts
+from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
 
 SHORT = 0.25
 """A contact that never lasts longer may be a brush [s]."""
@@ -37,12 +37,15 @@ class SkinContacts:
         Contact that each part belongs to, -1 for none.
     bears : (F, C) bool array
         When each contact bears.
+    tracks : PartTracks
+        Where each part is lowest.
     """
 
     level: float
     drift: Array
     group: Indices
     bears: Mask
+    tracks: PartTracks
 
 
 @sliced
@@ -55,7 +58,7 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     groups : (P,) int array, optional
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """
-    parts = yield from track_parts.slices(skin)
+    parts = tracks = yield from track_parts.slices(skin)
     drift = drift_of(parts)
     yield
     level = yield from level_of.slices(parts, drift)
@@ -71,7 +74,7 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     if (groups >= 0).any():
         parts = yield from track_parts.slices(skin, groups, level)
         bears = bearing(parts, level, drift)
-    return SkinContacts(level * skin.height, drift * skin.height, groups, bears)
+    return SkinContacts(level * skin.height, drift * skin.height, groups, bears, tracks)
 
 
 def _numbered(groups: Indices) -> Indices:

@@ -66,10 +66,10 @@ def test_jumps_and_raised_feet_are_no_steps():
 
 def test_the_advice_names_how_many_since_when_and_what_to_do():
     missed = found(walked(), Slope(edge=3.0))
-    text = advice("Walker", missed, "'Field'")
+    text = advice("Walker", missed, "'Field'").text
     assert f"{len(missed)} steps of 'Walker'" in text
     assert "'Field'" in text
     assert f"from frame {missed[0].frame:.0f}" in text
     assert "extend or move the ground" in text
     once = "1 step of 'Walker' meets no ground on 'Field' and leaves no print"
-    assert advice("Walker", missed[:1], "'Field'").startswith(once)
+    assert advice("Walker", missed[:1], "'Field'").text.startswith(once)

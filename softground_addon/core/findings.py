@@ -1,0 +1,53 @@
+"""What a bake finds wrong with itself or with what it was given, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning", "note"]
+"""Prints are wrong; prints may be wrong; prints are right, and something else is worth knowing. Worst first."""
+
+_ORDER: tuple[Severity, ...] = ("error", "warning", "note")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One of them.
+
+    Attributes
+    ----------
+    code : str
+        For scripts; docs/troubleshooting.md lists them.
+    severity : 'error', 'warning' or 'note'
+    message : str
+        What is wrong.
+    remedy : str
+        What to do.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    remedy: str
+
+    @property
+    def text(self) -> str:
+        """Both, for people.
+
+        Examples
+        --------
+        >>> Finding("code", "note", "It is small", "make it larger.").text
+        'It is small: make it larger.'
+        """
+        return f"{self.message}{' ' if self.message.endswith('.') else ': '}{self.remedy}"
+
+    def as_dict(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+
+def worst_first(findings: Iterable[Finding]) -> list[Finding]:
+    """The worst first, those that are as bad in the order given."""
+    return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))

@@ -1,0 +1,352 @@
+"""A bake judged by what it was made from: the skin, the ground, the body's size and pace."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .findings import Finding
+from .ground.heightfield import Terrain
+from .loads.estimate import CharacterLoads
+from .loads.missed_steps import advice, missed_steps
+from .loads.sliding import treadmill_speed
+from .motion.motion import CharacterMotion, LowSkin
+from .numerics.slices import Slices, sliced
+from .pressing.sole_points import places, sole_points
+from .record.footprints import Footprint
+from .skin.skin_motion import CALM_SPEED
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+OFF_SKIN = 0.012
+"""The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
+NEAR = 0.015
+"""Calm skin this near to where it rests touches, in body heights (`skin.bearing.TOUCH`)."""
+BESIDE = 0.15
+"""A step within this of touching skin is that skin's, in body heights: a foot's length."""
+DISAGREE = 0.2
+"""Share of steps, and of moments of rest, that may go without the other: brushes, and the ends of contacts."""
+LEAST_REST = 3
+"""Frames of rest without a step that may be the rounding of a contact's ends."""
+BIN = 0.004
+"""Step of the levels that are tried, in body heights (`skin.ground_level.BIN`)."""
+STANDING_PERCENTILE = 20.0
+"""Percentile of the lowest skin that is on the ground: a walker has a foot there nearly always."""
+SOME_FRAMES = 200
+"""Frames whose skin is looked up on the ground in one go."""
+
+PERSON_MASS, PERSON_LEG = 77.5, 0.87
+"""A person of 1.78 m [kg], hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
+LEG_OF_STATURE = 0.491
+MASS_RANGE = 4.0
+"""Ratio of mass to that of a person of the same leg length beyond which it is asked about."""
+TALLEST, SMALLEST = 20.0, 0.05
+"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
+APART = 0.02
+"""Difference of the offsets of one character's feet that is no error of a pose, up to an adult's size [m]; of a larger
+one, it grows with the legs."""
+FEW_CELLS, ENOUGH_CELLS = 8, 27
+"""Cells along a sole below which its outline is lost, and those that an adult's has at the default cell size."""
+ON_GROUND = 0.9
+"""A sole with less of it over the ground stands on the edge: beyond, it digs more than a tenth deeper."""
+WALK_RATIO = 0.384 / (PERSON_LEG * np.sqrt(PERSON_LEG / 9.81))
+"""Step length over step frequency, in leg·sqrt(leg/gravity): 0.0064 m/(steps/min) at any free speed (Sekiya et al.
+1997, doi:10.2519/jospt.1997.26.5.266). Played k times slower, it is k times as large."""
+SLOW_MOTION = 3.0
+"""That factor from which a motion is in slow motion; a creeping walk comes to 2."""
+LEAST_STRIDE = 0.8
+"""Shorter strides are shuffles, which have no pace, in leg lengths."""
+
+
+@sliced
+def self_check(
+    loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], terrain: Terrain, cell_size: float, ground: str
+) -> Slices[list[Finding]]:
+    """What is wrong with a bake, or may be.
+
+    Parameters
+    ----------
+    loads : sequence of CharacterLoads
+    footprints : sequence of Footprint
+        All that they left.
+    terrain : Terrain
+        The undisturbed ground.
+    cell_size : float
+        [m]
+    ground : str
+        Its name.
+    """
+    found: list[Finding] = []
+    for character in loads:
+        yield
+        motion = character.motion
+        steps = [footprint for footprint in footprints if footprint.character == motion.name]
+        found += _prints(character, steps, ground)
+        found += _size(motion, cell_size)
+        found += _feet_apart(character)
+        found += _pace(character, steps)
+        found += yield from _edge(motion, steps, terrain, ground)
+        if motion.skin is not None:
+            found += yield from _skin(motion, motion.skin, steps, terrain, ground)
+    unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
+    if unplaced > 0:
+        message = f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground"
+        found.append(Finding("rim_off_ground", "note", message, "make it larger."))
+    return found
+
+
+def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) -> Iterator[Finding]:
+    """Whether it moves, prints and gets along."""
+    motion = character.motion
+    if motion.centre is None and motion.stands_still:
+        yield Finding(
+            "no_motion",
+            "warning",
+            f"'{motion.name}' does not move in these frames",
+            "look whether its action has keys in them, is assigned with its slot, and is not muted.",
+        )
+    elif not steps:
+        yield Finding(
+            "no_print",
+            "error",
+            f"'{motion.name}' leaves no print in these frames",
+            "look in the Character panel whether its soles are what touches the ground, and in the viewport whether "
+            "they face down.",
+        )
+    missed = missed_steps(motion, character.contacts)
+    if missed:
+        yield advice(motion.name, missed, f"'{ground}'")
+    belt = treadmill_speed(motion, character.contacts)
+    if belt > 0:
+        yield Finding(
+            "walks_in_place",
+            "warning",
+            f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while they stand, and print over "
+            "each other.",
+            "Let the armature move ahead by as much, or use the animation with its root motion.",
+        )
+
+
+def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
+    """Whether the body, its mass and the cells suit each other."""
+    length = min(sole.sole.length for sole in motion.soles)
+    if length < FEW_CELLS * cell_size:
+        yield Finding(
+            "few_cells",
+            "warning",
+            f"The soles of '{motion.name}' are only {length / cell_size:.0f} cells long",
+            f"set the cell size to {length / ENOUGH_CELLS * 100:.2g} cm to see their shape.",
+        )
+    if motion.centre is not None:
+        return  # a thing has no legs to go by
+    height = motion.skin.height if motion.skin else motion.leg_length / LEG_OF_STATURE
+    if not SMALLEST < height < TALLEST:
+        tall = f"{height:.0f} m" if height > 1 else f"{height * 100:.2g} cm"
+        units, scale = ("centimetres", "0.01") if height > 1 else ("metres, and was read as centimetres", "100")
+        yield Finding(
+            "unit_scale",
+            "error",
+            f"'{motion.name}' is {tall} tall: its file is in {units}.",
+            f"Scale it by {scale}, its meshes with it, or leave it if it is meant so.",
+        )
+        return  # with its size, the mass that suits it changes
+    likely = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3
+    if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
+        yield Finding(
+            "mass_of_size",
+            "warning",
+            f"'{motion.name}' weighs {motion.mass:g} kg on legs of {motion.leg_length:.2g} m: a person of that "
+            f"size weighs about {float(f'{likely:.2g}'):g} kg.",
+            "Set Mass in the Character panel.",
+        )
+
+
+def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
+    """Whether some feet float higher than others."""
+    motion, contacts = character.motion, character.contacts
+    feet = [number for number, sole in enumerate(motion.soles) if sole.sole.prop is None]
+    offset = {motion.soles[n].sole.name: float(contacts.offset[n]) for n in feet if contacts.touching[:, n].any()}
+    if motion.centre is not None or len(offset) < 2:
+        return
+    high, low = max(offset, key=offset.__getitem__), min(offset, key=offset.__getitem__)
+    apart = offset[high] - offset[low]
+    if apart > APART * max(motion.leg_length / PERSON_LEG, 1.0):
+        yield Finding(
+            "feet_apart",
+            "warning",
+            f"'{high}' of '{motion.name}' is {apart * 100:.1f} cm higher over the ground than '{low}' where it stands",
+            "look whether both soles are the right bones, and the ground level under them.",
+        )
+
+
+def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Finding]:
+    """Whether it walks as fast as legs of its length swing."""
+    motion = character.motion
+    if motion.centre is not None or motion.four_legged:
+        return
+    belt = treadmill_speed(motion, character.contacts)
+    slower = []
+    for sole in motion.soles:
+        of_sole = [step for step in steps if step.sole == sole.sole.name]
+        for step, after in itertools.pairwise(of_sole):
+            seconds = (after.start_frame - step.start_frame) / motion.frame_rate
+            stride = float(np.linalg.norm((after.position - step.position)[:2])) + belt * seconds
+            if stride > LEAST_STRIDE * motion.leg_length:
+                slower.append(stride * seconds / (4 * motion.leg_length * motion.pendulum_time) / WALK_RATIO)
+    if slower and (factor := float(np.median(slower))) > SLOW_MOTION:
+        yield Finding(
+            "slow_motion",
+            "note",
+            f"'{motion.name}' walks about {factor:.1f} times slower than legs of its length do",
+            "set the frame rate of the scene to that of the animation, or leave it if slow motion is meant.",
+        )
+
+
+def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, ground: str) -> Slices[list[Finding]]:
+    """Steps with a part of the sole beyond the edge of the ground: what is over it bears all of the load."""
+    first, least, count = 0.0, 1.0, 0
+    soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
+    angle = np.arange(16) / 16 * 2 * np.pi
+    ring = np.stack([np.cos(angle), np.sin(angle)])
+    for step in steps:
+        yield
+        sole = soles.get(step.sole)
+        if sole is None:
+            continue
+        around = step.position[:2, None] + ring * sole.sole.length
+        if np.isfinite(terrain.heights(*around)).all():
+            continue
+        now = int(np.abs(motion.frames - (step.start_frame + step.end_frame) / 2).argmin())
+        pose = sole.transforms[now : now + 1]
+        points = sole_points(sole.sole, pose)
+        area = np.concatenate([patch.area for patch in points.patches])
+        share = float(area[np.isfinite(terrain.heights(*(at[0] for at in places(points, pose))))].sum() / area.sum())
+        if share < ON_GROUND:
+            first, least, count = first if count else step.start_frame, min(least, share), count + 1
+    if not count:
+        return []
+    many = f"{count} steps of '{motion.name}' stand" if count > 1 else f"1 step of '{motion.name}' stands"
+    return [
+        Finding(
+            "edge_of_ground",
+            "error",
+            f"{many} on the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
+            "the sole, which digs in the deeper",
+            "extend the ground beyond the steps.",
+        )
+    ]
+
+
+@dataclass(frozen=True)
+class _Touching:
+    """Where skin rests on the ground."""
+
+    skin: LowSkin
+    on: Mask
+    """Which parts are where they rest, (F, P)."""
+
+    def near(self, step: Footprint, frames: slice, reach: float) -> Mask:
+        """At which of some frames skin touches within reach of a step."""
+        apart = np.linalg.norm(self.skin.position[frames, :, :2] - step.position[:2], axis=-1)
+        calm = self.skin.rise[frames] < self.skin.calm
+        return np.asarray((self.on[frames] & calm & (apart < reach)).any(axis=1))
+
+    @property
+    def rests(self) -> Mask:
+        """When some skin touches and is calm however fast the body is, (F,)."""
+        return np.asarray((self.on & (self.skin.rise < CALM_SPEED * self.skin.height)).any(axis=1))
+
+
+def _skin(
+    motion: CharacterMotion, skin: LowSkin, steps: Sequence[Footprint], terrain: Terrain, ground: str
+) -> Slices[list[Finding]]:
+    """Whether ground, steps and resting skin agree."""
+    height = np.empty(skin.rise.shape)
+    for start in range(0, len(height), SOME_FRAMES):
+        x, y, z = np.moveaxis(skin.position[start : start + SOME_FRAMES], -1, 0)
+        height[start : start + SOME_FRAMES] = z - terrain.heights(x, y)
+        yield
+    height[~np.isfinite(height)] = np.inf
+    over = _resting(height, skin)
+    if over is None:
+        return []
+    found = []
+    if abs(over) > OFF_SKIN * skin.height:
+        side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
+        found.append(
+            Finding(
+                "ground_off_skin",
+                "error",
+                f"The skin of '{motion.name}' rests {abs(over) * 100:.1f} cm {side} '{ground}'",
+                f"move the ground {ground_way} by as much, or the character {body_way}.",
+            )
+        )
+    touching = _Touching(skin, np.abs(height - over) < NEAR * skin.height)
+    if steps:
+        found += yield from _skin_and_steps(motion, touching, steps)
+    return found
+
+
+def _resting(height: Array, skin: LowSkin) -> float | None:
+    """How far over the ground the skin rests [m], by the low envelope or where calm skin is lowest most often."""
+    lowest = height.min(axis=1)
+    lowest = lowest[np.isfinite(lowest)]
+    if not len(lowest):
+        return None
+    levels = [float(np.percentile(lowest, STANDING_PERCENTILE))]
+    calm = np.where(skin.rise < CALM_SPEED * skin.height, height, np.inf).min(axis=1)
+    calm = calm[np.isfinite(calm)]
+    if len(calm):
+        number = np.round(calm / (BIN * skin.height)).astype(np.int64)
+        values, counts = np.unique(number, return_counts=True)
+        votes = [counts[np.abs(values - value) <= 1].sum() for value in values]
+        levels.append(float(calm[np.abs(number - values[int(np.argmax(votes))]) <= 1].mean()))
+    return min(levels, key=abs)
+
+
+def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequence[Footprint]) -> Slices[list[Finding]]:
+    """Steps without skin, and skin that rests without a step."""
+    frames, height = touching.skin.frames, touching.skin.height
+    soles = {sole.sole.name: sole for sole in motion.soles}
+    covered = np.zeros(len(frames), dtype=bool)
+    seen, alone = 0, []
+    for step in steps:
+        yield
+        sole = soles[step.sole]
+        reach = max(BESIDE * height, sole.sole.length)
+        first, last = np.searchsorted(frames, [step.start_frame - 1, step.end_frame + 1 + 1e-6])
+        covered[first:last] |= touching.near(step, slice(first, last), reach)
+        if sole.bears is not None:
+            middle = int(np.abs(frames - (step.start_frame + step.end_frame) / 2).argmin())
+            seen += 1
+            if not touching.near(step, slice(middle, middle + 1), reach).any():
+                alone.append(step.start_frame)
+    found = []
+    if len(alone) > DISAGREE * seen:
+        found.append(
+            Finding(
+                "step_without_skin",
+                "error",
+                f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
+                "on",
+                "look in the Character panel whether its contacts are the parts that touch the ground.",
+            )
+        )
+    rests = touching.rests
+    missed = np.flatnonzero(rests & ~covered)
+    if len(missed) > max(DISAGREE * rests.sum(), LEAST_REST):
+        found.append(
+            Finding(
+                "skin_without_step",
+                "error",
+                f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
+                f"{frames[missed[0]]:.0f} on",
+                "add what rests there with Add Contact in the Character panel.",
+            )
+        )
+    return found

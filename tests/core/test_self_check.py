@@ -1,0 +1,135 @@
+"""What a bake says of itself, on cases that are right or wrong by construction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softground_addon.core.findings import Finding, worst_first
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.motion.motion import LowSkin
+from softground_addon.core.self_check import WALK_RATIO, self_check
+from tests.core.character import Slope
+from tests.core.walkers import GRAVITY, MASS, box_sole, pressed, standing, walk
+
+SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
+STATURE = 1.78
+PLACES = np.array([[0.0, 0.2, 0.0], [0.0, -0.2, 0.0]])
+
+
+def skin_at(frames, places):
+    """Calm skin at places (P, 3) that do not move."""
+    position = np.broadcast_to(np.asarray(places, dtype=float), (len(frames), len(places), 3)).copy()
+    return LowSkin(frames, position, np.zeros(position.shape[:2]), 0.3, STATURE)
+
+
+def stands(skin=PLACES, soles=PLACES):
+    """A body on feet at some places, its skin calm at others."""
+    loads = standing(box_sole(0.27, 0.1), soles, MASS * GRAVITY / len(soles))
+    frames = loads.motion.frames[loads.motion.on_frames]
+    motion = loads.motion
+    seen = tuple(replace(sole, bears=np.ones(len(motion.frames), dtype=bool)) for sole in motion.soles)
+    seen = tuple(
+        replace(sole, sole=replace(sole.sole, name=name)) for sole, name in zip(seen, ("left", "right"), strict=False)
+    )
+    moves = {"hips": np.linspace((0, 0, 0.9), (0, 0, 0.92), len(motion.frames))}
+    return replace(loads, motion=replace(motion, skin=skin_at(frames, skin), soles=seen, joints=moves))
+
+
+def found(loads, terrain=None, cell_size=0.01):
+    """Findings by their codes."""
+    terrain = terrain or FlatTerrain()
+    _, footprints = pressed(loads, SNOW, cell_size, terrain)
+    findings = self_check([loads], footprints, terrain, cell_size, "Field")
+    assert len({finding.code for finding in findings}) == len(findings)
+    return {finding.code: finding for finding in findings}
+
+
+def test_a_sound_bake_has_nothing_to_say():
+    assert not found(stands())
+
+
+@pytest.mark.parametrize("over", [0.06, -0.06, 0.015])
+def test_a_ground_off_the_resting_skin_is_told_by_how_much(over):
+    findings = found(stands(skin=np.add(PLACES, (0, 0, over))))
+    if abs(over) < 0.012 * STATURE:
+        assert not findings
+        return
+    assert findings.keys() == {"ground_off_skin"}  # the steps are where the skin is
+    side, way = ("above", "up") if over > 0 else ("below", "down")
+    assert f"6.0 cm {side} 'Field'" in findings["ground_off_skin"].message
+    assert f"ground {way}" in findings["ground_off_skin"].remedy
+
+
+def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_apart():
+    away = np.add(PLACES, (1.0, 0, 0))
+    assert found(stands(skin=np.concatenate([PLACES[:1], away]))).keys() == {"step_without_skin"}
+    assert found(stands(skin=away)).keys() == {"step_without_skin", "skin_without_step"}
+    loads = stands()
+    frames = loads.motion.skin.frames
+    alone = skin_at(frames, np.concatenate([PLACES, away[:1]]))
+    alone.rise[len(frames) // 2 :, :2] = 1.0  # from there on it stands on the other, which does not print
+    other = replace(loads, motion=replace(loads.motion, skin=alone))
+    assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
+
+
+def test_skin_off_the_ground_and_bodies_without_skin_say_nothing():
+    loads = stands()
+    assert not found(replace(loads, motion=replace(loads.motion, skin=None)))
+    skin = loads.motion.skin
+    beside = LowSkin(skin.frames, np.add(skin.position, (9.0, 0, 0)), skin.rise, skin.calm, skin.height)
+    codes = found(replace(loads, motion=replace(loads.motion, skin=beside)), Slope(edge=5.0)).keys()
+    assert "ground_off_skin" not in codes
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.015, False), (0.03, True)])
+def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, told):
+    loads = stands()
+    loads = replace(loads, contacts=replace(loads.contacts, offset=np.array([0.0, apart])))
+    findings = found(loads)
+    assert ("feet_apart" in findings) == told
+    if told:
+        assert f"'right' of 'walker' is {apart * 100:.1f} cm higher" in findings["feet_apart"].message
+
+
+@pytest.mark.parametrize(("height", "remedy"), [(178.0, "by 0.01"), (0.0178, "by 100"), (3.0, ""), (0.1, "")])
+def test_a_body_of_another_unit_is_told_its_scale(height, remedy):
+    loads = stands()
+    skin = replace(loads.motion.skin, height=height)
+    findings = found(replace(loads, motion=replace(loads.motion, skin=skin)))
+    assert ("unit_scale" in findings) == bool(remedy)
+    if remedy:
+        assert remedy in findings["unit_scale"].remedy
+
+
+@pytest.mark.parametrize("share", [1.0, 0.95, 0.5, 0.1])
+def test_a_sole_on_the_edge_of_the_ground_presses_what_bears_and_says_so(share):
+    length = 0.27
+    edge = Slope(edge=(share - 0.5) * length)
+    loads = stands(skin=np.subtract(PLACES, (0.05, 0, 0)))
+    findings = found(loads, edge)
+    assert ("edge_of_ground" in findings) == (share < 0.9)
+    if share < 0.9:
+        told = float(findings["edge_of_ground"].message.split("as little as ")[1].split(" %")[0])
+        assert told / 100 == pytest.approx(share, abs=0.03)
+        assert "2 steps of 'walker'" in findings["edge_of_ground"].message
+
+
+@pytest.mark.parametrize(("slower", "told"), [(1.0, False), (2.0, False), (4.8, True)])
+def test_data_of_120_frames_a_second_in_a_scene_of_25_is_slow_motion(slower, told):
+    loads = walk(speed=1.3, period=1.1)
+    slow = replace(loads, motion=replace(loads.motion, frame_rate=loads.motion.frame_rate / slower))
+    _, footprints = pressed(loads, SNOW, 0.02)
+    codes = {finding.code for finding in self_check([slow], footprints, FlatTerrain(), 0.02, "Field")}
+    assert ("slow_motion" in codes) == told
+
+
+def test_the_walk_ratio_is_that_of_an_adult():
+    # Steps of 0.70 m at 110 a minute.
+    assert 0.70 / (110 / 60) / (0.87 * np.sqrt(0.87 / 9.81)) == pytest.approx(WALK_RATIO, rel=0.01)
+
+
+def test_the_worst_is_said_first_and_equals_keep_their_order():
+    findings = [Finding(code, severity, "", "") for code, severity in (("a", "note"), ("b", "error"), ("c", "note"))]
+    assert [finding.code for finding in worst_first(findings)] == ["b", "a", "c"]
