@@ -62,7 +62,8 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
     lasting = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(bears[:, part]), strict=True):
-            lasting[first:last, part] = last - first > longest
+            may_go_on = first == 0 or last == len(bears)  # beyond the shot
+            lasting[first:last, part] = may_go_on or last - first > longest
     return lasting
 
 

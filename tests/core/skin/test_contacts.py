@@ -103,6 +103,16 @@ def test_the_gait_of_an_animal_is_found_in_its_skin(
     assert np.linalg.norm(found.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
 
 
+@pytest.mark.parametrize("on_the_spot", [False, True])
+def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) -> None:
+    skin, _ = animal(2, duty=0.6, stride=0.6, on_the_spot=on_the_spot)
+    whole = find_contacts(skin)
+    for end in range(45, FRAMES):
+        found = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
+        # The speed of the last frame is known from one side alone.
+        assert (found.bears == whole.bears[:end])[:-1].all(), end
+
+
 def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
     skin, stands = animal(2, duty=0.6, stride=0.6)
     positions = skin.positions.copy()
