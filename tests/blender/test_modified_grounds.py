@@ -52,8 +52,9 @@ def test_a_ground_that_anything_shapes_over_time_is_told_of_and_up_to_date_at_ev
     change(ground, short_walk)
     bpy.context.view_layer.update()
     assert bpy.ops.softground.bake() == {"FINISHED"}
-    (warning,) = ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
-    assert "'Field' changes its shape over time by its modifier 'Theirs'" in warning
+    # Where the ground is lifted, the skin's distance from it is said too.
+    changes = "'Field' changes its shape over time by its modifier 'Theirs'"
+    (_,) = (one for one in ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if changes in one)
     for frame in (1, 20):
         short_walk.frame_set(frame)
         assert bake_report.stale_reasons(short_walk) == ()
