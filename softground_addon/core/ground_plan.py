@@ -199,14 +199,15 @@ def _slope(motions: Sequence[CharacterMotion]) -> Array:
 
 
 def _footholds(motion: CharacterMotion) -> Array:
-    """Lowest point of each foot whenever it rests, (N, 3) [m]; none of limbs, which may rest on nothing."""
+    """Lowest point of each foot whenever it is seen to bear or rests, (N, 3) [m]; none of limbs, which may rest on
+    nothing."""
     limit = REST_SPEED * motion.froude_speed
     found = [np.zeros((0, 3))]
     for sole in (sole for sole in motion.soles if sole.sole.prop is None):
         points = sole.landmark_positions()
         lowest = points[np.arange(len(points)), points[..., 2].argmin(axis=1)]
         speed = np.linalg.norm(np.gradient(lowest, motion.time_step, axis=0), axis=-1) if len(lowest) > 1 else 0.0
-        found.append(lowest[speed < limit])
+        found.append(lowest[speed < limit if sole.bears is None else sole.bears])
     return np.concatenate(found)
 
 

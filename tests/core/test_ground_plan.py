@@ -7,9 +7,10 @@ import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.ground_plan import plan_ground
+from softground_addon.core.ground_plan import _slope, plan_ground
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.estimate import estimate_loads
+from tests.core.character import character, flat_sole
 from tests.core.walkers import pressed, through_scene_frames, walk
 
 
@@ -73,6 +74,21 @@ def test_feet_that_float_unevenly_do_not_tilt_the_ground():
         motion, soles=tuple(replace(sole, transforms=poses) for sole, poses in zip(motion.soles, raised, strict=True))
     )
     assert isinstance(plan_ground([motion]).terrain, FlatTerrain)
+
+
+def test_a_run_on_the_spot_whose_feet_pause_in_the_air_gets_level_ground():
+    """Each foot is slowest where it turns, far in front and less high behind."""
+    turn = 3.0 * np.arange(120) / 30.0
+    soles = []
+    for side in (1, -1):
+        phase = (turn + np.pi / 2 * (1 - side)) % (2 * np.pi)
+        ahead, wave = np.cos(phase), np.sin(phase)
+        height = 0.1125 + 0.075 * ahead - 0.05 * wave + 0.0625 * np.cos(2 * phase)
+        sole = flat_sole(np.stack([0.5 * ahead, 0 * turn + 0.1 * side, height], axis=1))
+        soles.append(replace(sole, bears=wave > 0.9))
+    motion = character(soles, hips=(0.0, 0.0, 0.9), rate=30.0)
+    assert not _slope([motion]).any()
+    assert _slope([replace(motion, soles=tuple(replace(sole, bears=None) for sole in soles))]).any()  # as they rest
 
 
 @pytest.mark.parametrize(("cell_size", "rate"), [(0.005, 24.0), (0.01, 30.0), (0.03, 60.0)])

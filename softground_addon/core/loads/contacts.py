@@ -119,8 +119,9 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     tracks = [_track(sole, motion, terrain) for sole in motion.soles]
     feet = [track for track, sole in zip(tracks, motion.soles, strict=True) if sole.sole.prop is None]
     drift = _ground_drift(feet or tracks, motion)
+    seen = _seen_on_skin(motion, terrain, tracks)
     # Where a whole body travels, its speed tells more finely than its skin when a foot that swings has left.
-    if (drift.any() or not motion.joints) and (seen := _seen_on_skin(motion, terrain, tracks)) is not None:
+    if seen is not None and (drift.any() or not motion.joints):
         return seen
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
     found = [
@@ -128,6 +129,8 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
         for track, sole in zip(tracks, motion.soles, strict=True)
     ]
     sharp, offset = (np.array(values) for values in zip(*found, strict=True))
+    if seen is not None and np.ptp(offset) > LEAVE_HEIGHT * motion.leg_length:
+        return seen  # the feet of one body stand on one ground: these heights are those of feet that swing
     touching = [
         _beside(sharp[index], np.delete(sharp, index, axis=0), track.velocity - drift, motion)
         for index, track in enumerate(tracks)

@@ -1,5 +1,7 @@
 """When soles touch: scale-free, with hysteresis, whatever the float, on any terrain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -107,6 +109,20 @@ def test_a_slow_walk_has_swings():
 def test_a_millimetre_of_jitter_is_no_step(seed):
     path = 0.001 * np.random.default_rng(seed).normal(size=(600, 3))
     assert detect_contacts(character([flat_sole(path)], rate=60.0), Slope()).touching.all()
+
+
+def test_feet_whose_heights_disagree_about_their_ground_touch_when_their_skin_does():
+    """One foot hops; the other one's toes stay down while its bones sink through the ground and rise again."""
+    hopping = hop().soles[0]
+    time = np.arange(len(hopping.transforms)) / RATE
+    flies = hopping.transforms[:, 0, 2, 3] > 0
+    dip = -0.06 * (1 + np.cos(2 * np.pi * (time - 0.7) / 1.4))
+    toes = flat_sole(np.stack([0 * time, 0 * time + 0.2, dip], axis=1))
+    soles = [replace(hopping, bears=~flies), replace(toes, bears=np.ones(len(time), dtype=bool))]
+    motion = replace(character(soles, hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0)
+    contacts = detect_contacts(motion, Slope())
+    assert np.array_equal(contacts.touching, np.stack([~flies, np.ones_like(flies)], axis=1))
+    assert contacts.offset.tolist() == [0.0, 0.0]
 
 
 def step_beside():
