@@ -20,6 +20,7 @@ from .body_dynamics import FREE_FALL, BodyDynamics, flights
 from .centre_of_pressure import extents, lowest_points
 from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts
 from .load_sharing import whole_body_shares
+from .sliding import treadmill_velocity
 
 Array = NDArray[np.float64]
 
@@ -144,7 +145,7 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     ]
     if not unsupported:
         return touching
-    speed = _sole_speeds(motion)
+    speed = _sole_speeds(motion, treadmill_velocity(motion, contacts))
     about_as_low = clearance < clearance.min(axis=1, keepdims=True) + same_height
     slowest = np.where(about_as_low, speed, np.inf).min(axis=1, keepdims=True)
     about_as_slow = speed < slowest + TOUCH_SPEED * motion.froude_speed
@@ -159,15 +160,15 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     return touching
 
 
-def _sole_speeds(motion: CharacterMotion) -> Array:
-    """Horizontal speed of each sole's slowest landmark, (N, S) [m/s]."""
+def _sole_speeds(motion: CharacterMotion, belt: Array) -> Array:
+    """Horizontal speed of each sole's slowest landmark on a belt of a velocity (2,), (N, S) [m/s]."""
     cutoff = EDGE_CUTOFF / (2 * np.pi * motion.pendulum_time)
     frames = motion.at_frames()
     points = [sole.landmark_positions()[..., :2] for sole in frames.soles]
     path = np.concatenate(points, axis=1)
     _, velocity, _ = smooth_path(path.reshape(len(path), -1), frames.time_step, cutoff)
     first = np.cumsum([0, *(place.shape[1] for place in points)])[:-1]
-    slowest = np.minimum.reduceat(np.linalg.norm(velocity.reshape(path.shape), axis=-1), first, axis=1)
+    slowest = np.minimum.reduceat(np.linalg.norm(velocity.reshape(path.shape) - belt, axis=-1), first, axis=1)
     return np.stack([np.interp(motion.frames, frames.frames, speed) for speed in slowest.T], axis=1)
 
 
