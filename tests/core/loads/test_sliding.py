@@ -48,6 +48,15 @@ def test_a_walk_on_the_spot_has_the_speed_of_the_walk():
     assert speed_of(on_the_spot(motion)) == pytest.approx(np.mean(soles) / motion.times[-1], rel=0.15)
 
 
+def test_feet_that_slide_forward_under_a_body_that_runs_ahead_are_on_no_belt():
+    motion = walk(steps=1).motion
+    soles = tuple(replace(s, transforms=np.repeat(s.transforms[:1], len(motion.frames), axis=0)) for s in motion.soles)
+    still = replace(motion, soles=soles, joints={"hips": np.tile((0.0, 0.0, 0.9), (len(motion.frames), 1))})
+    slide = np.array([1.2, 0.0, 0.0])
+    assert speed_of(carried(still, slide, hips=3.0 * slide)) == 0.0
+    assert speed_of(carried(still, slide, hips=0.0 * slide)) == pytest.approx(1.2, rel=1e-6)
+
+
 def test_skates_that_take_the_body_along_are_no_belt():
     motion = walk(steps=1).motion
     still = replace(
