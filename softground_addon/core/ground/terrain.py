@@ -95,8 +95,9 @@ class MeshTerrain:
         """
         if bounds is not None and len(triangles):
             place = vertices[:, :2]
-            beyond = np.stack([place < bounds[0], place > bounds[1]], axis=-1)
-            triangles = triangles[~beyond[triangles].all(axis=1).any(axis=(1, 2))]
+            sides = (place < bounds[0]) @ (1, 2) + (place > bounds[1]) @ (4, 8)  # one bit for each that it is beyond
+            a, b, c = sides[triangles].T
+            triangles = triangles[a & b & c == 0]
             yield
         corners = vertices[triangles].astype(np.float64)
         yield
