@@ -81,7 +81,7 @@ class Walker:
     with_things : sequence of bpy.types.Object
         Further mesh objects that are one thing with the first, such as the other wheel.
     more : sequence of str
-        Bones that print beside the feet, such as hands and forepaws.
+        Bones that print beside the feet, such as hands and forepaws; those that Add Character finds need no naming.
     held : sequence of bpy.types.Object
         Mesh objects that print beside the feet, such as a cane.
     """
@@ -167,8 +167,9 @@ def bake(
         for sole in shot.characters[-1].soles:
             if shoe := walker.shoes.get(sole.side[:1]):
                 sole.object = shoe
-        if walker.more:
-            character_setup.add_bone_contacts(shot.characters[-1], walker.more)
+        found = {sole.bone for sole in shot.characters[-1].soles}
+        if more := [bone for bone in walker.more if bone not in found]:
+            character_setup.add_bone_contacts(shot.characters[-1], more)
         if walker.held:
             character_setup.add_object_contacts(scene, shot.characters[-1], walker.held)
     bpy.ops.softground.load_preset(name=preset)

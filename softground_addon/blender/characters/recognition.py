@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +58,7 @@ def recognise(scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[
 def _joined(
     armature: bpy.types.Object, named: tuple[SoleSource, ...], seen: tuple[SoleSource, ...]
 ) -> tuple[SoleSource, ...]:
-    """What the names say with the skin's parts, and what only the skin shows."""
+    """What the names say with the skin's parts, and what only the skin shows: beside feet, hands and other limbs."""
     soles, left = [], list(seen)
     for source in named:
         family, _ = bone_families(armature, source)
@@ -64,7 +66,7 @@ def _joined(
         left = [contact for contact in left if contact not in same]
         parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
         soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))
-    return (*soles, *left)
+    return (*soles, *(replace(contact, limb=contact.limb or bool(soles)) for contact in left))
 
 
 def _contacts_of_skin(
