@@ -26,7 +26,7 @@ Indices = NDArray[np.intp]
 _WELD = 1e-5
 """Vertices nearer than this over the size of the mesh are one."""
 
-_SLICE = 10_000
+_SLICE = 2_000
 """Vertices whose weights are read in one slice."""
 
 _LEAST_WEIGHT = 1e-4
