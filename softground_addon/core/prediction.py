@@ -24,9 +24,9 @@ from .numerics.intervals import runs
 from .pressing.contact_layout import landing_drop
 from .pressing.deformation import compress, compression_rate, target_compression, touching_fraction
 from .pressing.ground_cells import UndisturbedCells
-from .pressing.indentation import Springs, stress
+from .pressing.indentation import stress
 from .pressing.pressure import pressure_field
-from .pressing.prop_imprint import ground_under
+from .pressing.prop_imprint import GroundUnder, ground_under
 from .pressing.sole_points import (
     FINEST_DETAIL,
     PatchPoints,
@@ -351,12 +351,12 @@ class ContactLoads:
     ----------
     soles : tuple of SoleContact
         Those of the most steps first.
-    poses : tuple of (Springs, float)
+    poses : tuple of (GroundUnder, float)
         The ground under bodies at some steps, and the normal force at those [N]; the hardest first.
     """
 
     soles: tuple[SoleContact, ...]
-    poses: tuple[tuple[Springs, float], ...]
+    poses: tuple[tuple[GroundUnder, float], ...]
 
     @cached_property
     def _table(self) -> _Table:
@@ -374,7 +374,7 @@ class ContactLoads:
             Look at so many contacts only, where the ground gives way the furthest, with as many that they lie on; and
             at so many poses of bodies, which press the hardest.
         """
-        depth = max((_depth_under(springs, force, material) for springs, force in self.poses[:most]), default=0.0)
+        depth = max((_depth_under(under, force, material) for under, force in self.poses[:most]), default=0.0)
         if not self.soles:
             return depth
         sinking = self._table.sink(material)
@@ -385,9 +385,10 @@ class ContactLoads:
         return max(depth, self._table.depth(furthest, sinking, material, pressure))
 
 
-def _depth_under(springs: Springs, force: float, material: GroundMaterial) -> float:
+def _depth_under(under: GroundUnder, force: float, material: GroundMaterial) -> float:
     """Largest compression under a lasting force, where the crust gives way to it [m]."""
-    compression = springs.compression(springs.sinkage(force, material), material)
+    springs = under.springs
+    compression = springs.compression(springs.sinkage(force, material), material) * under.bears
     loaded = stress(compression, material, stiffness=springs.stiffness, depth=springs.depth)
     return float(compression.max(initial=0.0, where=loaded >= material.crust_stress))
 
@@ -409,7 +410,7 @@ def contact_loads(
     """
     cells = UndisturbedCells(terrain, variation, cell_size)
     soles: list[SoleContact] = []
-    poses: list[tuple[Springs, float]] = []
+    poses: list[tuple[GroundUnder, float]] = []
     for number, character in enumerate(loads):
         for index, sole in enumerate(character.motion.soles):
             if sole.sole.prop:
@@ -449,11 +450,11 @@ def _sole_contacts(
         ground = cells.surface(window, divisions)
         contact = point_contact(points, poses, ground)
         clearance = contact.clearance / points.tolerance
-        area = contact.area / normals[:, 2:]
+        printing, area = contact.area / normals[:, 2:], (contact.area + contact.beyond) / normals[:, 2:]
         x, y = places(points, poses)
         factors = cells.factors(window)
         softness = factors.softness[window.cells_under(x, y, cells.cell_size)] if factors else None
-        squares, centres, over = _over_squares(x, y, clearance, area, size)
+        squares, centres, over = _over_squares(x, y, clearance, printing, size)
         under = window.cells_under(centres[:, 0], centres[:, 1], cells.cell_size)
         landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
         drop = landing_drop(sole.sole, landing, character.contacts.normal[steps.start, index])
@@ -494,7 +495,7 @@ def _parts(coarse: SolePoints, poses: Array, ground: Surface, lowest: Array, tol
     """See `SoleContact.parts`."""
     contact = point_contact(coarse, poses, ground)
     clearance = (contact.clearance + (contact.lowest - lowest)[:, None]) / tolerance
-    return np.stack([*places(coarse, poses), clearance, contact.area])
+    return np.stack([*places(coarse, poses), clearance, contact.area + contact.beyond])
 
 
 def _area_by_sinkage(clearance: Array, area: Array) -> Single:
@@ -546,7 +547,7 @@ def _over_squares(
     return squares, centres, mean.reshape(len(x), count).astype(np.float32)
 
 
-def _prop_poses(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[tuple[Springs, float]]:
+def _prop_poses(character: CharacterLoads, index: int, cells: UndisturbedCells) -> Iterator[tuple[GroundUnder, float]]:
     """The ground under a body at some steps of each contact, and the force on it.
 
     Each is taken as if it rested there: too large for one that rolls on before the ground gives way.
@@ -565,7 +566,7 @@ def _prop_poses(character: CharacterLoads, index: int, cells: UndisturbedCells) 
             window = Window.around(across.min(axis=0), across.max(axis=0), cells.cell_size)
             under = ground_under(prop, pose, cells.surface(window), np.inf, cells.factors(window))
             if under is not None:
-                yield under.springs, float(normal_force[step])
+                yield under, float(normal_force[step])
 
 
 def matching_modulus(

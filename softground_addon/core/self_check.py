@@ -53,7 +53,7 @@ one, it grows with the legs."""
 FEW_CELLS, ENOUGH_CELLS = 8, 27
 """Cells along a sole below which its outline is lost, and those that an adult's has at the default cell size."""
 ON_GROUND = 0.9
-"""A sole with less of it over the ground stands on the edge: beyond, it digs more than a tenth deeper."""
+"""A sole with less of it over the ground stands on the edge: its print is cut off there."""
 WALK_RATIO = 0.384 / (PERSON_LEG * np.sqrt(PERSON_LEG / 9.81))
 """Step length over step frequency, in leg·sqrt(leg/gravity): 0.0064 m/(steps/min) at any free speed (Sekiya et al.
 1997, doi:10.2519/jospt.1997.26.5.266). Played k times slower, it is k times as large."""
@@ -208,7 +208,7 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
 
 
 def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, ground: str) -> Slices[list[Finding]]:
-    """Steps with a part of the sole beyond the edge of the ground: what is over it bears all of the load."""
+    """Steps with a part of the sole beyond the edge of the ground, whose prints end there."""
     first, least, count = 0.0, 1.0, 0
     soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
     angle = np.arange(16) / 16 * 2 * np.pi
@@ -234,9 +234,9 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
     return [
         Finding(
             "edge_of_ground",
-            "error",
+            "warning",
             f"{many} on the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
-            "the sole, which digs in the deeper",
+            "the sole, and the print ends there",
             "extend the ground beyond the steps.",
         )
     ]

@@ -10,6 +10,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.prediction import FEW, contact_loads
 from softground_addon.core.simulation import simulate
+from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
 from tests.core.prop_bodies import prop_sole, sphere
 from tests.core.walkers import walk
@@ -99,3 +100,16 @@ def test_feet_that_come_down_on_their_own_prints_add_as_much_as_is_predicted(har
     expected = pressed([loads], material, "UNIFORM")
     assert contact_loads([loads], FlatTerrain(), CELL).deepest(material, most=most) == pytest.approx(expected, rel=0.03)
     assert expected < 1.2 * first
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+def test_steps_on_the_edge_of_the_ground_are_predicted_like_those_beside_it(pressure):
+    loads = walk()
+    whole = contact_loads([loads], FlatTerrain(), CELL).deepest(SNOW, pressure)
+    edge = float(loads.motion.soles[0].transforms[-1, 0, 0, 3]) / 2
+    terrain = Slope(edge=edge)
+    results = simulate([loads], SoftGround(terrain, SNOW, pressure), CELL)
+    baked = max(footprint.max_depth_m for result in results for footprint in result.footprints)
+    predicted = contact_loads([loads], terrain, CELL).deepest(SNOW, pressure)
+    assert predicted == pytest.approx(baked, rel=0.03)
+    assert predicted <= whole * 1.001

@@ -104,7 +104,7 @@ def test_a_body_of_another_unit_is_told_its_scale(height, remedy):
 
 
 @pytest.mark.parametrize("share", [1.0, 0.95, 0.5, 0.1])
-def test_a_sole_on_the_edge_of_the_ground_presses_what_bears_and_says_so(share):
+def test_a_sole_on_the_edge_of_the_ground_says_how_much_of_it_prints(share):
     length = 0.27
     edge = Slope(edge=(share - 0.5) * length)
     loads = stands(skin=np.subtract(PLACES, (0.05, 0, 0)))

@@ -14,6 +14,7 @@ from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.simulation import Simulation, simulate
+from tests.core.character import Slope
 from tests.core.walkers import (
     GRAVITY,
     MASS,
@@ -262,13 +263,42 @@ class HalfPlane:
         return np.where(x < 0, 0.0, self.beyond * (1 + 0 * x)) + 0 * y
 
 
-def test_a_sole_over_the_edge_of_the_ground_presses_what_is_there_with_all_its_load():
-    loads = standing(box_sole(0.24, 0.08), [[0, 0, 0]], 400.0)
-    ground, (footprint,) = pressed(loads, MUD, 0.01, HalfPlane(np.nan))
-    beyond = Window(0, -30, 60, 60)
-    assert not ground.read(beyond).any()
-    assert footprint.max_depth_m == pytest.approx(equilibrium_depth(400.0, 0.12 * 0.08, MUD), rel=0.05)
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.9])
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_the_load_that_falls_beyond_the_edge_of_the_ground_leaves_with_it(share, slope):
+    angle, length = np.arctan(slope), 0.24
+    loads = standing(box_sole(length, 0.08), [[0, 0, 0]], 400.0, normal=(-np.sin(angle), 0.0, np.cos(angle)))
+    loads.motion.soles[0].transforms[:] = pose((0, 0, 0), 0.0, angle)
+    _, (whole,) = pressed(loads, MUD, 0.005, Slope(slope=slope))
+    end = (share - 0.5) * length * np.cos(angle)
+    ground, (footprint,) = pressed(loads, MUD, 0.005, Slope(slope=slope, edge=end))
+    assert not ground.read(Window(int(end // 0.005) + 1, -60, 120, 120)).any()
+    assert footprint.max_depth_m == pytest.approx(whole.max_depth_m, rel=0.01)
+    assert footprint.max_depth_m == pytest.approx(
+        equilibrium_depth(400.0 * np.cos(angle), length * 0.08, MUD), rel=0.02
+    )
+    assert footprint.area_m2 == pytest.approx(share * whole.area_m2, abs=1.1 * 0.005 * 0.08)
+    assert footprint.compressed_m3 == pytest.approx(share * whole.compressed_m3, abs=0.01 * whole.compressed_m3 + 3e-6)
     assert footprint.rim_m3 == pytest.approx(2 * 0.35 * footprint.compressed_m3, rel=1e-9)
+    assert footprint.peak_force_n == whole.peak_force_n
+
+
+def test_a_rolling_pressure_at_the_edge_of_the_ground_is_that_of_the_whole_sole():
+    loads = standing(box_sole(0.24, 0.08), [[0, 0, 0]], 400.0)
+    loads.forces.centre_of_pressure[..., 0] = -0.02
+    read = []
+    for edge in (np.inf, 0.0):
+        results = list(simulate([loads], SoftGround(Slope(edge=edge), MUD, "CENTRE_OF_PRESSURE", None), 0.01))
+        read.append(results[-1].ground.read(Window(-11, -3, 10, 6))[0])
+    assert np.ptp(read[0]) > 0.1 * read[0].max()
+    assert read[1] == pytest.approx(read[0], rel=0.02)
+
+
+def test_toes_that_stand_beyond_the_edge_lift_the_heel_off_the_ground():
+    loads = standing(box_sole(0.24, 0.08), [[0, 0, 0]], 400.0)
+    loads.motion.soles[0].transforms[:] = pose((0, 0, 0.06), 0.0, -0.5)
+    _, footprints = pressed(loads, MUD, 0.01, Slope(edge=0.0))
+    assert not footprints
 
 
 def test_a_rim_that_finds_no_ground_to_rise_on_is_reported_instead_of_lost():

@@ -286,6 +286,24 @@ class Surface:
         rise += self.slope_y[cell] * (y / self.cell_size - self.window.row - row - 0.5)
         return level, level + rise * self.cell_size
 
+    def beyond(self, x: Array, y: Array) -> Mask:
+        """Which world positions [m] lie beyond the edge of the ground."""
+        off: Mask = np.isnan(self.heights[self.window.cells_under(x, y, self.cell_size)])
+        return off
+
+    def mean_plane(self, x: Array, y: Array, weight: Array) -> Array:
+        """Mean plane (3, ..., 1) under world positions (..., Q): height at the origin [m], and slopes along x and y.
+
+        `weight` (..., Q) says how much each counts, 0 where the cell does not bear; no number where none counts.
+        """
+        cell = self.window.cells_under(x, y, self.cell_size)
+        total = weight.sum(axis=-1, keepdims=True)
+        share = np.divide(weight, total, out=np.full(weight.shape, np.nan), where=total > 0)
+        height = np.where(weight > 0, self.planes_at(x, y)[1], 0.0)
+        values = (x, y, height, self.slope_x[cell], self.slope_y[cell])
+        mean_x, mean_y, level, rise_x, rise_y = ((share * value).sum(axis=-1, keepdims=True) for value in values)
+        return np.stack([level - rise_x * mean_x - rise_y * mean_y, rise_x, rise_y])
+
 
 class SampledGrid(SparseGrid):
     """A function of place at cell centres, looked up once per tile.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any
 
@@ -34,7 +34,9 @@ class GroundUnder:
     divisions : int
         Samples along each side of a cell.
     over : (rows·divisions, columns·divisions) bool array
-        Samples where the body is over ground.
+        Samples where the body is over ground, or beyond its edge, where what lies there bears its part of the load.
+    bears : (number of those,) bool array
+        Which of them are over ground.
     springs : Springs
         Of those samples.
     """
@@ -43,6 +45,7 @@ class GroundUnder:
     columns: slice
     divisions: int
     over: NDArray[np.bool_]
+    bears: NDArray[np.bool_]
     springs: Springs
 
     def by_cell(self, samples: NDArray[Any]) -> Array:
@@ -69,7 +72,8 @@ def ground_under(
     """
     window, size = cells.window, cells.cell_size
     vertices, (a, b, c) = posed(prop.vertices, pose), prop.triangles.T
-    _, ground = cells.planes_at(vertices[:, 0], vertices[:, 1])
+    whole = _continued(cells, vertices)
+    _, ground = whole.planes_at(vertices[:, 0], vertices[:, 1])
     height = np.where(np.isnan(ground), np.inf, vertices[:, 2] - ground)
     above = np.minimum(np.minimum(height[a], height[b]), height[c])
     if not np.isfinite(above.min()):
@@ -88,17 +92,35 @@ def ground_under(
     spacing = size / divisions
     shape = ((rows.stop - rows.start) * divisions, (columns.stop - columns.start) * divisions)
     lower = lowest_surface(vertices, triangles, (first + corner) * size + spacing / 2, shape, spacing)
-    clearance = lower - _finer(cells, rows, columns, divisions)
+    clearance = lower - _finer(whole, rows, columns, divisions)
     over = np.isfinite(clearance)
-    if not over.any():
+    bears = _repeated(cells.bears[rows, columns], divisions)[over]
+    if not bears.any():
         return None
     clearance = np.maximum(clearance[over] - clearance[over].min() - prop.give, 0.0)
     area = np.full(len(clearance), spacing**2)
     if factors is None:
-        return GroundUnder(rows, columns, divisions, over, Springs(clearance, area))
+        return GroundUnder(rows, columns, divisions, over, bears, Springs(clearance, area))
     varying = (field[rows, columns] for field in (factors.stiffness, factors.depth))
     stiffness, depth = (_repeated(field, divisions)[over] for field in varying)
-    return GroundUnder(rows, columns, divisions, over, Springs(clearance, area, stiffness, depth))
+    return GroundUnder(rows, columns, divisions, over, bears, Springs(clearance, area, stiffness, depth))
+
+
+def _continued(cells: Surface, vertices: Array) -> Surface:
+    """The ground with what lies beyond its edge, taken to go on as it is under the rest of a body."""
+    off = np.isnan(cells.heights)
+    x, y = vertices[:, 0], vertices[:, 1]
+    on = ~np.isnan(cells.planes_at(x, y)[1])
+    if not (off.any() and on.any()):
+        return cells
+    level, rise_x, rise_y = cells.mean_plane(x, y, on.astype(float))
+    x, y = np.meshgrid(*cells.window.centres(cells.cell_size))
+    return replace(
+        cells,
+        heights=np.where(off, level + rise_x * x + rise_y * y, cells.heights),
+        slope_x=np.where(off, rise_x, cells.slope_x),
+        slope_y=np.where(off, rise_y, cells.slope_y),
+    )
 
 
 def _finer(cells: Surface, rows: slice, columns: slice, divisions: int) -> Array:
@@ -110,5 +132,5 @@ def _finer(cells: Surface, rows: slice, columns: slice, divisions: int) -> Array
     return np.asarray(heights.reshape(heights.shape[0] * divisions, -1))
 
 
-def _repeated(values: Array, divisions: int) -> Array:
+def _repeated(values: NDArray[Any], divisions: int) -> NDArray[Any]:
     return values.repeat(divisions, axis=0).repeat(divisions, axis=1)

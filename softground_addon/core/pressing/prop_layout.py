@@ -163,7 +163,7 @@ class PropLayout(ContactLayout):
                 break
             extent = min(2 * sinkage, deepest)
         compression = np.zeros(under.over.shape)
-        compression[under.over] = under.springs.compression(sinkage, material)
+        compression[under.over] = under.springs.compression(sinkage, material) * under.bears
         covered, mean = under.by_cell(compression > 0), under.by_cell(compression)
         indentation.coverage[under.rows, under.columns] = covered
         indentation.compression[under.rows, under.columns] = np.divide(

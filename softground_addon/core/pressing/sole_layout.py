@@ -49,7 +49,8 @@ class SoleLayout(ContactLayout):
         surface = cells.surface(window)
         ground = cells.surface(window, divisions) if divisions > 1 else surface
         over_ground = point_contact(points, poses, ground)
-        area = over_ground.area / self.steps.normals[steps, 2, None]
+        upright = self.steps.normals[steps, 2, None]
+        area = (over_ground.area + over_ground.beyond) / upright
         factors = cells.factors(window)
         landing_speed = self._landing_drop / step
         sinking = sink(
@@ -63,7 +64,9 @@ class SoleLayout(ContactLayout):
             landing_speed=landing_speed,
             softness=factors.softness[window.cells_under(*places(points, poses), cells.cell_size)] if factors else None,
         )
-        touching = area * touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
+        fraction = touching_fraction(over_ground.clearance, sinking.sinkage[:, None], points.tolerance)
+        printing = over_ground.area / upright * fraction
+        pressing = (sinking.target > 0) & printing.any(axis=1)
         coverage = cell_coverage(
             self.sole,
             poses,
@@ -77,7 +80,7 @@ class SoleLayout(ContactLayout):
         toward = material.rim_bias * self.lean[steps] if material.rim_bias else None
         rim = rim_weights(coverage, contact, cells.rim_reach, surface.bears, toward)
         rate = compression_rate(step, material, sinking.target, landing_speed)
-        stress = self._stress(steps, window, cells, sinking, touching)
+        stress = self._stress(steps, window, cells, sinking, area * fraction)
         if factors and stress.ndim == 1:
             stress = stress[:, None, None]
         target = sinking.target
@@ -90,14 +93,18 @@ class SoleLayout(ContactLayout):
             coverage,
             contact,
             rim,
-            sinking.target > 0,
+            pressing,
             target,
             np.broadcast_to(rate, sinking.target.shape),
             stress < material.crust_stress if material.crust_stress else None,
             factors,
             sinking.sinkage,
             sinking.reached,
-            Loads(self._load_at(steps, sinking), sinking.area, self._middle(poses, over_ground, touching)),
+            Loads(
+                np.where(pressing, self.force[steps], 0.0),
+                printing.sum(axis=1),
+                self._middle(poses, over_ground, printing),
+            ),
         )
 
     def _middle(self, poses: Array, over_ground: PointContact, touching: Array) -> Array:
@@ -109,20 +116,13 @@ class SoleLayout(ContactLayout):
 
     def _stress(self, steps: slice, window: Window, cells: GroundCells, sinking: Sinking, touching: Array) -> Array:
         """Normal stress at each of N steps, (N,) [Pa]; where the pressure rolls, of each cell, (N, rows, columns)."""
-        stress = np.divide(
-            self._load_at(steps, sinking), sinking.area, out=np.zeros(len(sinking.area)), where=sinking.target > 0
-        )
+        stress = np.divide(self.force[steps], sinking.area, out=np.zeros(len(sinking.area)), where=sinking.target > 0)
         if cells.ground.pressure != "CENTRE_OF_PRESSURE":
             return stress
         x, y = places(self.points, self.steps.poses[steps])
         field = pressure_field(x, y, touching, self.steps.centres[steps, :2], self.points.tolerance)
         over_cells: Array = stress[:, None, None] * field.over(*window.centres(cells.cell_size))
         return over_cells
-
-    def _load_at(self, steps: slice, sinking: Sinking) -> Array:
-        """Force on the ground at these steps, (N,) [N]: none where it gives no way."""
-        load: Array = self.force[steps] * (sinking.target > 0)
-        return load
 
     @property
     def _length(self) -> float:

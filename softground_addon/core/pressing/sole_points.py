@@ -86,13 +86,16 @@ class PointContact:
     clearance : (N, Q) float array
         Height above the undisturbed ground, less that of the lowest point [m].
     area : (N, Q) float array
-        Horizontal area that each point stands for [m²].
+        Horizontal area that each point stands for where it is over ground that bears [m²].
+    beyond : (N, Q) float array
+        The same of points beyond the edge of the ground: what lies there bears its part of the load.
     lowest : (N,) float array
         Height of the lowest point above the undisturbed ground [m].
     """
 
     clearance: Array
     area: Array
+    beyond: Array
     lowest: Array
 
 
@@ -154,32 +157,40 @@ def point_contact(points: SolePoints, transforms: Array, ground: Surface) -> Poi
     Returns
     -------
     PointContact
-        Points off the ground, over a wall or inside of one, or turned away from the ground have no area.
+        Points over a wall or inside of one, or turned away from the ground, have no area. Beyond its edge, the ground
+        is taken to go on as it is under the rest of the sole; there is none where all of the sole is beyond.
     """
-    is_level = bool(ground.bears.all()) and np.ptp(ground.heights) == 0
-    clearances, areas, levels = [], [], []
+    height, facing = _posed(points, transforms)
+    if ground.bears.all() and np.ptp(ground.heights) == 0:
+        clearance, area, beyond = height - ground.heights[0, 0], facing, np.zeros_like(facing)
+    else:
+        x, y = places(points, transforms)
+        level, plane = ground.planes_at(x, y)
+        off = np.isnan(plane)
+        clearance, area = np.where(off, FAR, height - plane), np.where(off, 0.0, facing)
+        if has_steps(ground, WALL * points.length):
+            area[_inside_walls(np.where(area > 0, clearance, FAR), level, WALL * points.length)] = 0.0
+        beyond = np.zeros_like(facing)
+        if off.any():
+            level, rise_x, rise_y = ground.mean_plane(x, y, area)
+            plane = level + rise_x * x + rise_y * y
+            off = ground.beyond(x, y) & ~np.isnan(plane)
+            beyond[off], clearance[off] = facing[off], (height - plane)[off]
+    clearance[area + beyond == 0] = FAR
+    lowest = clearance.min(axis=1)
+    return PointContact(clearance - lowest[:, None], area, beyond, lowest)
+
+
+def _posed(points: SolePoints, transforms: Array) -> tuple[Array, Array]:
+    """Height of a sole's points and the horizontal area that each stands for where it faces down, (N, Q) each."""
+    heights, areas = [], []
     for number, patch in enumerate(points.patches):
-        rotation, place = transforms[:, number, :3, :3], transforms[:, number, :3, 3]
-        height = rotation[:, 2] @ patch.positions.T + place[:, 2:]
+        rotation = transforms[:, number, :3, :3]
+        heights.append(rotation[:, 2] @ patch.positions.T + transforms[:, number, 2, 3:])
         area = np.maximum(rotation[:, 2] @ patch.normals.T, 0.0) * patch.area
         area[rotation[:, 2, 2] < LEAST_FACING] = 0.0
-        if is_level:
-            height -= ground.heights[0, 0]
-        else:
-            x, y = (rotation[:, axis] @ patch.positions.T + place[:, axis, None] for axis in (0, 1))
-            level, plane = ground.planes_at(x, y)
-            height -= plane
-            area[np.isnan(plane)] = 0.0
-            levels.append(level)
-        height[area == 0] = FAR
-        clearances.append(height)
         areas.append(area)
-    clearance, area = np.concatenate(clearances, axis=1), np.concatenate(areas, axis=1)
-    if has_steps(ground, WALL * points.length):
-        inside = _inside_walls(clearance, np.concatenate(levels, axis=1), WALL * points.length)
-        clearance[inside], area[inside] = FAR, 0.0
-    lowest = clearance.min(axis=1)
-    return PointContact(clearance - lowest[:, None], area, lowest)
+    return np.concatenate(heights, axis=1), np.concatenate(areas, axis=1)
 
 
 def has_steps(ground: Surface, jump: float) -> bool:

@@ -10,7 +10,9 @@ from scipy.optimize import brentq
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
 from softground_addon.core.motion.motion import CharacterMotion, SoleMotion
 from softground_addon.core.numerics.rigid import rotation
+from softground_addon.core.prediction import contact_loads
 from softground_addon.core.pressing.indentation import Springs, stress
+from tests.core.character import Slope
 from tests.core.prop_bodies import box, prop_sole, sphere, wheel
 from tests.core.walkers import loads_of, pose, pressed
 
@@ -65,6 +67,18 @@ def test_a_box_prints_with_the_side_that_it_lies_on(size, turn, sides):
     _ground, (print_,) = pressed(resting(prop_sole(*box(*size)), [0.01, 0.02, 0.5], 800.0, turn=turn), GROUND)
     assert print_.area_m2 == pytest.approx(area, rel=0.02)
     assert print_.max_depth_m == pytest.approx(800.0 / area * PER_FORCE, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.9])
+def test_a_box_on_the_edge_of_the_ground_digs_in_no_deeper_than_beside_it(share):
+    size = 0.4
+    loads = resting(prop_sole(*box(size, size, size)), [0, 0, size / 2], 800.0)
+    terrain = Slope(edge=(share - 0.5) * size)
+    (whole,), (print_,) = (pressed(loads, GROUND, 0.01, ground)[1] for ground in (None, terrain))
+    assert print_.max_depth_m == pytest.approx(whole.max_depth_m, rel=0.01)
+    assert print_.area_m2 == pytest.approx(share * whole.area_m2, abs=1.1 * 0.01 * size)
+    assert print_.compressed_m3 == pytest.approx(share * whole.compressed_m3, rel=0.01, abs=0.03 * whole.compressed_m3)
+    assert contact_loads([loads], terrain, 0.01).deepest(GROUND) == pytest.approx(print_.max_depth_m, rel=0.03)
 
 
 def test_a_tilted_box_presses_a_wedge_that_carries_the_same_load():
