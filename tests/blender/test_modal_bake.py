@@ -1,6 +1,7 @@
 """A bake that is left in any of its states has changed nothing."""
 
 import time
+from functools import partial
 from types import SimpleNamespace
 
 import bpy
@@ -12,6 +13,7 @@ from softground_addon.blender.interface import modal_bake, operators
 from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
+from tests.blender.redraws import fill, least_seconds, walk_over_all_objects
 from tests.blender.shots import walker
 
 
@@ -119,7 +121,7 @@ def test_no_bake_and_no_live_mode_begins_during_a_render(scene, monkeypatch):
 def test_what_was_deleted_under_a_bake_is_named(scene):
     armature = walker(scene, frames=24)
     bpy.ops.softground.add_character()
-    needed = modal_bake._read_by_bake(scene)
+    needed = modal_bake._needed_by_job(scene)
     armature.name = "Renamed"
     modal_bake._check_still_there(needed)
     bpy.data.objects.remove(armature)
@@ -229,7 +231,9 @@ def test_a_tick_ends_where_blender_draws_its_window_anew(scene):
         yield jobs.Progress("write", 1.0)
         return "written"
 
-    bake = SimpleNamespace(_scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes)
+    bake = SimpleNamespace(
+        _scene=scene.session_uid, _job=job(), _progress=None, _changing=analysis.own_changes, _needed={}
+    )
     forever = time.perf_counter() + 1e6
     assert modal_bake._Bake._work(bake, forever) is None
     assert bake._progress.fraction == 0.2
@@ -299,12 +303,33 @@ def test_a_character_whose_reading_was_left_is_not_half_there(scene, others):
         names = [character.name for character in options.characters]
         return names, options.active_character, options.frame_start, options.frame_end
 
-    before = settings_now()
+    before, steps = settings_now(), 0
     job = operators._added(scene, armature, [armature])
-    next(job)
-    assert settings_now() != before
+    while settings_now() == before:
+        next(job)
+        steps += 1
+    assert steps > 10  # its skin is looked at in as many
     job.close()
     assert settings_now() == before
+
+
+def test_a_rig_that_is_deleted_while_its_feet_are_looked_for_is_named(scene):
+    armature = walker(scene, frames=40)
+    job = operators._added(scene, armature, [armature])
+    for _ in range(5):
+        next(job)
+    bpy.data.objects.remove(armature)
+    with pytest.raises(InputError, match="'Walker'"):
+        jobs.run(job)
+    assert not scene.softground.characters
+
+
+def test_a_tick_asks_for_what_it_reads_without_walking_over_all_objects(scene):
+    prepare(scene, "coarse")
+    fill(scene, 10_000)
+    needed = modal_bake._needed_by_job(scene)
+    look = partial(modal_bake._check_still_there, needed)
+    assert least_seconds(look) < least_seconds(walk_over_all_objects) / 5
 
 
 def test_a_shot_is_read_in_steps_and_leaves_no_trace_where_that_ends(scene):

@@ -11,8 +11,9 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
+from .. import jobs
 from ..properties import SoftGroundCharacter
-from ..settings import SIDE_TO_CODE, is_set_up, time_stretch_of
+from ..settings import SIDE_TO_CODE, found, is_set_up, name_of, time_stretch_of
 from .prop_extraction import surface_of
 from .recognition import recognise
 from .rig_mapping import RigMapping, instances_armature, require_armature
@@ -31,6 +32,11 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     InputError
         If there is no armature, it is a character already, or its feet are not found.
     """
+    return jobs.run(adding_character(scene, armature))
+
+
+def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> jobs.Job[SoftGroundCharacter]:
+    """What `add_character` does, in steps; nothing is changed before the last."""
     require_armature(armature)
     assert armature is not None
     settings = scene.softground
@@ -38,7 +44,9 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
         raise InputError(
             f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
         )
-    mapping = recognise(scene, armature, animated_frames(armature))
+    rig = name_of(armature)
+    mapping = yield from recognise(scene, armature, animated_frames(armature))
+    armature = found(rig)
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
@@ -155,18 +163,21 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
     settings.frame_start, settings.frame_end = start, end
 
 
-def detect_bones(character: SoftGroundCharacter) -> None:
-    """Set a character's joints and feet as they are recognised, in place of those in the list; other soles stay.
+def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
+    """Set the joints and feet of a scene's character as they are recognised; its other soles stay.
+
+    Returns the names of those that were found.
 
     Raises
     ------
     InputError
         If it has no armature, or its feet are not found.
     """
-    require_armature(character.armature)
-    scene = character.id_data
-    assert isinstance(scene, bpy.types.Scene)
-    _fill(character, recognise(scene, character.armature, animated_frames(character.armature)))
+    armature = scene.softground.characters[number].armature
+    require_armature(armature)
+    mapping = yield from recognise(scene, armature, animated_frames(armature))
+    _fill(scene.softground.characters[number], mapping)
+    return [source.name for source in mapping.soles]
 
 
 def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:

@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ...core.numerics.rigid import unit
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
-from ..settings import frame_rate_of, time_stretch_of
+from ..settings import found, frame_rate_of, name_of, time_stretch_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource, map_rig
 from .rig_sampling import is_animated, record
@@ -23,6 +23,9 @@ from .sole_extraction import bone_families
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
 
+SHARE = 0.3
+"""Of a reading of the whole shot, as it is shown to the user."""
+
 TURNED = 50.0
 """A contact whose bone leans farther than this from how it mostly bears prints by other sides too [°]."""
 
@@ -30,7 +33,9 @@ TURNED_SHARE = 0.2
 """Share of the bearing time for which it does."""
 
 
-def recognise(scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None = None) -> RigMapping:
+def recognise(
+    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None = None
+) -> jobs.Job[RigMapping]:
     """Joints and contacts of a character.
 
     Parameters
@@ -40,12 +45,21 @@ def recognise(scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[
     frames : tuple of int, optional
         First and last frame of its animation.
 
+    Returns
+    -------
+    Job of RigMapping
+        Leaving it changes nothing.
+
     Raises
     ------
     InputError
         If neither the skin, nor the names, nor the rest pose show any contact.
     """
-    seen = _contacts_of_skin(scene, armature, frames) if frames and is_animated(armature) else ()
+    rig = name_of(armature)
+    seen: tuple[SoleSource, ...] = ()
+    if frames and is_animated(armature):
+        seen = yield from _contacts_of_skin(scene, armature, frames)
+        armature = found(rig)
     try:
         mapping = map_rig(armature)
     except InputError:
@@ -71,29 +85,34 @@ def _joined(
 
 def _contacts_of_skin(
     scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int]
-) -> tuple[SoleSource, ...]:
+) -> jobs.Job[tuple[SoleSource, ...]]:
     """The contacts that the skin shows."""
-    skin = read_skin(scene, armature)
+    rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
+    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
+    armature = found(rig)
     if skin is None or armature.mode == "EDIT" or armature.data.pose_position == "REST":
         return ()
     first, last = (round(frame / time_stretch_of(scene)) for frame in frames)
-    reading = record(scene, armature, range(first, min(last, first + MOST_FRAMES) + 1), skin.bones)
-    recording = jobs.run(jobs.counted(reading, "sample", MOST_FRAMES))
-    followed = followed_skin(skin, armature, recording, frame_rate_of(scene), linked=True)
+    samples = range(first, min(last, first + MOST_FRAMES) + 1)
+    reading = record(scene, armature, samples, skin.bones)
+    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    following = followed_skin.slices(skin, found(rig), recording, frame_rate_of(scene), linked=True)
+    followed = yield from jobs.meanwhile(read, following)
     if followed is None:
         return ()
-    found = find_contacts(followed.motion)
-    sources = (_source(number, found, followed, recording) for number in np.flatnonzero(found.bears.any(axis=0)))
+    contacts = yield from jobs.meanwhile(read, find_contacts.slices(followed.motion))
+    bearing = np.flatnonzero(contacts.bears.any(axis=0))
+    sources = (_source(number, contacts, followed, recording) for number in bearing)
     return tuple(source for source in sources if source)
 
 
-def _source(number: int, found: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:
+def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:
     """One contact, carried by the bone with most of the skin that bears; None where no bone carries it."""
-    parts = np.flatnonzero((found.group == number) & np.array([*map(bool, followed.bones)]))
+    parts = np.flatnonzero((contacts.group == number) & np.array([*map(bool, followed.bones)]))
     if not len(parts):
         return None
-    bears = found.bears[:, number]
-    height = followed.motion.positions[bears][..., 2] - found.level
+    bears = contacts.bears[:, number]
+    height = followed.motion.positions[bears][..., 2] - contacts.level
     low = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=0)
     weight = np.bincount(followed.motion.part, low, len(followed.bones))
     bones = [followed.bones[part] for part in parts]

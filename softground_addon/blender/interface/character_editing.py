@@ -7,10 +7,11 @@ from typing import Any, cast
 import bpy
 
 from ...core.errors import InputError
-from .. import settings
+from .. import jobs, settings
 from ..characters import character_setup
 from ..characters.character_setup import ancestors
 from ..operator_base import reports_errors
+from .modal_bake import Reading
 
 
 def active_character(scene: bpy.types.Scene) -> Any:
@@ -55,17 +56,24 @@ class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_detect_bones(_OnCharacter, bpy.types.Operator):
-    """Find the feet and joints of the character again, by the names of its bones or its rest pose"""
+class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
+    """Find the feet and joints of the character again, by its skin, the names of its bones or its rest pose. Esc
+    cancels"""
 
     bl_idname = "softground.detect_bones"
     bl_label = "Detect Bones"
-    bl_options = {"REGISTER", "UNDO"}
+    cancelled = "Detect Bones cancelled: nothing was changed"
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        character_setup.detect_bones(active_character(settings.scene_of(context)))
-        return {"FINISHED"}
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen, and no other job runs."""
+        return super().poll(context) and Reading.poll.__func__(cls, context)
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
+        return character_setup.detecting_bones(scene, scene.softground.active_character)
+
+    def _show(self, result: list[str]) -> None:
+        self.report({"INFO"}, "Found " + ", ".join(result))
 
 
 class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import bpy
 
 from ...core.errors import InputError, SoftGroundError
+from ...core.settings import ObjectName
 from .. import jobs, session, settings
 from ..baking import bake_job, sink_feet
 from ..characters.character_setup import characters_of
@@ -99,7 +100,7 @@ class ModalJob(bpy.types.Operator):
         self._gave_way = False
         self._progress: jobs.Progress | None = None
         next(self._job)  # what cannot be baked is refused before anything moves
-        self._needed = _read_by_bake(scene)
+        self._needed = _needed_by_job(scene)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
@@ -167,6 +168,7 @@ class ModalJob(bpy.types.Operator):
     def _work(self, until: float) -> Any | None:
         """Go on with the job until a time; the result if it is done by then."""
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene)
+        self._needed |= _needed_by_job(scene)
         blocks = _count_of_blocks()
 
         def goes_on() -> bool:
@@ -339,8 +341,8 @@ def _why_not(context: bpy.types.Context) -> str:
     return ""
 
 
-def _read_by_bake(scene: bpy.types.Scene) -> dict[int, str]:
-    """Scene, ground, armatures and soles of a bake: their names, by their identifiers in this session."""
+def _needed_by_job(scene: bpy.types.Scene) -> dict[int, str]:
+    """Scene, ground, armatures and soles that a job reads: their names, by their identifiers in this session."""
     options = scene.softground
     soles = [sole.object for character in options.characters for sole in character.soles]
     blocks = (scene, options.ground, *(character.armature for character in options.characters), *soles)
@@ -354,11 +356,11 @@ def _count_of_blocks() -> int:
 
 
 def _check_still_there(needed: dict[int, str]) -> None:
-    """Raise InputError if something that a bake reads was deleted meanwhile: Blender does not survive its use."""
-    found = {block.session_uid for blocks in (bpy.data.scenes, bpy.data.objects) for block in blocks}
-    gone = [name for uid, name in needed.items() if uid not in found]
-    if gone:
-        raise InputError(f"'{gone[0]}' was deleted while the bake read it: nothing was changed. Bake again.")
+    """Raise InputError if something that a job reads was deleted meanwhile: Blender does not survive its use."""
+    there = {uid for scene in bpy.data.scenes for uid in _needed_by_job(scene)}  # Blender takes out what is deleted
+    for uid, name in needed.items():
+        if uid not in there and settings.find(ObjectName(name, uid)) is None:
+            raise InputError(f"'{name}' was deleted while the bake read it: nothing was changed. Bake again.")
 
 
 def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:

@@ -12,7 +12,7 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from .. import jobs, session, settings
-from ..characters import character_setup
+from ..characters import character_setup, recognition
 from ..command_line import program
 from ..ground import baked_ground, ground_checks, ground_mesh
 from ..ground.created_ground import create_ground
@@ -41,9 +41,9 @@ def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: li
     """Add the active armature or the selected objects, and read the shot for its prediction; what to say of it."""
     options = scene.softground
     before = len(options.characters), options.active_character, options.frame_start, options.frame_end
-    text, stays = _add(scene, active, selected), False
+    text, stays = (yield from _add(scene, active, selected)), False
     try:
-        yield jobs.Progress("sample", 0.0)
+        yield jobs.Progress("sample", recognition.SHARE)
         if not bpy.app.background:
             with suppress(InputError):  # it says so when the user asks for the depth, or bakes
                 yield from analysis.reading(scene)
@@ -56,10 +56,10 @@ def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: li
     return text
 
 
-def _add(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> str:
+def _add(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> jobs.Job[str]:
     armature = _armature_of(active)
     if armature is None or armature.type != "MESH":
-        character = character_setup.add_character(scene, armature)
+        character = yield from character_setup.adding_character(scene, armature)
         return f"Added '{character.name}' with " + ", ".join(sole.name for sole in character.soles)
     things = [thing for thing in selected if thing.type == "MESH" and not thing.find_armature()]
     added = character_setup.add_things(scene, dict.fromkeys([armature, *things]))
