@@ -28,7 +28,7 @@ BURIED = 0.015
 LOW = 0.15
 """A part lower than this above the lowest skin is low, in body heights."""
 
-_SLICE = 300_000
+_SLICE = 100_000
 """Places that are looked at in one slice."""
 
 
@@ -120,32 +120,37 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     number = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(part))))
     count = len(skin.positions)
     low, rise = np.empty((2, count, len(first)))
-    middle, ways = np.empty((count, len(first), 2)), np.empty((2, count, len(first), 3))
+    middle, ways = np.empty((count, 2, len(first))), np.empty((2, count, 3, len(first)))
     frames = max(_SLICE // max(len(used), 1), 1)
     for start in range(0, count, frames):
-        here = slice(start, start + frames)
-        height = skin.positions[here, used, 2].astype(float) / skin.height
+        samples = np.arange(start - 1, min(start + frames, count) + 1)  # with the one before and the one after
+        around = np.swapaxes(skin.positions, 1, 2)[np.clip(samples, 0, count - 1)]
+        positions = np.take(around, used, axis=2) / skin.height
+        steps = np.diff(positions, axis=0) * skin.rate
+        # The first sample has no step before it and the last none after it: each has its one step on both sides.
+        if start == 0:
+            steps[0] = steps[1]
+        if samples[-1] == count:
+            steps[-1] = steps[-2]
+        here, positions = samples[1:-1], positions[1:-1]
+        height = positions[:, 2]
         lowest = np.minimum.reduceat(np.where(height < floor - BURIED, np.inf, height), first, axis=1)
         lowest = np.where(np.isfinite(lowest), lowest, np.maximum.reduceat(height, first, axis=1))
-        frame, point = np.nonzero(~(np.abs(height - lowest[:, number]) > PATCH))
-        patch = np.flatnonzero(np.diff(frame * len(first) + number[point], prepend=-1))
-        size = np.diff(np.append(patch, len(frame)))[:, None]
-        frame, point = frame + start, used[point]
-        before, place, after = (
-            skin.positions[np.clip(frame + step, 0, count - 1), point].astype(float) / skin.height
-            for step in (-1, 0, 1)
-        )
+        patch = np.abs(height - lowest[:, number]) <= PATCH
+        size = np.add.reduceat(patch, first, axis=1, dtype=float)[:, None]
         low[here] = lowest
-        middle[here] = (np.add.reduceat(place[:, :2], patch) / size).reshape(*lowest.shape, 2)
-        # The first sample has no step before it and the last none after it: each has its one step on both sides.
-        before, after = (place - before) * skin.rate, (after - place) * skin.rate
-        steps = np.where((frame > 0)[:, None], before, after), np.where((frame < count - 1)[:, None], after, before)
-        for side, step in enumerate(steps):
-            ways[side, here] = (np.add.reduceat(step, patch) / size).reshape(*lowest.shape, 3)
-        rises = np.minimum(*(np.abs(step[:, 2]) for step in steps))
-        rise[here] = np.minimum.reduceat(rises, patch).reshape(lowest.shape)
+        middle[here] = _sums(positions[:, :2], patch, first) / size
+        ways[0, here] = _sums(steps[:-1], patch, first) / size
+        ways[1, here] = _sums(steps[1:], patch, first) / size
+        rises = np.minimum(*np.abs([steps[:-1, 2], steps[1:, 2]]))
+        rise[here] = np.minimum.reduceat(np.where(patch, rises, np.inf), first, axis=1)
         yield
     near = low < low.min() + LOW
-    speed = np.linalg.norm(ways, axis=-1).min(axis=0)
+    speed = np.linalg.norm(ways, axis=2).min(axis=0)
     calm = max(CALM_SPEED, CALM_SHARE * float(np.percentile(speed[near], 95)))
-    return PartTracks(low, middle, rise, ways[..., :2], calm, skin.rate)
+    return PartTracks(low, np.swapaxes(middle, 1, 2), rise, np.swapaxes(ways[:, :, :2], 2, 3), calm, skin.rate)
+
+
+def _sums(values: NDArray[np.floating], patch: Mask, first: Indices) -> Array:
+    """Sums over the points of each part's patch, (F, axes, P)."""
+    return np.asarray(np.add.reduceat(values * patch[:, None], first, axis=2, dtype=float))
