@@ -72,7 +72,9 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     material = {"youngs_modulus": MODULUS, "poisson_ratio": POISSON, "characteristic_time": TAU, "layer_depth": 0.6}
     chosen = {"shape_keys": "false"} | {f"material.{field}": f"{value:g}" for field, value in material.items()}
     walkers = [Walker(sphere, value if row == "mass" else MASS) for (row, value), sphere in spheres.items()]
-    bake = production.bake(scene, walkers, "Dry Sand", cell_size, ground=ground, options=chosen | dict(options or {}))
+    bake = production.bake(
+        scene, walkers, "Paper Dry Sand", cell_size, ground=ground, options=chosen | dict(options or {})
+    )
     return Craters({"craters": bake}, spheres)
 
 

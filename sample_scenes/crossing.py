@@ -50,8 +50,10 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     second.location.xy = meeting - turn @ meeting
     walkers = [Walker(first, body.mass), Walker(second, body.mass)]
     options = {"shape_keys": "false"} | dict(options or {})
-    alone = [production.bake(scene, [walker], "Snow", cell_size, options=options, write=False) for walker in walkers]
-    bake = production.bake(scene, walkers, "Snow", cell_size, options=options)
+    alone = [
+        production.bake(scene, [walker], "Paper Snow", cell_size, options=options, write=False) for walker in walkers
+    ]
+    bake = production.bake(scene, walkers, "Paper Snow", cell_size, options=options)
     return Crossing({"Snow": bake}, alone, [first, second])
 
 

@@ -32,7 +32,6 @@ from softground_addon.core.record.footprints import Footprint
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 
 WALK_FRAMES = 84  # 3.5 s: six or seven steps
-CELL_SIZE = 0.0075  # m
 _GAP = 0.10  # m between neighbouring grounds
 _CLOSE_UP = (640, 480)
 _OVERVIEW = (1024, 576)
@@ -89,13 +88,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--scale", type=float, default=0.01, metavar="S", help="metres per unit of the motion file")
     parser.add_argument("--up", choices=("Y", "Z"), help="up axis of the motion file (default: the body's long axis)")
     parser.add_argument("--output", type=Path, default=Path("build/demo"), metavar="DIR")
-    parser.add_argument("--cell-size", type=float, default=CELL_SIZE, metavar="M", help="size of the ground's cells")
+    parser.add_argument("--cell-size", type=float, metavar="M", help="size of the cells (default: fits the soles)")
     parser.add_argument("--samples", type=int, default=20, metavar="N", help="render samples of the pictures")
     parser.add_argument("--no-pictures", action="store_true", help="bake and save only")
     return parser
 
 
-def build(motion: Path | None, scale: float, up: str | None, cell_size: float) -> list[Lane]:
+def build(motion: Path | None, scale: float, up: str | None, cell_size: float | None) -> list[Lane]:
     """Bake the same walk on each preset, side by side in the open file."""
     scene = bpy.context.scene
     walker = import_motion(motion, scale, up) if motion else create_walker(scene)
@@ -146,13 +145,14 @@ def import_motion(path: Path, scale: float, up: str | None) -> bpy.types.Object:
     return rig
 
 
-def bake_lane(scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cell_size: float) -> Lane:
+def bake_lane(scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cell_size: float | None) -> Lane:
     """Set up and bake one ground, as a user does it in the panel."""
     started = time.perf_counter()
     settings = scene.softground
     settings.ground = None
     settings.characters.clear()
-    settings.cell_size = cell_size
+    if cell_size:
+        settings.cell_size = cell_size
     bpy.ops.object.select_all(action="DESELECT")
     walker.select_set(True)
     bpy.context.view_layer.objects.active = walker

@@ -45,7 +45,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     options = {"shape_keys": "false"} | dict(options or {})
-    bake = production.bake(scene, [Walker(walker, body.mass)], "Soil", cell_size, options=options)
+    bake = production.bake(scene, [Walker(walker, body.mass)], "Paper Soil", cell_size, options=options)
     return ForceArrows({"Soil": bake}, walker, analysis.read(scene).loads[0])
 
 

@@ -103,7 +103,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     bake = production.bake(
         scene,
         [Walker(walkers[name], bodies[name].mass, shoes if name == "snowshoes" else {}) for name in walkers],
-        "Snow",
+        "Paper Snow",
         cell_size,
         ground=ground,
         options=options,

@@ -144,7 +144,7 @@ def bake(
     scene: bpy.types.Scene,
     walkers: Sequence[Walker],
     preset: str,
-    cell_size: float,
+    cell_size: float | None,
     *,
     ground: bpy.types.Object | None = None,
     options: Options | None = None,
@@ -152,12 +152,14 @@ def bake(
 ) -> Bake:
     """Bake walkers into a ground as a user does it in the panel; without a ground, one is made that fits the walk.
 
-    Without writing, the prints are computed and the ground stays as it is.
+    Without a cell size, the cells fit the soles. Without writing, the prints are computed and the ground stays as it
+    is.
     """
     shot = scene.softground
     shot.ground = ground
     shot.characters.clear()
-    shot.cell_size = cell_size
+    if cell_size:
+        shot.cell_size = cell_size
     for walker in walkers:
         make_active(walker.armature)
         for thing in walker.with_things:

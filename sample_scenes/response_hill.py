@@ -54,7 +54,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
         ground = terrain.add_terrain(f"Hill {name}", x, y, hill, "soil", scene.collection)
         chosen = {"shape_keys": "false", "material.youngs_modulus": "4e5"} | dict(options or {}) | answer
         bakes[name] = production.bake(
-            scene, [Walker(walker, body.mass)], "Soil", cell_size, ground=ground, options=chosen
+            scene, [Walker(walker, body.mass)], "Paper Soil", cell_size, ground=ground, options=chosen
         )
     return ResponseHill(bakes, walkers)
 

@@ -88,7 +88,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     x, y = (terrain.spaced(LOW[axis], HIGH[axis], SPACING) for axis in (0, 1))
     ground = terrain.add_terrain("Snow", x, y, terrain.flat, "snow", scene.collection)
     chosen = {"shape_keys": "false", "detail": "ALWAYS", "material.youngs_modulus": f"{MODULUS:g}"}
-    bake = production.bake(scene, walkers, "Snow", cell_size, ground=ground, options=chosen | dict(options or {}))
+    bake = production.bake(scene, walkers, "Paper Snow", cell_size, ground=ground, options=chosen | dict(options or {}))
     things = {"walker": walker, "faller": faller, "crate": crate, "ball": ball, "sled": sled}
     return Things({"snow": bake}, things, dict(zip(things, analysis.read(scene).loads, strict=True)))
 

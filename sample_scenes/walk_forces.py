@@ -44,7 +44,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     write_action(walker, walk(body, Gait(speed=SPEED), FRAMES, RATE), "Brisk Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     options = {"shape_keys": "false"} | dict(options or {})
-    bake = production.bake(scene, [Walker(walker, body.mass)], "Dry Sand", cell_size, options=options)
+    bake = production.bake(scene, [Walker(walker, body.mass)], "Paper Dry Sand", cell_size, options=options)
     loads = {}
     for model in ("IMPULSE", "WHOLE_BODY"):
         scene.softground.characters[0].force_model = model

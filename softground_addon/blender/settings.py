@@ -9,6 +9,7 @@ from typing import Any, cast
 import bpy
 
 from ..core.errors import InputError
+from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
 from ..core.response.performance import Performance
@@ -230,11 +231,73 @@ def user_folder() -> Path:
 
 
 def apply_preset(scene: bpy.types.Scene, preset: Preset) -> None:
-    """Set the scene's ground material to a preset's."""
-    target = scene.softground.material
-    for field in MATERIAL_FIELDS:
-        setattr(target, field, getattr(preset.material, field))
-    target.preset, target.surface = preset.name, preset.surface
+    """Set the scene's ground to a preset's; what the preset does not say, and a cell size of the user's own, stay."""
+    for group, field, value in _of_preset(scene, preset):
+        setattr(group, field, value)
+    options = scene.softground
+    if preset.cells_along_sole is not None and options.cells_along_sole > 0:
+        options.cells_along_sole = preset.cells_along_sole
+        fit_cells(scene)
+
+
+def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
+    """The scene's ground as a preset of that name."""
+    options = scene.softground
+    return Preset(
+        name,
+        source,
+        options.material.surface,
+        material_of(scene),
+        options.pressure,
+        typed(options.tread),
+        typed(options.cells_along_sole) or None,
+    )
+
+
+def take_defaults(scene: bpy.types.Scene) -> None:
+    """Set what the user has not set of the ground to the default preset, and the cells to fit the soles.
+
+    For the first character of a scene. The defaults of the properties themselves are those of version 0.1: a file keeps
+    only what was set, and the others are to stay as they were when it was saved.
+    """
+    preset = presets.find(presets.DEFAULT)
+    options = scene.softground
+    for group, field, value in _of_preset(scene, preset):
+        if not group.is_property_set(field):
+            setattr(group, field, value)
+    if not options.is_property_set("cell_size") and not options.is_property_set("cells_along_sole"):
+        options.cells_along_sole = preset.cells_along_sole
+
+
+def untouched(scene: bpy.types.Scene) -> list[tuple[Any, str]]:
+    """The settings that `take_defaults` would set, as groups and names."""
+    options = scene.softground
+    fields = [(group, field) for group, field, _ in _of_preset(scene, presets.find(presets.DEFAULT))]
+    fields += [(options, "cell_size"), (options, "cells_along_sole")]
+    return [(group, field) for group, field in fields if not group.is_property_set(field)]
+
+
+def _of_preset(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, Any]]:
+    """What a preset says: groups of settings, names in them, values."""
+    options, material = scene.softground, scene.softground.material
+    said = [(material, field, getattr(preset.material, field)) for field in MATERIAL_FIELDS]
+    said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
+    said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
+    return [one for one in said if one[2] is not None]
+
+
+COARSER = 4.0
+"""How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
+be as it says."""
+
+
+def fit_cells(scene: bpy.types.Scene) -> None:
+    """Set the cell size to what the scene's preset says of the soles, unless the user has set it."""
+    options = scene.softground
+    count, lengths = options.cells_along_sole, [one.sole_length for one in options.characters if one.sole_length > 0]
+    if count > 0 and lengths:
+        options.cell_size = float(f"{max(min(lengths), max(lengths) / COARSER) / count:.2g}")
+        options.cells_along_sole = count  # which a cell size of the user's own switches off
 
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\]")

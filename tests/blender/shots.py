@@ -51,11 +51,19 @@ def import_motion(name: str) -> bpy.types.Object:
         update_scene_fps=True,
         update_scene_duration=True,
     )
+    coarse(bpy.context.scene)
     return bpy.context.active_object
 
 
 COARSE = 4.0
 """How many times further apart than in pictures the vertices of a test's figure are, but for its shoes."""
+
+
+def coarse(scene: bpy.types.Scene) -> None:
+    """Settings with which tests bake quickly: flat pressure in cells of a centimetre, no tread."""
+    options = scene.softground
+    options.cell_size, options.pressure, options.tread = 0.01, "UNIFORM", 0.0
+
 
 _walk = cache(walk)
 
@@ -63,10 +71,11 @@ _walk = cache(walk)
 def walker(
     scene: bpy.types.Scene, frames: int = 72, rate: int = 24, coarseness: float = COARSE, **gait: float
 ) -> bpy.types.Object:
-    """The project's own character, walking from the origin; it is the active object."""
+    """The project's own character, walking from the origin, with `coarse` settings; it is the active object."""
     scene.render.fps, scene.render.fps_base = rate, 1.0
     body = Body()
     armature = create_character("Walker", body, scene.collection, coarseness)
     write_action(armature, _walk(body, Gait(**gait), frames, rate), "Walk")
+    coarse(scene)
     bpy.context.view_layer.objects.active = armature
     return armature

@@ -15,6 +15,8 @@ from tests.blender import shots
 from tests.blender.grounds import plane
 
 NO_INPUT = {
+    "cells_along_sole": "sets the cell size",
+    "characters.sole_length": "sets the cell size",
     "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
     "characters.active_sole": "which one the list shows",

@@ -72,7 +72,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
         table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines)))
         del lines  # they are large, and all is in the table
         yield Progress("write", 0.8)
-        marks = _tread(footprints, place.position, made_with.tread_m)
+        marks = _tread(footprints, place.position, made_with)
         yield Progress("write", 0.9)
         yield from baked_ground.write(
             place,
@@ -118,9 +118,19 @@ def sign(
     staleness.store(inputs, ground, hashes)
 
 
-def _tread(footprints: Sequence[Footprint], position: Array, depth: float) -> Array | None:
-    """What `ground_mesh.SOLE` says of places (K, 3), for a tread of some depth [m]; None without a tread."""
-    if not depth > 0 or not footprints:
+FEET_IN_SHOES = 2
+"""Feet of those who wear shoes."""
+
+
+def _tread(footprints: Sequence[Footprint], position: Array, made_with: BakeSettings) -> Array | None:
+    """What `ground_mesh.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
+    has one."""
+    shod = set()
+    for one in made_with.characters:
+        feet = [sole for sole in one.soles if sole.bone and not sole.limb]
+        shod |= {(one.name, sole.name) for sole in feet if len(feet) == FEET_IN_SHOES}
+    if not made_with.tread_m > 0 or not any((step.character, step.sole) in shod for step in footprints):
         return None
-    marks: Array = sole_marks(footprints, footprints[0].cell_size).sample(*position[:, :2].T)
-    return marks.T * (1.0, 1.0, depth)
+    marks = sole_marks(footprints, footprints[0].cell_size, shod)
+    values: Array = marks.sample(*position[:, :2].T)
+    return values.T * (1.0, 1.0, made_with.tread_m)

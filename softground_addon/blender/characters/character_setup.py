@@ -11,13 +11,19 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
+<<<<<<< HEAD
 from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, found, is_set_up, name_of, time_stretch_of
+=======
+from ..jobs import counted, run
+from ..properties import SoftGroundCharacter
+from ..settings import SIDE_TO_CODE, character_of, fit_cells, is_set_up, take_defaults, time_stretch_of
+>>>>>>> fbf351b (presets: carry the whole ground, so that two clicks bake what the gallery shows)
 from .prop_extraction import surface_of
 from .recognition import recognise
 from .rig_mapping import RigMapping, instances_armature, require_armature
-from .rig_sampling import is_animated, is_simulated
+from .rig_sampling import is_animated, is_simulated, sample_character
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
@@ -53,7 +59,45 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     _fill(character, mapping)
     settings.active_character = len(settings.characters) - 1
     _take_frames(scene, animated_frames(armature))
+    character.sole_length = _shortest_sole(scene, character)
+    _fit_ground(scene)
     return character
+
+
+LONGEST_OF_LIMBS = 0.55
+"""Length from which a limb or an object counts as no longer, since it prints with a part of itself [m]: cells of 1 cm
+along a preset's 55."""
+
+_POSES = 16
+"""Poses of an animation from which soles are measured."""
+
+
+def _shortest_sole(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
+    """Length of a character's shortest sole [m]; 0 where it cannot be told."""
+    one = character_of(character)
+    first, last = scene.softground.frame_start, scene.softground.frame_end
+    frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
+    mapping = RigMapping(one.joints, one.soles, "settings")
+    try:
+        motion = run(
+            counted(
+                sample_character(scene, character.armature, mapping, mass=1.0, frames=frames), "sample", len(frames)
+            )
+        )
+    except InputError:  # it says so when the user bakes
+        return 0.0
+    limbs = {sole.name for sole in one.soles if sole.limb}
+    return min(
+        min(sole.sole.length, LONGEST_OF_LIMBS) if sole.sole.name in limbs else sole.sole.length
+        for sole in motion.soles
+    )
+
+
+def _fit_ground(scene: bpy.types.Scene) -> None:
+    """Let the ground fit a character that was just added: by the default preset if it is the first."""
+    if len(scene.softground.characters) == 1:
+        take_defaults(scene)
+    fit_cells(scene)
 
 
 DENSITY = 500.0
@@ -90,12 +134,15 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
         character = scene.softground.characters.add()
         character.name = (members[0] if len(members) == 1 else root).name
         character.mass = _guessed_mass(scene, members)
+        size = min(float(np.array(thing.dimensions).max()) for thing in members) * scene.unit_settings.scale_length
+        character.sole_length = min(size, LONGEST_OF_LIMBS)
         for thing in members:
             sole = character.soles.add()
             sole.name, sole.object = thing.name, thing
         added.append(character)
         for thing in members:
             _take_frames(scene, _moving_frames(scene, thing))
+        _fit_ground(scene)
     scene.softground.active_character = len(scene.softground.characters) - 1
     return added
 

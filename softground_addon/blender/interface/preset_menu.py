@@ -103,7 +103,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
         scene = settings.scene_of(context)
         if any(preset.name == name for _, preset in listed(presets.FOLDER)[0]):
             raise InputError(f"'{name}' comes with SoftGround: choose another name.")
-        preset = presets.Preset(name, self.source, scene.softground.material.surface, settings.material_of(scene))
+        preset = settings.as_preset(scene, name, self.source)
         path = _file_for(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_text(path, presets.dump(preset))

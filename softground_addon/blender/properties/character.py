@@ -114,3 +114,6 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)
     active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})
+    sole_length: FloatProperty(
+        name="Sole Length", description="Of its shortest sole [m], to which cells are fitted", options={"HIDDEN"}
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -32,6 +34,10 @@ _TREAD = (
 )
 
 
+def _of_the_users_own(options: Any, _context: bpy.types.Context) -> None:
+    options.cells_along_sole = 0.0
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
@@ -50,6 +56,13 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         soft_min=0.002,
         soft_max=0.05,
         precision=4,
+        update=_of_the_users_own,
+    )
+    cells_along_sole: FloatProperty(
+        name="Cells Along Sole",
+        description="Cells along the shortest sole, to which the cell size is fitted; 0 where the user has set it",
+        min=0.0,
+        options={"HIDDEN"},
     )
     cell_size_cm: in_unit(
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2

@@ -10,12 +10,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import cast, get_args
 
 from ..errors import InputError
-from .material import MATERIAL_RANGES, GroundMaterial
+from .material import MATERIAL_RANGES, GroundMaterial, Pressure
 
 FOLDER = Path(__file__).parents[2] / "presets"
 """Where the presets that come with the add-on are."""
+
+DEFAULT = "Snow"
+"""The preset that a scene starts with."""
 
 SCHEMA_VERSION = 1
 
@@ -40,12 +44,26 @@ class Preset:
     surface : str
         One of `SURFACES`.
     material : GroundMaterial
+    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE', optional
+    tread : float, optional
+        Depth of the bars of shoes [m].
+    cells_along_sole : float, optional
+        Cells that lie along the shortest sole.
+
+    What is optional stays as it was where it is None: presets of version 0.1 had none of it.
     """
 
     name: str
     source: str
     surface: str
     material: GroundMaterial
+    pressure: Pressure | None = None
+    tread: float | None = None
+    cells_along_sole: float | None = None
+
+
+RANGES = {"tread": (0.0, 0.1), "cells_along_sole": (4.0, 1000.0)}
+"""Smallest and largest value of the numbers beside the material: [m], and a count."""
 
 
 def validate_material(values: Mapping[str, object], origin: str) -> GroundMaterial:
@@ -60,14 +78,18 @@ def validate_material(values: Mapping[str, object], origin: str) -> GroundMateri
     for name, value in values.items():
         if name not in known:
             raise InputError(f"{origin}: unknown field '{name}'. Known are: {', '.join(sorted(known))}.")
-        low, high = MATERIAL_RANGES.get(name, (-math.inf, math.inf))
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number from {low:g} to {high:g}.")
+        _check(name, value, MATERIAL_RANGES.get(name, (-math.inf, math.inf)), origin)
     try:
         return GroundMaterial(**{name: float(value) for name, value in values.items()})  # type: ignore[arg-type]
     except TypeError:
         missing = sorted({"youngs_modulus", "poisson_ratio", "characteristic_time"} - set(values))
         raise InputError(f"{origin}: the material lacks {', '.join(missing)}.") from None
+
+
+def _check(name: str, value: object, limits: tuple[float, float], origin: str) -> None:
+    low, high = limits
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number from {low:g} to {high:g}.")
 
 
 def parse(text: str, origin: str) -> Preset:
@@ -96,7 +118,16 @@ def parse(text: str, origin: str) -> Preset:
         raise InputError(f"{origin}: 'surface' is {surface!r}; it must be one of {', '.join(SURFACES)}.")
     if not isinstance(material, dict):
         raise InputError(f"{origin}: the preset has no 'material' table.")
-    return Preset(name, source, surface, validate_material(material, origin))
+    pressure, numbers = content.get("pressure"), {}
+    if pressure is not None and pressure not in get_args(Pressure):
+        raise InputError(f"{origin}: 'pressure' is {pressure!r}; it must be one of {', '.join(get_args(Pressure))}.")
+    for key, limits in RANGES.items():
+        if (number := content.get(key)) is not None:
+            _check(key, number, limits, origin)
+            numbers[key] = float(number)
+    return Preset(
+        name, source, surface, validate_material(material, origin), cast("Pressure | None", pressure), **numbers
+    )
 
 
 def load(path: Path) -> Preset:
@@ -119,7 +150,8 @@ def load(path: Path) -> Preset:
 
 def dump(preset: Preset) -> str:
     """The text of the preset's JSON file."""
-    content = {"schema_version": SCHEMA_VERSION, **asdict(preset)}
+    content = {key: value for key, value in asdict(preset).items() if value is not None}
+    content = {"schema_version": SCHEMA_VERSION, **content}
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from ..ground.heightfield import SparseGrid
 from .footprints import Footprint
 
 
-def sole_marks(footprints: Iterable[Footprint], cell_size: float) -> SparseGrid:
+def sole_marks(
+    footprints: Iterable[Footprint], cell_size: float, shod: Collection[tuple[str, str]] | None = None
+) -> SparseGrid:
     """Place under the sole that touched each cell last.
 
     Parameters
@@ -19,6 +21,8 @@ def sole_marks(footprints: Iterable[Footprint], cell_size: float) -> SparseGrid:
         In the order of their first contact: later ones go over earlier ones.
     cell_size : float
         Side of a cell [m].
+    shod : collection of (str, str), optional
+        Characters and names of the soles that leave a mark; by default all. The others wipe out what is under them.
 
     Returns
     -------
@@ -39,6 +43,7 @@ def sole_marks(footprints: Iterable[Footprint], cell_size: float) -> SparseGrid:
         own = touched | (values[2] == 0)
         values[0] = np.where(own, dx * cos + dy * sin, values[0])
         values[1] = np.where(own, dy * cos - dx * sin, values[1])
-        values[2] = np.where(touched, 1.0, values[2])
+        is_shod = shod is None or (footprint.character, footprint.sole) in shod
+        values[2] = np.where(touched, float(is_shod), values[2])
         marks.write(window, values)
     return marks

@@ -25,8 +25,8 @@ PAPER_RANGES = {
 }
 
 
-def test_nine_presets_are_shipped():
-    assert len(SHIPPED) == 9
+def test_thirteen_presets_are_shipped():
+    assert len(SHIPPED) == 13
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -40,12 +40,15 @@ def test_a_shipped_preset_is_valid_names_its_source_and_survives_a_round_trip(pa
 @pytest.mark.parametrize("name", PAPER_RANGES)
 def test_the_papers_presets_hold_the_middle_of_its_table(name):
     (low, high), tau, nu, blur = PAPER_RANGES[name]
-    material = presets.find(name).material
-    assert material == GroundMaterial((low + high) / 2, nu, tau, layer_depth=0.3, rim_reach=0.04, blur_sigma=blur)
+    preset = presets.find(f"paper_{name}")
+    assert (preset.pressure, preset.tread) == ("UNIFORM", 0.0)
+    assert preset.material == GroundMaterial(
+        (low + high) / 2, nu, tau, layer_depth=0.3, rim_reach=0.04, blur_sigma=blur
+    )
 
 
 def test_what_goes_beyond_the_paper_is_off_where_a_preset_does_not_say_so():
-    text = (presets.FOLDER / "mud.json").read_text(encoding="utf-8")
+    text = (presets.FOLDER / "paper_mud.json").read_text(encoding="utf-8")
     beyond = ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress", "firm_depth")
     assert not any(name in text for name in beyond)
     assert not any(getattr(presets.parse(text, "mud").material, name) for name in beyond)
@@ -64,8 +67,27 @@ def test_wet_sand_is_as_stiff_under_a_plate_as_it_was_measured():
     assert 10e6 <= material.youngs_modulus / material.layer_depth <= 15e6
 
 
-def test_loose_dry_sand_keeps_slopes_of_32_degrees():
-    assert presets.find("loose_dry_sand").material.repose_angle == pytest.approx(np.radians(32.0), abs=1e-4)
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_preset_carries_the_whole_ground(path):
+    preset = presets.load(path)
+    assert preset.pressure is not None
+    assert preset.tread is not None
+    assert preset.cells_along_sole is not None
+
+
+def test_a_preset_of_version_0_1_says_nothing_of_what_it_did_not_know():
+    content = json.loads((presets.FOLDER / "snow.json").read_text(encoding="utf-8"))
+    old = {key: content[key] for key in ("schema_version", "name", "source", "surface", "material")}
+    preset = presets.parse(json.dumps(old), "mine.json")
+    assert (preset.pressure, preset.tread, preset.cells_along_sole) == (None, None, None)
+    assert json.loads(presets.dump(preset)) == json.loads(json.dumps(old)) | {
+        "material": dataclasses.asdict(preset.material)
+    }
+
+
+@pytest.mark.parametrize("name", ["dry_sand", "loose_dry_sand"])
+def test_dry_sand_keeps_slopes_of_32_degrees(name):
+    assert presets.find(name).material.repose_angle == pytest.approx(np.radians(32.0), abs=1e-4)
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -85,6 +107,9 @@ def test_no_preset_lets_a_standing_person_through_the_layer(path):
         ({"material": {"youngs_modulus": "stiff"}}, "'youngs_modulus' is 'stiff'"),
         ({"material": {"poisson_ratio": 0.6}}, "from 0 to 0.5"),
         ({"material": {"poisson_ratio": float("nan")}}, "from 0 to 0.5"),
+        ({"pressure": "HEAVY"}, "'pressure' is 'HEAVY'; it must be one of UNIFORM, CENTRE_OF_PRESSURE"),
+        ({"tread": -0.1}, "'tread' is -0.1"),
+        ({"cells_along_sole": "many"}, "'cells_along_sole' is 'many'"),
         ({"material": {"density": 1}}, "unknown field 'density'"),
         ({"material": {"poisson_ratio": 0.1}}, "lacks characteristic_time, youngs_modulus"),
     ],
