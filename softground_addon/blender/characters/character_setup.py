@@ -11,17 +11,11 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
-<<<<<<< HEAD
 from .. import jobs
 from ..properties import SoftGroundCharacter
-from ..settings import SIDE_TO_CODE, found, is_set_up, name_of, time_stretch_of
-=======
-from ..jobs import counted, run
-from ..properties import SoftGroundCharacter
-from ..settings import SIDE_TO_CODE, character_of, fit_cells, is_set_up, take_defaults, time_stretch_of
->>>>>>> fbf351b (presets: carry the whole ground, so that two clicks bake what the gallery shows)
+from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .prop_extraction import surface_of
-from .recognition import recognise
+from .recognition import SHARE, recognise
 from .rig_mapping import RigMapping, instances_armature, require_armature
 from .rig_sampling import is_animated, is_simulated, sample_character
 
@@ -52,6 +46,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
         )
     rig = name_of(armature)
     mapping = yield from recognise(scene, armature, animated_frames(armature))
+    length = yield from _shortest_sole(scene, found(rig), mapping)
     armature = found(rig)
     character = settings.characters.add()
     character.name = armature.name
@@ -59,7 +54,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     _fill(character, mapping)
     settings.active_character = len(settings.characters) - 1
     _take_frames(scene, animated_frames(armature))
-    character.sole_length = _shortest_sole(scene, character)
+    character.sole_length = length
     _fit_ground(scene)
     return character
 
@@ -72,25 +67,26 @@ _POSES = 16
 """Poses of an animation from which soles are measured."""
 
 
-def _shortest_sole(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
-    """Length of a character's shortest sole [m]; 0 where it cannot be told."""
-    one = character_of(character)
-    first, last = scene.softground.frame_start, scene.softground.frame_end
+def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> jobs.Job[float]:
+    """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
+    first, last = _frames_of_scene(scene, animated_frames(armature))
     frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
-    mapping = RigMapping(one.joints, one.soles, "settings")
+    reading = sample_character(scene, armature, mapping, mass=1.0, frames=frames)
     try:
-        motion = run(
-            counted(
-                sample_character(scene, character.armature, mapping, mass=1.0, frames=frames), "sample", len(frames)
-            )
-        )
+        motion = yield from jobs.counted(reading, "sample", len(frames), share=SHARE)
     except InputError:  # it says so when the user bakes
         return 0.0
-    limbs = {sole.name for sole in one.soles if sole.limb}
-    return min(
-        min(sole.sole.length, LONGEST_OF_LIMBS) if sole.sole.name in limbs else sole.sole.length
-        for sole in motion.soles
-    )
+    limbs = {sole.name for sole in mapping.soles if sole.limb}
+    lengths = ((sole.sole.name in limbs, sole.sole.length) for sole in motion.soles)
+    return min(min(length, LONGEST_OF_LIMBS) if is_limb else length for is_limb, length in lengths)
+
+
+def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:
+    """The scene's frames at which an animation plays; all of them without one."""
+    if not frames:
+        return scene.frame_start, scene.frame_end
+    stretch = time_stretch_of(scene)
+    return floor(frames[0] / stretch), ceil(frames[1] / stretch)
 
 
 def _fit_ground(scene: bpy.types.Scene) -> None:
@@ -203,8 +199,8 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
         if len(scene.softground.characters) == 1:
             scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
         return
-    settings, stretch = scene.softground, time_stretch_of(scene)
-    start, end = floor(frames[0] / stretch), ceil(frames[1] / stretch)
+    settings = scene.softground
+    start, end = _frames_of_scene(scene, frames)
     if len(settings.characters) > 1:
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end

@@ -41,12 +41,8 @@ def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: li
     """Add the active armature or the selected objects, and read the shot for its prediction; what to say of it."""
     options = scene.softground
     before = len(options.characters), options.active_character, options.frame_start, options.frame_end
-<<<<<<< HEAD
-    text, stays = (yield from _add(scene, active, selected)), False
-=======
     fresh, cells = settings.untouched(scene), (options.cell_size, options.cells_along_sole)
-    text, stays = _add(scene, active, selected), False
->>>>>>> fbf351b (presets: carry the whole ground, so that two clicks bake what the gallery shows)
+    text, stays = (yield from _add(scene, active, selected)), False
     try:
         yield jobs.Progress("sample", recognition.SHARE)
         if not bpy.app.background:
