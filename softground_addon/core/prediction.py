@@ -21,6 +21,7 @@ from .ground.variation import Factors, Variation, layer_factors
 from .loads.estimate import CharacterLoads
 from .motion.props import posed
 from .numerics.intervals import runs
+from .numerics.slices import Slices, sliced
 from .pressing.contact_layout import landing_drop
 from .pressing.deformation import compress, compression_rate, target_compression, touching_fraction
 from .pressing.ground_cells import UndisturbedCells
@@ -393,9 +394,10 @@ def _depth_under(under: GroundUnder, force: float, material: GroundMaterial) -> 
     return float(compression.max(initial=0.0, where=loaded >= material.crust_stress))
 
 
+@sliced
 def contact_loads(
     loads: Sequence[CharacterLoads], terrain: Terrain, cell_size: float, variation: Variation | None = None
-) -> ContactLoads:
+) -> Slices[ContactLoads]:
     """Every contact of the characters.
 
     Parameters
@@ -414,9 +416,13 @@ def contact_loads(
     for number, character in enumerate(loads):
         for index, sole in enumerate(character.motion.soles):
             if sole.sole.prop:
-                poses += _prop_poses(character, index, cells)
+                for pose in _prop_poses(character, index, cells):
+                    poses.append(pose)
+                    yield
             else:
-                soles += _sole_contacts(character, number, index, cells)
+                for contact in _sole_contacts(character, number, index, cells):
+                    soles.append(contact)
+                    yield
     soles.sort(key=lambda contact: -len(contact.force))
     poses.sort(key=lambda pose: -pose[1])
     return ContactLoads(tuple(soles), tuple(poses))

@@ -213,7 +213,8 @@ def _keep(
 ) -> jobs.Job[Analysis]:
     """Work the loads of a shot out and know it from now on."""
     loads = yield from estimate_shot(wanted, shot)
-    contacts = contact_loads(loads, shot.terrain, wanted.cell_size_m, shot.variation)
+    gathering = contact_loads.slices(loads, shot.terrain, wanted.cell_size_m, shot.variation)
+    contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), gathering)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, pressed_area(loads))
     _known[scene.session_uid] = analysis
     _depths.clear()
