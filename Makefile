@@ -39,7 +39,7 @@ gallery: scenes
 test slow marathon: export OPENBLAS_NUM_THREADS := 1
 
 # What measures processor time has the machine to itself; where none of $(TESTS) does, pytest exits with 5.
-QUICK := not slow and not marathon and not gui and not benchmark and not versions
+QUICK := $(shell sed -n "s/^addopts.* -m '\([^']*\)'.*/\1/p" pyproject.toml)
 test: $(READY)
 	$(PYTEST) $(SIDE_BY_SIDE) -m "$(QUICK) and not alone" $(TESTS)
 	$(PYTEST) -m "$(QUICK) and alone" $(TESTS) || [ $$? -eq 5 ]

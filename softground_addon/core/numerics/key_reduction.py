@@ -1,4 +1,10 @@
-"""Which frames of sampled curves need keys, so that straight lines between them stay within a tolerance."""
+"""Which samples of curves are needed, so that straight lines between them stay within a tolerance (Douglas-Peucker).
+
+References
+----------
+Douglas, D., Peucker, T. (1973). Algorithms for the reduction of the number of points required to represent a digitized
+line or its caricature. Cartographica 10(2), 112-122. https://doi.org/10.3138/FM57-6770-U75U-7727
+"""
 
 from __future__ import annotations
 
@@ -6,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
-def kept_samples(values: Array, tolerance: float) -> NDArray[np.intp]:
-    """Samples to keep so that all channels, joined by straight lines, stay within the tolerance (Douglas-Peucker).
+def kept_samples(values: Array, tolerance: float) -> Indices:
+    """Samples to keep so that all channels, joined by straight lines, stay within the tolerance.
 
     Parameters
     ----------
@@ -27,20 +34,59 @@ def kept_samples(values: Array, tolerance: float) -> NDArray[np.intp]:
     >>> kept_samples(np.array([[0.0], [1.0], [2.0], [2.0], [2.0]]), 0.01)
     array([0, 2, 4])
     """
-    count = len(values)
-    keep = np.zeros(count, dtype=bool)
+    keep = np.zeros(len(values), dtype=bool)
     keep[[0, -1]] = True
-    spans = [(0, count - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2:
-            continue
-        part = np.arange(1, last - first)[:, None] / (last - first)
-        line = values[first] + part * (values[last] - values[first])
-        off = np.abs(values[first + 1 : last] - line).max(axis=1)
-        worst = int(off.argmax())
-        if off[worst] > tolerance:
-            middle = first + 1 + worst
-            keep[middle] = True
-            spans += [(first, middle), (middle, last)]
+    bend_lines(np.arange(float(len(values))), values[:, None], keep[:, None], np.full((1, values.shape[1]), tolerance))
     return np.flatnonzero(keep)
+
+
+def bend_lines(frames: Array, values: Array, knot: NDArray[np.bool_], margin: Array) -> Array:
+    """Add knots, each where a line between two knots is farthest from the values, until all lines are near enough.
+
+    Parameters
+    ----------
+    frames : (T,) float array
+        When the samples are.
+    values : (T, K, C) float array
+        C values of K points, which bend at the same knots.
+    knot : (T, K) bool array
+        Where the lines of each point begin and end; gains the knots that are added.
+    margin : (K, C) float array
+        Largest distance from a line.
+
+    Returns
+    -------
+    (K, C) float array
+        The largest distance that is left.
+    """
+    count, points, channels = values.shape
+    # One point after the other, so that what lies between two knots lies together.
+    rows, when = values.transpose(1, 0, 2).reshape(-1, channels), np.tile(frames, points)
+    error = np.zeros((points, channels))
+    at = np.flatnonzero(knot.T)
+    begin, end = _with_samples_between(at[:-1], at[1:], count)
+    while len(begin):
+        inside = end - begin - 1
+        first = np.cumsum(inside) - inside
+        line = np.repeat(np.arange(len(begin)), inside)
+        sample = np.arange(len(line)) - first[line] + begin[line] + 1
+        share = (when[sample] - when[begin][line]) / (when[end] - when[begin])[line]
+        rise = rows[end] - rows[begin]
+        missed = np.abs(rows[begin][line] + share[:, None] * rise[line] - rows[sample])
+        excess = (missed / margin[begin // count][line]).max(axis=1)
+        worst = np.maximum.reduceat(excess, first)
+        fits = worst <= 1.0
+        np.maximum.at(error, begin[fits] // count, np.maximum.reduceat(missed, first)[fits])
+        farthest = np.flatnonzero(excess == worst[line])
+        bend = sample[farthest[np.searchsorted(line[farthest], np.flatnonzero(~fits))]]
+        knot[bend % count, bend // count] = True
+        begin, end = _with_samples_between(
+            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
+        )
+    return error
+
+
+def _with_samples_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
+    """Those of some lines between rows of points, `count` each, that have rows between their ends."""
+    kept = (end - begin > 1) & (begin // count == end // count)
+    return begin[kept], end[kept]

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.key_reduction import bend_lines
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -83,8 +85,8 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     """Stand a few ramps in for vertex_histories that change now and then.
 
     Each movement begins as one straight line through its ends; where the values are farther from it than the tolerance,
-    it is bent to them where they are farthest, and so on [1]_. All values of a point bend at the same frames. Points at
-    rest for `REST` frames are where they were, to half a `QUANTUM`.
+    it is bent to them where they are farthest, and so on (`key_reduction`). All values of a point bend at the same
+    frames. Points at rest for `REST` frames are where they were, to half a `QUANTUM`.
 
     Parameters
     ----------
@@ -99,11 +101,6 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     -------
     Fit
 
-    References
-    ----------
-    .. [1] Douglas, D., Peucker, T. (1973). Algorithms for the reduction of the number of points required to represent
-       a digitized line or its caricature. Cartographica 10(2), 112-122.
-
     Examples
     --------
     A print that is pressed between frames 2 and 4 takes one ramp:
@@ -114,35 +111,11 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     """
     count, points, channels = vertex_histories.shape
     values = np.round(vertex_histories / QUANTUM) * QUANTUM
-    # One point after the other, so that what lies between two knots lies together.
-    knot = _ends_of_movements(values).T.ravel()
-    values = values.transpose(1, 0, 2).reshape(-1, channels)
-    when = np.tile(frames, points)
+    knot = _ends_of_movements(values)
     margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), (points, channels))
-    error = np.zeros((points, channels))
-
-    at = np.flatnonzero(knot)
-    begin, end = _with_frames_between(at[:-1], at[1:], count)
-    while len(begin):
-        inside = end - begin - 1
-        first = np.cumsum(inside) - inside
-        line = np.repeat(np.arange(len(begin)), inside)
-        sample = np.arange(len(line)) - first[line] + begin[line] + 1
-        share = (when[sample] - when[begin][line]) / (when[end] - when[begin])[line]
-        rise = values[end] - values[begin]
-        missed = np.abs(values[begin][line] + share[:, None] * rise[line] - values[sample])
-        excess = (missed / margin[begin // count][line]).max(axis=1)
-        worst = np.maximum.reduceat(excess, first)
-        fits = worst <= 1.0
-        np.maximum.at(error, begin[fits] // count, np.maximum.reduceat(missed, first)[fits])
-        farthest = np.flatnonzero(excess == worst[line])
-        bend = sample[farthest[np.searchsorted(line[farthest], np.flatnonzero(~fits))]]
-        knot[bend] = True
-        begin, end = _with_frames_between(
-            np.concatenate([begin[~fits], bend]), np.concatenate([bend, end[~fits]]), count
-        )
-
-    at = np.flatnonzero(knot)
+    error = bend_lines(frames, values, knot, margin)
+    values, when = values.transpose(1, 0, 2).reshape(-1, channels), np.tile(frames, points)
+    at = np.flatnonzero(knot.T)
     change = np.diff(values[at], axis=0)
     ramp = np.flatnonzero((at[:-1] // count == at[1:] // count) & change.any(axis=1))
     start, stop = at[:-1][ramp], at[1:][ramp]
@@ -159,9 +132,3 @@ def _ends_of_movements(values: Array) -> NDArray[np.bool_]:
     moving[1:-1] = after - before <= REST
     ends: NDArray[np.bool_] = moving[1:] != moving[:-1]
     return ends
-
-
-def _with_frames_between(begin: Indices, end: Indices, count: int) -> tuple[Indices, Indices]:
-    """Those of some lines between rows of points, `count` each, that have rows between their ends."""
-    kept = (end - begin > 1) & (begin // count == end // count)
-    return begin[kept], end[kept]
