@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +16,7 @@ from ..core.ground.presets import Preset
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
-from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SoleSource
+from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SceneUnits, SoleSource
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
@@ -106,6 +107,16 @@ def gravity_of(scene: bpy.types.Scene) -> float:
     return float(scene.gravity.length) if scene.use_gravity and scene.gravity.length > 0 else STANDARD_GRAVITY
 
 
+def units_of(scene: bpy.types.Scene) -> SceneUnits:
+    """What frames and lengths of a scene come to, as they are now."""
+    return SceneUnits(
+        frame_rate=frame_rate_of(scene),
+        time_stretch=time_stretch_of(scene),
+        gravity_m_s2=typed(gravity_of(scene)),
+        unit_scale_m=typed(scene.unit_settings.scale_length),
+    )
+
+
 PERFORMANCE = ("knee_lift", "hold", "crouch", "arms")
 """What can be acted in deep ground, as the settings and the core call it."""
 
@@ -134,10 +145,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         cell_size_m=typed(options.cell_size),
         frames=(options.frame_start, options.frame_end),
-        frame_rate=frame_rate_of(scene),
-        time_stretch=time_stretch_of(scene),
-        gravity_m_s2=typed(gravity_of(scene)),
-        unit_scale_m=typed(scene.unit_settings.scale_length),
+        **asdict(units_of(scene)),
         response=_response(options, grounded=grounded),
         output=options.output,
         detail=options.detail,

@@ -111,7 +111,26 @@ class ResponseOptions:
 
 
 @dataclass(frozen=True)
-class BakeSettings:
+class SceneUnits:
+    """What frames and lengths of a scene come to.
+
+    Attributes
+    ----------
+    frame_rate : float
+        Scene frames per second [Hz].
+    time_stretch : float
+        Frames of the animation per frame of the scene.
+    gravity_m_s2, unit_scale_m : float
+    """
+
+    frame_rate: float
+    time_stretch: float
+    gravity_m_s2: float
+    unit_scale_m: float
+
+
+@dataclass(frozen=True)
+class BakeSettings(SceneUnits):
     """Everything that a bake depends on, beside the objects themselves.
 
     Attributes
@@ -130,11 +149,6 @@ class BakeSettings:
     cell_size_m : float
     frames : (int, int)
         First and last of the scene.
-    frame_rate : float
-        Scene frames per second [Hz].
-    time_stretch : float
-        Frames of the animation per frame of the scene.
-    gravity_m_s2, unit_scale_m : float
     response : ResponseOptions or None
     output : 'BOTH', 'PRINTS' or 'RESPONSE'
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
@@ -154,10 +168,6 @@ class BakeSettings:
     painted: tuple[str, str, str]
     cell_size_m: float = field(metadata=_on(Acts.PRESSING))
     frames: tuple[int, int]
-    frame_rate: float
-    time_stretch: float
-    gravity_m_s2: float
-    unit_scale_m: float
     response: ResponseOptions | None = field(metadata=_on(Acts.RESPONDING))
     output: str = field(metadata=_on(Acts.OUTPUT))
     detail: str = field(metadata=_on(Acts.WRITING))

@@ -24,7 +24,6 @@ from ...core.soles.foot_attitude import (
     standing_up,
 )
 from ...core.soles.soles import PlacedSole, prop_sole
-from ..settings import frame_rate_of, gravity_of
 from .recording import Recording
 from .rig_at_rest import RestPose
 from .rig_mapping import RigMapping, SoleSource
@@ -74,7 +73,7 @@ def assemble_motion(
         If a mesh that should print has no underside.
     """
     rest = RestPose.of(armature, mapping, recording.armature)
-    frame_rate, gravity = frame_rate_of(scene), gravity_of(scene)
+    frame_rate, gravity = recording.units.frame_rate, recording.units.gravity_m_s2
     leg = rest.leg_length(mapping)
     if not rest.is_upright:
         stances = None  # where the whole rig is tilted, what its feet stand on is tilted with it

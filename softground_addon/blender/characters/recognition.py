@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ...core.numerics.rigid import unit
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
-from ..settings import found, frame_rate_of, name_of, time_stretch_of
+from ..settings import found, name_of, units_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource, map_rig
 from .rig_sampling import is_animated, record
@@ -92,11 +92,12 @@ def _contacts_of_skin(
     armature = found(rig)
     if skin is None or armature.mode == "EDIT" or armature.data.pose_position == "REST":
         return ()
-    first, last = (round(frame / time_stretch_of(scene)) for frame in frames)
+    units = units_of(scene)
+    first, last = (round(frame / units.time_stretch) for frame in frames)
     samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record(scene, armature, samples, skin.bones)
+    reading = record(scene, armature, samples, skin.bones, units)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    following = followed_skin.slices(skin, found(rig), recording, frame_rate_of(scene), linked=True)
+    following = followed_skin.slices(skin, found(rig), recording, units.frame_rate, linked=True)
     followed = yield from jobs.meanwhile(read, following)
     if followed is None:
         return ()

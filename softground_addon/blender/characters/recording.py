@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.motion.motion import Array
+from ...core.settings import SceneUnits
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,8 @@ class Recording:
         Of the armature [Blender units].
     things : mapping of str to (F, 4, 4) float array
         World matrices of the objects by their names [m].
-    metre : float
-        Blender unit [m].
+    units : SceneUnits
+        What frames and Blender units come to.
     """
 
     frames: Array
@@ -35,7 +36,7 @@ class Recording:
     poses: NDArray[np.float32]
     world: Array
     things: Mapping[str, Array]
-    metre: float
+    units: SceneUnits
 
     @property
     def armature(self) -> Array:
@@ -50,8 +51,8 @@ class Recording:
     def of(self, samples: NDArray[np.intp]) -> Recording:
         """Some of the samples."""
         things = {name: matrices[samples] for name, matrices in self.things.items()}
-        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], things, self.metre)
+        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], things, self.units)
 
     def _in_metres(self, matrices: Array) -> Array:
-        matrices[..., :3, :] *= self.metre
+        matrices[..., :3, :] *= self.units.unit_scale_m
         return matrices

@@ -16,10 +16,11 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
+from ...core.settings import SceneUnits
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
 from ..jobs import meanwhile
-from ..settings import found, frame_rate_of, gravity_of, name_of, time_stretch_of
+from ..settings import found, name_of, units_of
 from .control_poses import PoseRecorder
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .motion_assembly import assemble_motion
@@ -60,13 +61,14 @@ def sample_character(
     mass: float,
     frames: range,
     recorder: PoseRecorder | None = None,
+    units: SceneUnits | None = None,
 ) -> Sampling:
     """Read a character frame by frame.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        The user's scene: frame rate, units, gravity and meshes; only read.
+        The user's scene: its meshes; only read.
     armature : bpy.types.Object
         May be linked or overridden.
     mapping : RigMapping
@@ -77,6 +79,8 @@ def sample_character(
         Scene frames.
     recorder : PoseRecorder, optional
         Takes down how its bones stand.
+    units : SceneUnits, optional
+        Those of the bake that it is read for; as they are now in the scene where it is read for itself.
 
     Yields
     ------
@@ -102,7 +106,9 @@ def sample_character(
     if on_bones and len(frames) <= LONGEST and meshes_on(scene, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene, armature))
         armature = found(rig)
-    recording = yield from record(scene, armature, frames, [*bones, *(skin.bones if skin else ())], things, recorder)
+    units = units or units_of(scene)
+    bones += skin.bones if skin else ()
+    recording = yield from record(scene, armature, frames, bones, units, things, recorder)
     armature = found(rig)
     _check_recording(armature.name, recording)
     carried = {
@@ -110,7 +116,7 @@ def sample_character(
         for source in mapping.soles
         if source.object
     }
-    rate = frame_rate_of(scene) / frames.step
+    rate = units.frame_rate / frames.step
     stances = None
     if skin:
         stances = yield from meanwhile(len(frames), skin_stances(skin, armature, mapping, recording, rate))
@@ -125,6 +131,7 @@ def record(
     armature: bpy.types.Object,
     frames: range,
     bones: Iterable[str],
+    units: SceneUnits,
     things: Sequence[str] = (),
     recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
@@ -133,8 +140,8 @@ def record(
     with without_layer(armature):
         keyed = not things and is_moved_by_keys_alone(armature, names)
     if keyed:
-        return (yield from _read_keys(scene, armature.name_full, frames, names, recorder))
-    return (yield from _evaluate(scene, armature.name_full, frames, names, things, recorder))
+        return (yield from _read_keys(armature.name_full, frames, names, units, recorder))
+    return (yield from _evaluate(scene, armature.name_full, frames, names, units, things, recorder))
 
 
 def sample_thing(
@@ -144,6 +151,7 @@ def sample_thing(
     *,
     mass: float,
     frames: range,
+    units: SceneUnits,
 ) -> Sampling:
     """Read frame by frame a thing without a rig: one or more objects that fall, roll or slide together.
 
@@ -153,7 +161,7 @@ def sample_thing(
         What the user calls it.
     mapping : RigMapping
         Its soles are objects.
-    scene, mass, frames
+    scene, mass, frames, units
         As for `sample_character`; and so is what it yields, returns and raises.
     """
     _check_mass(name, mass)
@@ -161,7 +169,7 @@ def sample_thing(
     check_things(scene, name, sources)
     _check_frames(frames)
     things = list(dict.fromkeys(source.object for source in sources))
-    recording = yield from _evaluate(scene, "", frames, [], things)
+    recording = yield from _evaluate(scene, "", frames, [], units, things)
     _check_finite(name, recording)
     parts = [prop_motion(scene, source, recording.things[source.object]) for source in sources]
     volumes = np.array([volume for _, volume in parts])
@@ -172,9 +180,9 @@ def sample_thing(
         mass=mass,
         leg_length=max(motion.sole.prop.size for motion in motions if motion.sole.prop),
         frames=recording.frames,
-        frame_rate=frame_rate_of(scene),
+        frame_rate=units.frame_rate,
         soles=motions,
-        gravity=gravity_of(scene),
+        gravity=units.gravity_m_s2,
         centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
     )
 
@@ -184,13 +192,13 @@ def _bones(source: SoleSource) -> list[str]:
 
 
 def _read_keys(
-    scene: bpy.types.Scene, armature: str, frames: range, bones: Sequence[str], recorder: PoseRecorder | None
+    armature: str, frames: range, bones: Sequence[str], units: SceneUnits, recorder: PoseRecorder | None
 ) -> Generator[int, None, Recording]:
     """Record the matrices of a rig that nothing but its keys moves, bone by bone.
 
     Yields the frames that come to as much work.
     """
-    times = np.array(frames) * time_stretch_of(scene)
+    times = np.array(frames) * units.time_stretch
     chain = with_parents(object_named(armature), bones)
     poses = np.empty((len(frames), len(chain), 4, 4), dtype=np.float32)
     for done, name in enumerate(chain):
@@ -213,7 +221,7 @@ def _read_keys(
         poses=poses,
         world=world,
         things={},
-        metre=scene.unit_settings.scale_length,
+        units=units,
     )
 
 
@@ -222,6 +230,7 @@ def _evaluate(
     armature: str,
     frames: range,
     bones: Sequence[str],
+    units: SceneUnits,
     things: Sequence[str],
     recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
@@ -258,15 +267,14 @@ def _evaluate(
             yield done + 1
     yield len(frames)
 
-    metre = scene.unit_settings.scale_length
-    thing_matrices[..., :3, :] *= metre
+    thing_matrices[..., :3, :] *= units.unit_scale_m
     return Recording(
         frames=np.array(frames, dtype=float),
         bones=tuple(bones),
         poses=poses,
         world=armature_matrices,
         things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
-        metre=metre,
+        units=units,
     )
 
 

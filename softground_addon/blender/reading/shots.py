@@ -215,9 +215,11 @@ def sample_characters(
             if wanted.response:
                 controls = controls_of(scene, armature, mapping)
                 recorder = PoseRecorder([control.bone for control in controls], len(frames))
-            job = sample_character(scene, armature, mapping, mass=one.mass_kg, frames=frames, recorder=recorder)
+            job = sample_character(
+                scene, armature, mapping, mass=one.mass_kg, frames=frames, recorder=recorder, units=wanted
+            )
         else:
-            job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames)
+            job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted)
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
         if recorder:
             rigs.append(ReadRig(controls, recorder.poses()))
