@@ -9,6 +9,7 @@ import bpy
 
 from . import handlers, properties, session
 from .command_line import cli
+from .ground import look
 from .interface import (
     bake_result,
     character_editing,
@@ -24,6 +25,7 @@ from .interface import (
 )
 from .live import live
 from .output import export_formats, force_curves
+from .properties.material import look_followers
 
 _SETTINGS: tuple[tuple[Any, type], ...] = (
     (bpy.types.Scene, properties.SoftGroundSettings),
@@ -65,6 +67,8 @@ def register() -> None:
         for part in (handlers, overlay, menus):
             part.register()
             undo.callback(part.unregister)
+        look_followers.append(look.follow)
+        undo.callback(look_followers.clear)
         undo.callback(prediction.unregister)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)

@@ -262,6 +262,15 @@ def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
     )
 
 
+def holds(scene: bpy.types.Scene, preset: Preset) -> bool:
+    """Whether the scene's ground is as a preset says."""
+    for group, field, value in _of_preset(scene, preset):
+        now = getattr(group, field)
+        if not (abs(now - value) <= 1e-6 * abs(value) if isinstance(value, float) else now == value):
+            return False
+    return True
+
+
 def take_defaults(scene: bpy.types.Scene) -> None:
     """Set what the user has not set of the ground to the default preset, and the cells to fit the soles.
 

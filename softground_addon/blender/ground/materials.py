@@ -22,6 +22,9 @@ TREAD_PITCH = 0.017
 MARK = "softground_surface"
 """Custom property of the add-on's own materials, with the surface that they show: no other material is touched."""
 
+OVER = "softground_over"
+"""Custom property of the add-on's copies of the user's materials, with the material that they are of."""
+
 BLEND = "surface_blend"
 """Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
@@ -201,6 +204,40 @@ def ensure_blend(surface: str, other: str) -> bpy.types.Material:
 
     name = " to ".join(one.replace("_", " ").title() for one in (surface, other))
     return _material(f"{surface} {other}", name, (surface, other), build)
+
+
+def ensure_over(theirs: bpy.types.Material, surface: str) -> bpy.types.Material:
+    """A copy of a material of the user's that shows a surface where prints are, and on their rims.
+
+    Raises
+    ------
+    InputError
+        If there is no such surface.
+    """
+    mark = f"{surface} over"
+    look = _looks(surface)[0]
+    for material in bpy.data.materials:
+        if material.get(MARK) == mark and material.get(OVER) == theirs and material.library is None:
+            return material
+    material = theirs.copy()
+    material.name, material[MARK], material[OVER] = f"{theirs.name} with {surface.title()} Prints", mark, theirs
+    if material.node_tree is None or not material.use_nodes:
+        material.use_nodes = True
+    tree = cast("bpy.types.NodeTree", material.node_tree)
+    output: Any = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
+    graph = Graph(tree)
+    ground = _ground(graph)
+    shader, height = _shaded(graph, look(graph, ground))
+    share = graph.math("MAXIMUM", ground.pressed, ground.risen)
+    mixed = graph.node("ShaderNodeMixShader", {0: share, 2: shader})
+    relief = graph.node("ShaderNodeDisplacement", {"Height": height * share, "Midlevel": 0.0, "Scale": 1.0})
+    both = graph.node("ShaderNodeVectorMath", {0: graph.out(relief)}, operation="ADD")
+    for name, ours in (("Surface", mixed), ("Displacement", both)):
+        into = output.inputs[name]
+        for link in list(into.links):
+            tree.links.new(link.from_socket, ours.inputs[1])
+        tree.links.new(ours.outputs[0], into)
+    return material
 
 
 def _looks(surface: str) -> tuple[Callable[[Graph, Ground], Look], Colour]:

@@ -22,6 +22,7 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         layout.operator("softground.live", icon="PLAY")
         layout.operator("softground.clear_bake", icon="TRASH")
+        layout.operator("softground.apply_look", icon="MATERIAL")
         layout.separator()
         layout.operator("softground.overlay", icon="HIDE_OFF")
         layout.operator("softground.predict_depth", icon="DRIVER_DISTANCE")

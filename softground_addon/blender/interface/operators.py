@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from .. import jobs, session, settings
 from ..characters import character_setup, recognition
 from ..command_line import program
-from ..ground import baked_ground, ground_checks, ground_mesh
+from ..ground import baked_ground, ground_checks, ground_mesh, look
 from ..ground.created_ground import create_ground
 from ..operator_base import reports_errors
 from ..reading import analysis, shots
@@ -138,9 +138,37 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
         scene = settings.scene_of(context)
         ground = scene.softground.ground
         with analysis.own_changes(scene):
-            if ground is not None and baked_ground.has_remains(ground):
-                baked_ground.clear(ground)
+            if ground is not None:
+                if baked_ground.has_remains(ground):
+                    baked_ground.clear(ground)
+                look.take_off(ground)
             response_job.remove_layers(scene)
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_apply_look(bpy.types.Operator):
+    """Show the preset's look on the ground: over your own materials where prints are, by copies of them. Clear Bake
+    takes it off again"""
+
+    bl_idname = "softground.apply_look"
+    bl_label = "Apply Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is a ground."""
+        cls.poll_message_set("Choose a ground, or bake one, first")
+        return settings.exists(settings.scene_of(context).softground.ground)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        options = settings.scene_of(context).softground
+        ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
+        mixed = look.apply(options.ground, options.material.surface)
+        theirs = f" over {mixed} of your materials" if mixed else ""
+        self.report(
+            {"INFO"}, f"'{options.ground.name}' looks like {options.material.surface.replace('_', ' ')}{theirs}"
+        )
         return {"FINISHED"}
 
 
@@ -191,5 +219,6 @@ CLASSES = (
     SOFTGROUND_OT_add_character,
     SOFTGROUND_OT_create_ground,
     SOFTGROUND_OT_clear_bake,
+    SOFTGROUND_OT_apply_look,
     SOFTGROUND_OT_copy_bake_command,
 )

@@ -11,7 +11,7 @@ from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
-from . import bake_result, prediction
+from . import bake_result, prediction, preset_menu
 from .character_editing import active_character, active_sole
 from .panel_base import SidebarPanel
 
@@ -196,7 +196,7 @@ class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
         scene = settings.scene_of(context)
         material = scene.softground.material
         row = layout.row(align=True)
-        row.menu("SOFTGROUND_MT_presets", text=material.preset or "Presets", translate=False)
+        row.menu("SOFTGROUND_MT_presets", text=preset_menu.title_of_ground(scene) or "Presets", translate=False)
         row.operator("softground.save_preset", text="", icon="ADD")
         row.operator("softground.remove_preset", text="", icon="REMOVE")
         column = layout.column()
@@ -231,6 +231,7 @@ class SOFTGROUND_PT_material_details(SidebarPanel, bpy.types.Panel):
         for field in ("layer_depth_cm", "rim_reach_cm", "blur_sigma_cm"):
             column.prop(material, field)
         column.prop(material, "surface")
+        column.operator("softground.apply_look", icon="MATERIAL")
 
 
 class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):

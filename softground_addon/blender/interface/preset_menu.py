@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,28 @@ def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
         except InputError as error:
             broken.append(str(error))
     return sorted(found, key=lambda entry: entry[1].name.casefold()), broken
+
+
+_read: dict[Path, tuple[int, presets.Preset]] = {}
+"""Preset files that were read, each with the time at which it was written [ns]: a panel asks at each drawing."""
+
+
+def title_of_ground(scene: bpy.types.Scene) -> str:
+    """The name of the preset that was loaded last, and whether the ground is still as it says."""
+    name = scene.softground.material.preset
+    preset = _last_read(name)
+    return f"{name} (modified)" if preset and not settings.holds(scene, preset) else name
+
+
+def _last_read(name: str) -> presets.Preset | None:
+    """The preset of that name; None where there is none any more."""
+    for path in (presets.FOLDER / _file_name(name), _file_for(name)):
+        with suppress(OSError, InputError):
+            written = path.stat().st_mtime_ns
+            if path not in _read or _read[path][0] != written:
+                _read[path] = written, presets.load(path)
+            return _read[path][1]
+    return None
 
 
 class SOFTGROUND_MT_presets(bpy.types.Menu):
@@ -133,6 +156,11 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
 def _file_for(name: str) -> Path:
     """File in which the user's preset of that name is kept."""
     return user_folder() / f"{bpy.path.clean_name(name).casefold()}.json"
+
+
+def _file_name(name: str) -> str:
+    """Name of the file in which a preset comes with the add-on: `Fresh Snow (field)` in `fresh_snow.json`."""
+    return name.partition(" (")[0].casefold().replace(" ", "_") + ".json"
 
 
 class SOFTGROUND_OT_predict_depth(OnShot, bpy.types.Operator):

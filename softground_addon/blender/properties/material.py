@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, cast
 
 import bpy
@@ -31,13 +32,23 @@ _CRUST = (
 _FIRM_BELOW = "Depth of compression below which the ground is ten times stiffer. 0 is loose all through"
 
 
+look_followers: list[Callable[[bpy.types.Scene], None]] = []
+"""What is told when the look of a scene's ground is another: by what knows the ground."""
+
+
+def _look_changed(material: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    for follow in look_followers:
+        follow(cast("bpy.types.Scene", material.id_data))
+
+
 class SoftGroundMaterial(bpy.types.PropertyGroup):
     """The ground's physics; see `core.ground.material.GroundMaterial`."""
 
     preset: StringProperty(name="Preset", description="Preset that was loaded last", default="Snow")
     surface: EnumProperty(
         name="Look",
-        description="Render material that a created ground gets",
+        description="Render material of the ground. It replaces what SoftGround made itself, never a material of yours",
+        update=_look_changed,
         items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
         default="snow",
     )

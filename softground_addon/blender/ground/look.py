@@ -1,0 +1,79 @@
+"""The look of a ground follows its preset: what the add-on made changes with it, the user's own only when asked.
+
+What is mixed over a material of the user's is a copy of it, which knows whose it is; the material itself stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+from ...core.ground.presets import SURFACES
+from .baked_ground import display_mesh_of
+from .materials import MARK, OVER, ensure_material, ensure_over
+
+
+def follow(scene: bpy.types.Scene) -> None:
+    """Show the scene's surface on its ground wherever the add-on's own material is."""
+    ground = scene.softground.ground
+    for thing in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
+        _show(thing, scene.softground.material.surface, over_theirs=False)
+
+
+def apply(ground: bpy.types.Object, surface: str) -> int:
+    """Show a surface on a ground, over the user's materials by where its prints are.
+
+    Returns
+    -------
+    int
+        Number of the user's materials that it is mixed over.
+    """
+    thing = display_mesh_of(ground)
+    if not thing.material_slots:
+        thing.data.materials.append(ensure_material(surface))
+    _show(thing, surface, over_theirs=True)
+    return sum(slot.material is not None and OVER in slot.material.keys() for slot in thing.material_slots)
+
+
+def take_off(thing: bpy.types.Object) -> None:
+    """Give an object the user's materials back, over which the add-on's were mixed."""
+    for slot in _writable_slots(thing):
+        if (mixed := slot.material) and (theirs := mixed.get(OVER)):
+            _replace(slot, theirs)
+
+
+def is_theirs(ground: bpy.types.Object) -> bool:
+    """Whether a ground shows a material of the user's, or none."""
+    slots = display_mesh_of(ground).material_slots
+    return not slots or any(slot.material is None or slot.material.get(MARK) is None for slot in slots)
+
+
+def _show(thing: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
+    for slot in _writable_slots(thing):
+        now = slot.material
+        if now is None:
+            if over_theirs:
+                slot.material = ensure_material(surface)
+        elif theirs := now.get(OVER):
+            _replace(slot, ensure_over(theirs, surface))
+        elif now.get(MARK) in SURFACES:
+            slot.material = ensure_material(surface)
+        elif over_theirs and now.get(MARK) is None:
+            slot.material = ensure_over(now, surface)
+
+
+def _writable_slots(thing: bpy.types.Object) -> Iterator[Any]:
+    for slot in thing.material_slots:
+        owner = thing if slot.link == "OBJECT" else thing.data
+        if owner.library is None:
+            yield slot
+
+
+def _replace(slot: Any, material: bpy.types.Material) -> None:
+    """Put another material in place of a mixed one, which goes where nothing else shows it."""
+    mixed = slot.material
+    slot.material = material
+    if mixed != material and not mixed.users:
+        bpy.data.materials.remove(mixed)
