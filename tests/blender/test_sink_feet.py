@@ -6,6 +6,7 @@ import pytest
 from softground_addon.blender import jobs
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking import bake_report, sink_feet
+from softground_addon.blender.reading import analysis
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 
@@ -79,3 +80,15 @@ def test_sinking_needs_no_ground_that_is_baked(scene):
     jobs.run(sink_feet.sink_feet(scene))
     assert nla_layer.has_layer(scene.softground.characters[0].armature)
     assert scene.softground.ground is None
+
+
+def test_a_shot_with_sunk_feet_stays_known_once_it_was_read_also_in_a_file_that_was_opened(baked, tmp_path):
+    """Reading switches the response layer off and on again: that is no edit."""
+    bpy.ops.softground.sink_feet()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "sunk.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "sunk.blend"))
+    scene = bpy.context.scene
+    depth = analysis.read(scene) and analysis.expected_depth(scene)
+    bpy.context.view_layer.update()
+    assert analysis.known(scene)
+    assert analysis.expected_depth(scene) == depth

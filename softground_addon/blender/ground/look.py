@@ -34,7 +34,7 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     if not thing.material_slots:
         thing.data.materials.append(ensure_material(surface))
     _show(thing, surface, over_theirs=True)
-    return sum(slot.material is not None and OVER in slot.material.keys() for slot in thing.material_slots)
+    return sum(slot.material is not None and slot.material.get(OVER) is not None for slot in thing.material_slots)
 
 
 def take_off(thing: bpy.types.Object) -> None:
@@ -42,12 +42,6 @@ def take_off(thing: bpy.types.Object) -> None:
     for slot in _writable_slots(thing):
         if (mixed := slot.material) and (theirs := mixed.get(OVER)):
             _replace(slot, theirs)
-
-
-def is_theirs(ground: bpy.types.Object) -> bool:
-    """Whether a ground shows a material of the user's, or none."""
-    slots = display_mesh_of(ground).material_slots
-    return not slots or any(slot.material is None or slot.material.get(MARK) is None for slot in slots)
 
 
 def _show(thing: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:

@@ -132,6 +132,8 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
         shot = yield from read_shot(scene, replace(wanted, response=None))
         source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
         analysis = yield from _keep(scene, wanted, shot, (source,), hashes)
+        _tell_of_changes(scene)  # response layers were switched off and on again, which is no edit
+        _known[scene.session_uid] = analysis
     return analysis
 
 
