@@ -127,7 +127,7 @@ def test_another_display_blur_changes_no_record_and_presses_nothing_anew(loads, 
 def test_what_is_laid_out_twice_is_counted_once(loads, bodies):
     """A stiffness that changes by a millionth back and forth has every step laid out anew, and the same record."""
     if bodies == "wheel":
-        loads = rolling(30.0)
+        loads = rolling(30.0, seconds=0.7)
     frames = np.unique(np.floor(loads.motion.frames))
     playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     for number, frame in enumerate(frames):

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.playback.keyframe_tables import NO_VISIT
+from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
 from ..settings import find, found, name_of
@@ -149,11 +149,11 @@ def _write_attributes(mesh: bpy.types.Mesh, vertex: Indices, spans: Spans) -> No
     """Store of which vertices (P,) the spans are."""
     for name, kind, values, elsewhere in (
         (nodes.MOVED, "BOOLEAN", True, False),
-        (nodes.START, "FLOAT", spans.start, -NO_VISIT),
-        (nodes.END, "FLOAT", spans.end, -NO_VISIT),
+        (nodes.START, "FLOAT", spans.start, -NO_CONTACT),
+        (nodes.END, "FLOAT", spans.end, -NO_CONTACT),
         (nodes.SPLINE, "INT", spans.curve, 0),
         (nodes.OFFSET, "FLOAT", spans.offset, 0.0),
-        (nodes.LAST_CONTACT, "FLOAT", spans.last_contact, NO_VISIT),
+        (nodes.LAST_CONTACT, "FLOAT", spans.last_contact, NO_CONTACT),
         # What is there is overwritten faster than made.
         (nodes.PRESSURE, "FLOAT", 0.0, 0.0),
         *([(nodes.LAST_HEIGHT, "FLOAT", spans.last_height, 0.0)] if mesh.shape_keys else []),

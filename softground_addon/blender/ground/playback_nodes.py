@@ -13,7 +13,7 @@ from typing import Any
 
 import bpy
 
-from ...core.playback.keyframe_tables import NO_VISIT
+from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
 
@@ -92,7 +92,7 @@ def build(
     shaded = graph.store(geometry, AGE, aged, graph.compare("LESS_EQUAL", last, frame))
     rim = graph.math("MAXIMUM", graph.math("ADD", height, compression), 0.0)
     contact = keyframe_tables.contact()
-    untouched = graph.compare("LESS_THAN", contact, -NO_VISIT / 2)
+    untouched = graph.compare("LESS_THAN", contact, -NO_CONTACT / 2)
     if few:
         untouched = graph.either(waiting, untouched)
     age = graph.choose("FLOAT", untouched, graph.math("MAXIMUM", graph.math("MULTIPLY", contact, -1.0), 0.0), NEVER)

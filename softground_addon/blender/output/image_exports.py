@@ -93,10 +93,10 @@ def export_images(
 
 
 def _age(over_time: VertexHistories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
-    visits = over_time.visits
+    contacts = over_time.contacts
     latest = np.full(points, -np.inf)
-    begun = visits.start <= frame
-    np.maximum.at(latest, visits.point[begun], np.minimum(visits.end[begun], frame))
+    begun = contacts.start <= frame
+    np.maximum.at(latest, contacts.point[begun], np.minimum(contacts.end[begun], frame))
     return np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
 
 

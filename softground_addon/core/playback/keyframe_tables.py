@@ -1,6 +1,6 @@
 """All that happens to each place of the ground in one table: its rows are in the order of time.
 
-Ramps and visits of a place overlap, and how many there are depends on how often it is stepped on. Put together they
+Ramps and contacts of a place overlap, and how many there are depends on how often it is stepped on. Put together they
 are a curve per place: what it is like at a time lies between two rows.
 """
 
@@ -17,8 +17,8 @@ from .vertex_histories import VertexHistories
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-NO_VISIT = 1e9
-"""Frame of visits that never come."""
+NO_CONTACT = 1e9
+"""Frame of contacts that never come."""
 
 
 @dataclass(frozen=True)
@@ -37,17 +37,17 @@ class KeyframeTables:
         Ascending within each place.
     movement : (R, 2) float array
         Change of the displayed height, and displayed compression [m].
-    visit_start, visit_end, pressure : (R,) float arrays
+    contact_start, contact_end, pressure : (R,) float arrays
         Frames between which the latest contact that has begun at the row lasts, and its pressure [Pa];
-        `NO_VISIT` where there was none.
+        `NO_CONTACT` where there was none.
     """
 
     point: Indices
     first: Indices
     frame: Array
     movement: Array
-    visit_start: Array
-    visit_end: Array
+    contact_start: Array
+    contact_end: Array
     pressure: Array
 
 
@@ -60,27 +60,27 @@ def keyframe_tables(over_time: VertexHistories) -> KeyframeTables:
     --------
     Two overlapping ramps of one place make four rows:
 
-    >>> from softground_addon.core.playback.vertex_histories import Visits
+    >>> from softground_addon.core.playback.vertex_histories import PointContacts
     >>> sinks = np.array([[-0.5, 0.5], [-0.25, 0.25]])
     >>> ramps = Ramps(np.array([7, 7]), np.array([2.0, 3.0]), np.array([4.0, 5.0]), sinks)
-    >>> nobody = Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
+    >>> nobody = PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
     >>> table = keyframe_tables(VertexHistories(ramps, nobody, 0.0))
     >>> table.point, table.frame, table.movement[:, 0]
     (array([7]), array([2., 3., 4., 5.]), array([ 0.   , -0.25 , -0.625, -0.75 ]))
     """
-    ramps, visits = over_time.movement, over_time.visits
-    point = np.concatenate([ramps.point, ramps.point, visits.point, visits.point])
-    frame = np.concatenate([ramps.start, ramps.end, visits.start, visits.end])
+    ramps, contacts = over_time.movement, over_time.contacts
+    point = np.concatenate([ramps.point, ramps.point, contacts.point, contacts.point])
+    frame = np.concatenate([ramps.start, ramps.end, contacts.start, contacts.end])
     order = np.lexsort((frame, point))
     new = np.ones(len(order), dtype=bool)
     new[1:] = (np.diff(point[order]) != 0) | (np.diff(frame[order]) != 0)
     row = np.empty(len(order), dtype=np.intp)
     row[order] = np.cumsum(new) - 1
     point, frame = point[order][new], frame[order][new]
-    begin, end, touch = np.split(row, np.cumsum([len(ramps.point)] * 2 + [len(visits.point)]))[:3]
+    begin, end, touch = np.split(row, np.cumsum([len(ramps.point)] * 2 + [len(contacts.point)]))[:3]
     places, first = np.unique(point, return_index=True)
     first = np.append(first, len(point))
-    contact = _latest(visits.start, visits.end, visits.pressure, touch, first)
+    contact = _latest(contacts.start, contacts.end, contacts.pressure, touch, first)
     return KeyframeTables(places, first, frame, _curve(ramps, begin, end, frame, first), *contact)
 
 
@@ -100,7 +100,7 @@ def _curve(ramps: Ramps, start: Indices, end: Indices, frame: Array, first: Indi
 
 
 def _latest(start: Array, end: Array, pressure: Array, row: Indices, first: Indices) -> tuple[Array, Array, Array]:
-    """Start, end and pressure of the visit that has begun last at each row; visits begin at given rows, in order."""
+    """Start, end and pressure of the contact that began last at each row; contacts begin at given rows, in order."""
     rows = int(first[-1])
     number = np.full(rows, -1)
     number[row] = np.arange(len(row))
@@ -112,7 +112,7 @@ def _latest(start: Array, end: Array, pressure: Array, row: Indices, first: Indi
     ends = np.unique(end)
     rank = np.searchsorted(ends, end) + place[row] * len(ends)
     latest = ends[np.maximum.accumulate(rank) - place[row] * len(ends)]
-    result = np.full((3, rows), NO_VISIT)
+    result = np.full((3, rows), NO_CONTACT)
     result[2] = 0.0
     result[:, known] = np.stack([start, latest, pressure])[:, number[known]]
     return result[0], result[1], result[2]

@@ -19,7 +19,7 @@ from ..ground.heightfield import SparseGrid
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
-from .keyframe_tables import NO_VISIT, KeyframeTables, keyframe_tables
+from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
 from .vertex_histories import VertexHistories, vertex_histories
 
@@ -40,7 +40,7 @@ LENGTH = 512.0
 TICK = 2.0**-14
 """Of the time along a curve [frames]."""
 
-VISITS_AT_ONCE = 5_000
+CONTACTS_AT_ONCE = 5_000
 """Footprints' cells over places whose vertex_histories are worked out together: some ten megabytes."""
 
 PART = 1.0
@@ -59,7 +59,7 @@ class PlaybackCurves:
         Time along the curve [frames]; change of the displayed height, and displayed compression [m], both times
         `NARROW`.
     contact : (R,) packed float32 array
-        While a contact lasts its pressure [Pa], after it minus the time since [s], before the first -`NO_VISIT`.
+        While a contact lasts its pressure [Pa], after it minus the time since [s], before the first -`NO_CONTACT`.
     """
 
     size: Indices
@@ -85,7 +85,7 @@ class Spans:
     last_height : (P,) float32 array
         Change of the displayed height at the last frame [m].
     last_contact : (P,) float32 array
-        Last frame of the last contact; `keyframe_tables.NO_VISIT` where there was none.
+        Last frame of the last contact; `keyframe_tables.NO_CONTACT` where there was none.
     frame_rate : float
         Frames per second [Hz].
     error : float
@@ -157,11 +157,11 @@ def playback_curves_at(
 def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]:
     """Places (K,) in parts that lie together, of which each takes about as much to work out."""
     order = np.lexsort((np.floor(x / PART), np.floor(y / PART)))
-    visits = SparseGrid(footprints[0].cell_size if footprints else PART, channels=1)
+    contacts = SparseGrid(footprints[0].cell_size if footprints else PART, channels=1)
     for footprint in footprints:
-        visits.write(footprint.window, visits.read(footprint.window) + 1)
-    so_far = np.cumsum(visits.nearest(x[order], y[order])[0])
-    return np.split(order, np.flatnonzero(np.diff(so_far // VISITS_AT_ONCE)) + 1)
+        contacts.write(footprint.window, contacts.read(footprint.window) + 1)
+    so_far = np.cumsum(contacts.nearest(x[order], y[order])[0])
+    return np.split(order, np.flatnonzero(np.diff(so_far // CONTACTS_AT_ONCE)) + 1)
 
 
 def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, PlaybackCurves]:
@@ -171,17 +171,17 @@ def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, Playba
     --------
     A contact from frame 2 to 12 on ground that does not move:
 
-    >>> from softground_addon.core.playback.vertex_histories import Visits
+    >>> from softground_addon.core.playback.vertex_histories import PointContacts
     >>> from softground_addon.core.playback.ramps import Ramps
-    >>> visits = Visits(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
-    >>> spans, lines = curves(VertexHistories(Ramps.joined([], 2), visits, 0.0), 24.0)
+    >>> contacts = PointContacts(np.array([7]), np.array([2.0]), np.array([12.0]), np.array([5e4]))
+    >>> spans, lines = curves(VertexHistories(Ramps.joined([], 2), contacts, 0.0), 24.0)
     >>> spans.start.tolist(), lines.position.unpacked()[:, 0].tolist(), lines.contact.unpacked().tolist()
     ([2.0], [0.0, 2.0, 8.0, 10.0], [0.0, 50000.0, 50000.0, 0.0])
     """
     table = keyframe_tables(over_time)
     place = np.repeat(np.arange(len(table.point)), np.diff(table.first))
     row, frame = _with_turns(table, place)
-    jump = np.flatnonzero(table.frame == table.visit_start)
+    jump = np.flatnonzero(table.frame == table.contact_start)
     jump = jump[np.isin(jump, table.first, invert=True)]
     # A point on either side of each jump: that before belongs to the contact of the row before.
     rows = np.concatenate([jump - 1, row])
@@ -203,7 +203,7 @@ def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, Playba
         curve=curve.astype(np.int32),
         offset=offset.astype(np.float32),
         last_height=table.movement[last, 0].astype(np.float32),
-        last_contact=table.visit_end[last].astype(np.float32),
+        last_contact=table.contact_end[last].astype(np.float32),
         frame_rate=frame_rate,
         error=over_time.error,
     )
@@ -224,9 +224,9 @@ def _end_to_end(length: Array) -> tuple[Indices, Array]:
 
 def _with_turns(table: KeyframeTables, place: Indices) -> tuple[Indices, Array]:
     """The rows and frames of all points but those before jumps: the table's own, and where the pressure turns."""
-    contact = np.flatnonzero((table.frame == table.visit_start) & (table.visit_end > table.visit_start))
-    length = table.visit_end[contact] - table.visit_start[contact]
-    turns = [table.visit_start[contact] + part * length for part in (LOADING, 1.0 - LOADING)]
+    contact = np.flatnonzero((table.frame == table.contact_start) & (table.contact_end > table.contact_start))
+    length = table.contact_end[contact] - table.contact_start[contact]
+    turns = [table.contact_start[contact] + part * length for part in (LOADING, 1.0 - LOADING)]
     own = np.arange(len(place))
     when = np.concatenate([table.frame, *turns])
     source = np.concatenate([own, contact, contact])
@@ -234,7 +234,7 @@ def _with_turns(table: KeyframeTables, place: Indices) -> tuple[Indices, Array]:
     row = np.maximum.accumulate(np.where(order < len(own), order, -1))
     # A turn counts while its contact is the latest, and where there is no row already.
     kept = (order < len(own)) | (
-        (table.visit_start[row] == table.visit_start[source[order]]) & (table.frame[row] < when[order])
+        (table.contact_start[row] == table.contact_start[source[order]]) & (table.frame[row] < when[order])
     )
     return row[kept], when[order][kept]
 
@@ -251,8 +251,8 @@ def _movement(table: KeyframeTables, row: Indices, frame: Array) -> Array:
 
 def _contact(table: KeyframeTables, row: Indices, frame: Array, frame_rate: float) -> Floats:
     """See `PlaybackCurves.contact`, at given frames, each between a row and the next, (N,)."""
-    begin, end = table.visit_start[row], table.visit_end[row]
+    begin, end = table.contact_start[row], table.contact_end[row]
     passed = np.divide(frame - begin, end - begin, out=np.zeros(len(row)), where=end > begin)
     pressure = np.clip(np.minimum(passed, 1.0 - passed) / LOADING, 0.0, 1.0) * table.pressure[row]
     contact = np.where(frame < end, pressure, (end - frame) / frame_rate)
-    return np.where(begin < NO_VISIT, contact, -NO_VISIT).astype(np.float32)
+    return np.where(begin < NO_CONTACT, contact, -NO_CONTACT).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What each place of the ground goes through during a bake: the record of footprints as ramps and visits.
+"""What each place of the ground goes through during a bake: the record of footprints as ramps and contacts.
 
 Footprints add up and the display blur is linear, so that each footprint is looked at alone, where and while it moves
 the ground. Time and memory follow the number of footprints, not the length of the shot or the size of the ground.
@@ -30,13 +30,13 @@ BLOCK = 64
 
 
 @dataclass(frozen=True)
-class Visits:
+class PointContacts:
     """When soles touched places, and how hard.
 
     Attributes
     ----------
     point : (N,) int array
-        Place of each visit, ascending; each place's visits are in the order of their start.
+        Place of each contact, ascending; each place's contacts are in the order of their start.
     start, end : (N,) float arrays
         First and last scene frame of the contact.
     pressure : (N,) float array
@@ -58,21 +58,21 @@ class VertexHistories:
     movement : Ramps
         Change of the displayed height, and displayed compression, this to `SHADING_TOLERANCE` [m]; the rim is the sum
         of both.
-    visits : Visits
+    contacts : PointContacts
     error : float
         Largest error of a displayed height, at any place and frame [m].
     """
 
     movement: Ramps
-    visits: Visits
+    contacts: PointContacts
     error: float
 
     def stretched(self, factor: float) -> VertexHistories:
         """The same on a clock that counts `factor` frames where this one counts 1."""
-        ramps, visits = self.movement, self.visits
+        ramps, contacts = self.movement, self.contacts
         return VertexHistories(
             replace(ramps, start=factor * ramps.start, end=factor * ramps.end),
-            replace(visits, start=factor * visits.start, end=factor * visits.end),
+            replace(contacts, start=factor * contacts.start, end=factor * contacts.end),
             self.error,
         )
 
@@ -100,7 +100,7 @@ def vertex_histories(
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
     movements: list[Ramps] = []
-    visits: list[Visits] = []
+    contacts: list[PointContacts] = []
     error = 0.0
     for number, footprint in enumerate(footprints):
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
@@ -112,9 +112,9 @@ def vertex_histories(
             movements.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
             yield
-        visits.append(_visits(footprint, places))
+        contacts.append(_point_contacts(footprint, places))
         yield
-    return VertexHistories(Ramps.joined(movements, 2), _joined(visits), error)
+    return VertexHistories(Ramps.joined(movements, 2), _joined(contacts), error)
 
 
 class _Places:
@@ -260,7 +260,7 @@ def _look_up(values: Array, window: Window, cell_size: float, places: _Places, p
     return bilinear.between((flat[..., at] for at in (corner, corner + 1, above, above + 1)), u, v)
 
 
-def _visits(footprint: Footprint, places: _Places) -> Visits:
+def _point_contacts(footprint: Footprint, places: _Places) -> PointContacts:
     """Contacts of a footprint with the places in its cells."""
     window = footprint.window
     points = places.within(window, footprint.cell_size)
@@ -271,7 +271,7 @@ def _visits(footprint: Footprint, places: _Places) -> Visits:
     touched = contact[row * window.columns + column]
     points, touched = points[touched >= 0], touched[touched >= 0]
     pressure = footprint.peak_force_n / footprint.area_m2 if footprint.area_m2 > 0 else 0.0
-    return Visits(
+    return PointContacts(
         points,
         footprint.contact_start[touched],
         footprint.contact_end[touched],
@@ -279,12 +279,12 @@ def _visits(footprint: Footprint, places: _Places) -> Visits:
     )
 
 
-def _joined(parts: Sequence[Visits]) -> Visits:
-    """All visits, by place and time."""
-    none = Visits(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
+def _joined(parts: Sequence[PointContacts]) -> PointContacts:
+    """All contacts, by place and time."""
+    none = PointContacts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
     point, start, end, pressure = (
         np.concatenate([getattr(part, name) for part in (none, *parts)])
         for name in ("point", "start", "end", "pressure")
     )
     order = np.lexsort((start, point))
-    return Visits(point[order], start[order], end[order], pressure[order])
+    return PointContacts(point[order], start[order], end[order], pressure[order])

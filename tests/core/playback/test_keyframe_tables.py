@@ -1,4 +1,4 @@
-"""The table that is played, against the ramps and visits that it is made from."""
+"""The table that is played, against the ramps and contacts that it is made from."""
 
 import numpy as np
 import pytest
@@ -6,21 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.playback.keyframe_tables import NO_VISIT, keyframe_tables
+from softground_addon.core.playback.keyframe_tables import NO_CONTACT, keyframe_tables
 from softground_addon.core.playback.ramps import QUANTUM, Ramps
-from softground_addon.core.playback.vertex_histories import VertexHistories, Visits, vertex_histories
+from softground_addon.core.playback.vertex_histories import PointContacts, VertexHistories, vertex_histories
 from tests.core.walkers import pressed, walk
 
 NO_RAMPS = Ramps.joined([], 2)
 
 
-def visits_of(point, start, end, pressure):
+def contacts_of(point, start, end, pressure):
     order = np.lexsort((start, point))
-    return Visits(*(np.asarray(values)[order] for values in (point, start, end, pressure)))
+    return PointContacts(*(np.asarray(values)[order] for values in (point, start, end, pressure)))
 
 
-def no_visits():
-    return Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
+def no_contacts():
+    return PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
 
 
 def row_at(table, place, frame):
@@ -60,7 +60,7 @@ def random_ramps(rng, count, points):
 def test_it_holds_the_sum_of_all_ramps_at_any_time(seed, count, points):
     rng = np.random.default_rng(seed)
     ramps = random_ramps(rng, count, points)
-    table = keyframe_tables(VertexHistories(ramps, no_visits(), 0.0))
+    table = keyframe_tables(VertexHistories(ramps, no_contacts(), 0.0))
     for frame in [*rng.uniform(-5, 130, 12), *rng.choice(np.append(ramps.end, 0.0), 4)]:
         expected = ramps.at(frame, points)
         for place, point in enumerate(table.point):
@@ -75,21 +75,21 @@ def test_it_holds_the_sum_of_all_ramps_at_any_time(seed, count, points):
 def test_it_tells_the_latest_contact_that_has_begun(seed, count):
     rng = np.random.default_rng(seed)
     start = rng.permutation(200)[:count] / 2
-    visits = visits_of(
+    contacts = contacts_of(
         rng.integers(0, 4, count), start, start + rng.integers(0, 40, count) / 2, rng.uniform(1, 9, count)
     )
-    table = keyframe_tables(VertexHistories(NO_RAMPS, visits, 0.0))
+    table = keyframe_tables(VertexHistories(NO_RAMPS, contacts, 0.0))
     for frame in rng.uniform(-5, 130, 15):
         for place, point in enumerate(table.point):
-            begun = (visits.point == point) & (visits.start <= frame)
+            begun = (contacts.point == point) & (contacts.start <= frame)
             row = row_at(table, place, frame)
             if not begun.any():
-                assert row is None or table.visit_start[row] == NO_VISIT
+                assert row is None or table.contact_start[row] == NO_CONTACT
                 continue
             last = np.flatnonzero(begun)[-1]
-            assert table.visit_start[row] == visits.start[last]
-            assert table.visit_end[row] == visits.end[begun].max()
-            assert table.pressure[row] == visits.pressure[last]
+            assert table.contact_start[row] == contacts.start[last]
+            assert table.contact_end[row] == contacts.end[begun].max()
+            assert table.pressure[row] == contacts.pressure[last]
 
 
 def test_a_walk_takes_few_rows():
@@ -102,5 +102,5 @@ def test_a_walk_takes_few_rows():
 
 
 def test_nothing_makes_an_empty_table():
-    table = keyframe_tables(VertexHistories(NO_RAMPS, no_visits(), 0.0))
+    table = keyframe_tables(VertexHistories(NO_RAMPS, no_contacts(), 0.0))
     assert len(table.point) == len(table.frame) == 0

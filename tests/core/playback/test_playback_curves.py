@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.playback.keyframe_tables import NO_VISIT, keyframe_tables
+from softground_addon.core.playback.keyframe_tables import NO_CONTACT, keyframe_tables
 from softground_addon.core.playback.playback_curves import LENGTH, LOADING, NARROW, TICK, curves, playback_curves_at
 from softground_addon.core.playback.ramps import QUANTUM, Ramps
-from softground_addon.core.playback.vertex_histories import VertexHistories, Visits, vertex_histories
+from softground_addon.core.playback.vertex_histories import PointContacts, VertexHistories, vertex_histories
 from tests.core.walkers import pressed, walk
 
 NO_RAMPS = Ramps.joined([], 2)
@@ -27,11 +27,11 @@ def random_ramps(rng, count):
     return Ramps.joined([Ramps(point, start, start + rng.integers(1, 60, count) / 4, change)], 2)
 
 
-def random_visits(rng, count):
+def random_contacts(rng, count):
     point, start = rng.integers(0, POINTS, count), rng.permutation(200)[:count] / 2
     order = np.lexsort((start, point))
     end = start + rng.integers(0, 40, count) / 2
-    return Visits(point[order], start[order], end[order], rng.uniform(1, 9, count))
+    return PointContacts(point[order], start[order], end[order], rng.uniform(1, 9, count))
 
 
 def unpacked(spans, lines):
@@ -68,8 +68,8 @@ def sampled(spans, lines, place, frame):
 @given(st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(0, 20))
 def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts):
     rng = np.random.default_rng(seed)
-    movement, visits = random_ramps(rng, ramps), random_visits(rng, contacts)
-    spans, lines = unpacked(*curves(VertexHistories(movement, visits, 0.0), RATE))
+    movement, contacts = random_ramps(rng, ramps), random_contacts(rng, contacts)
+    spans, lines = unpacked(*curves(VertexHistories(movement, contacts, 0.0), RATE))
     steepest = np.abs(movement.change / (movement.end - movement.start)[:, None]).sum(initial=0.0)
     along = lines.position[:, 0]
     assert (np.diff(along)[np.diff(np.repeat(np.arange(len(lines.size)), lines.size)) == 0] >= 0).all()
@@ -77,39 +77,39 @@ def test_they_hold_the_ramps_and_the_contacts_at_any_time(seed, ramps, contacts)
         for frame in rng.uniform(spans.start[place], spans.end[place], 15):
             height, sunk, contact = sampled(spans, lines, place, frame)
             assert [height, sunk] == pytest.approx(movement.at(frame, POINTS)[point], abs=2 * QUANTUM + steepest * TICK)
-            begun = np.flatnonzero((visits.point == point) & (visits.start <= frame))
+            begun = np.flatnonzero((contacts.point == point) & (contacts.start <= frame))
             if not len(begun):
-                assert contact == -NO_VISIT
+                assert contact == -NO_CONTACT
                 continue
-            start, end = visits.start[begun[-1]], visits.end[begun].max()
+            start, end = contacts.start[begun[-1]], contacts.end[begun].max()
             passed = np.clip((frame - start) / (end - start), 0.0, 1.0) if end > start else 0.0
             loaded = np.clip(min(passed, 1.0 - passed) / LOADING, 0.0, 1.0)
-            pressure, age = visits.pressure[begun[-1]] * loaded, max(frame - end, 0.0) / RATE
-            steep = visits.pressure[begun[-1]] / (LOADING * (end - start)) if end > start else 0.0
+            pressure, age = contacts.pressure[begun[-1]] * loaded, max(frame - end, 0.0) / RATE
+            steep = contacts.pressure[begun[-1]] / (LOADING * (end - start)) if end > start else 0.0
             assert contact == pytest.approx(pressure - age, abs=1e-4 + steep * TICK)
 
 
 def test_at_the_end_nothing_presses_any_more_and_all_is_told_without_a_look():
     rng = np.random.default_rng(1)
-    movement, visits = random_ramps(rng, 9), random_visits(rng, 20)
-    spans, lines = unpacked(*curves(VertexHistories(movement, visits, 0.0), RATE))
+    movement, contacts = random_ramps(rng, 9), random_contacts(rng, 20)
+    spans, lines = unpacked(*curves(VertexHistories(movement, contacts, 0.0), RATE))
     for place, point in enumerate(spans.point):
         height, _, contact = sampled(spans, lines, place, spans.end[place])
         assert contact <= 0.0
         assert spans.last_height[place] == height == movement.at(1e6, POINTS)[point, 0]
-        assert spans.last_contact[place] == max(visits.end[visits.point == point], default=NO_VISIT)
+        assert spans.last_contact[place] == max(contacts.end[contacts.point == point], default=NO_CONTACT)
 
 
 def test_a_contact_adds_three_points_at_most_to_those_of_its_timeline():
     rng = np.random.default_rng(2)
-    visits = random_visits(rng, 150)
-    over_time = VertexHistories(random_ramps(rng, 40), visits, 0.0)
+    contacts = random_contacts(rng, 150)
+    over_time = VertexHistories(random_ramps(rng, 40), contacts, 0.0)
     _, lines = unpacked(*curves(over_time, RATE))
-    assert len(lines.position) <= len(keyframe_tables(over_time).frame) + 3 * len(visits.point)
+    assert len(lines.position) <= len(keyframe_tables(over_time).frame) + 3 * len(contacts.point)
 
 
 def test_nothing_makes_no_polylines():
-    nobody = Visits(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
+    nobody = PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))
     none = unpacked(*curves(VertexHistories(NO_RAMPS, nobody, 0.0), RATE))
     for spans, lines in (none, at([], np.zeros(3), np.zeros(3))):
         assert len(spans.point) == len(lines.size) == len(lines.contact) == 0
@@ -125,7 +125,7 @@ def test_made_part_by_part_they_are_the_same(monkeypatch):
     _, footprints = pressed(walk(steps=5), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
     x, y = np.random.default_rng(0).uniform((-0.3, -0.3), (2.5, 0.3), (3000, 2)).T
     whole, its_lines = unpacked(*curves(vertex_histories(footprints, x, y, blur_sigma=0.005), RATE))
-    monkeypatch.setattr("softground_addon.core.playback.playback_curves.VISITS_AT_ONCE", 400)
+    monkeypatch.setattr("softground_addon.core.playback.playback_curves.CONTACTS_AT_ONCE", 400)
     parts, lines = at(footprints, x, y)
     assert parts.error == pytest.approx(whole.error)
     assert len(lines.size) > len(its_lines.size)
@@ -154,7 +154,7 @@ def trodden(footprint, times):
 
 
 def test_ground_that_is_stepped_on_again_and_again_takes_less_memory_than_what_is_played(monkeypatch):
-    monkeypatch.setattr("softground_addon.core.playback.playback_curves.VISITS_AT_ONCE", 1000)
+    monkeypatch.setattr("softground_addon.core.playback.playback_curves.CONTACTS_AT_ONCE", 1000)
     _, footprints = pressed(walk(steps=2), GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005))
     window, size = footprints[0].window, footprints[0].cell_size
     x, y = (grid.ravel() for grid in np.meshgrid(*window.centres(size)))
@@ -182,9 +182,9 @@ def test_on_another_clock_everything_happens_at_its_frames_and_what_never_comes_
     assert slow.frame_rate == factor * spans.frame_rate
     for name in ("start", "end"):
         np.testing.assert_allclose(getattr(slow, name), factor * getattr(spans, name), rtol=1e-6)
-    visited = spans.last_contact < NO_VISIT
-    np.testing.assert_allclose(slow.last_contact[visited], factor * spans.last_contact[visited], rtol=1e-6)
-    assert (slow.last_contact[~visited] == NO_VISIT).all()
+    touched = spans.last_contact < NO_CONTACT
+    np.testing.assert_allclose(slow.last_contact[touched], factor * spans.last_contact[touched], rtol=1e-6)
+    assert (slow.last_contact[~touched] == NO_CONTACT).all()
     for place in range(0, len(spans.point), 7):
         for frame in np.linspace(spans.start[place], spans.end[place], 9)[1:-1] + 0.01:
             expected = sampled(spans, lines, place, frame)
@@ -195,7 +195,7 @@ def test_end_to_end_no_place_reaches_into_another_and_all_times_are_known_to_a_t
     rng = np.random.default_rng(3)
     start = rng.uniform(0, 2000, 600)
     heights = Ramps(np.arange(600), start, start + rng.uniform(0.25, 90, 600), rng.integers(1, 9, (600, 2)) * QUANTUM)
-    spans, lines = unpacked(*curves(VertexHistories(heights, random_visits(rng, 0), 0.0), RATE))
+    spans, lines = unpacked(*curves(VertexHistories(heights, random_contacts(rng, 0), 0.0), RATE))
     assert spans.curve.tolist() == sorted(spans.curve.tolist())
     assert set(spans.curve.tolist()) == set(range(len(lines.size)))
     assert lines.size.sum() == len(lines.position)

@@ -1,4 +1,4 @@
-"""The record as ramps and visits, against the record put together frame by frame."""
+"""The record as ramps and contacts, against the record put together frame by frame."""
 
 import numpy as np
 import pytest
@@ -91,29 +91,29 @@ def test_a_sole_dragged_over_many_blocks_is_followed():
     assert height <= error <= TOLERANCE * 1.001
 
 
-def test_visits_tell_the_age_of_every_place():
+def test_contacts_tell_the_age_of_every_place():
     _, footprints = pressed(walk(steps=4), SNOW)
     x, y = places_around(footprints, 3000)
-    visits = vertex_histories(footprints, x, y, blur_sigma=SNOW.blur_sigma).visits
+    contacts = vertex_histories(footprints, x, y, blur_sigma=SNOW.blur_sigma).contacts
     for frame in (1.0, 22.0, 40.0, 63.0, 90.0):
         latest = np.full(len(x), -np.inf)
-        begun = visits.start <= frame
-        np.maximum.at(latest, visits.point[begun], np.minimum(visits.end[begun], frame))
+        begun = contacts.start <= frame
+        np.maximum.at(latest, contacts.point[begun], np.minimum(contacts.end[begun], frame))
         age = np.where(np.isfinite(latest), (frame - latest) / 30.0, -1.0)
         np.testing.assert_allclose(age, shown(footprints, frame, SNOW, x, y).age, atol=1e-9)
 
 
 def test_pressure_is_the_peak_force_over_the_area():
     _, footprints = pressed(standing(box_sole(0.2, 0.1), [0.0, 0.0, 0.0], 400.0), SNOW)
-    visits = vertex_histories(footprints, np.zeros(1), np.zeros(1), blur_sigma=0.005).visits
-    assert visits.pressure == pytest.approx([400.0 / 0.02], rel=0.05)
+    contacts = vertex_histories(footprints, np.zeros(1), np.zeros(1), blur_sigma=0.005).contacts
+    assert contacts.pressure == pytest.approx([400.0 / 0.02], rel=0.05)
 
 
 def test_untouched_places_have_no_history():
     _, footprints = pressed(walk(steps=2), SNOW)
     result = vertex_histories(footprints, np.array([50.0, -50.0]), np.array([0.0, 7.0]), blur_sigma=0.005)
     assert not len(result.movement.point)
-    assert not len(result.visits.point)
+    assert not len(result.contacts.point)
     assert result.error == 0.0
 
 
