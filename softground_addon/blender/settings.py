@@ -37,14 +37,14 @@ _existing: dict[int, tuple[int, bool]] = {}
 were in one. Going through the collections takes too long to be done in `draw`; who leaves one has a user less."""
 
 
-def exists(thing: bpy.types.Object | None) -> bool:
+def exists(obj: bpy.types.Object | None) -> bool:
     """Whether an object that the settings name is there: those deleted in the viewport live on in the settings only."""
-    if thing is None:
+    if obj is None:
         return False
-    users, found = _existing.get(thing.session_uid, (-1, False))
-    if users != thing.users:
-        found = bool(thing.users_collection)
-        _existing[thing.session_uid] = thing.users, found
+    users, found = _existing.get(obj.session_uid, (-1, False))
+    if users != obj.users:
+        found = bool(obj.users_collection)
+        _existing[obj.session_uid] = obj.users, found
     return found
 
 
@@ -206,17 +206,17 @@ def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
     )
 
 
-def name_of(thing: bpy.types.Object) -> ObjectName:
+def name_of(obj: bpy.types.Object) -> ObjectName:
     """An object by its name, to be found again."""
-    return ObjectName(thing.name, thing.session_uid)
+    return ObjectName(obj.name, obj.session_uid)
 
 
 def find(name: ObjectName) -> bpy.types.Object | None:
     """The object of a name, whatever it is called by now; None if it was deleted."""
-    thing = bpy.data.objects.get(name.name)
-    if thing is None or thing.session_uid != name.uid:
-        thing = next((other for other in bpy.data.objects if other.session_uid == name.uid), None)
-    return thing
+    obj = bpy.data.objects.get(name.name)
+    if obj is None or obj.session_uid != name.uid:
+        obj = next((other for other in bpy.data.objects if other.session_uid == name.uid), None)
+    return obj
 
 
 def found(name: ObjectName) -> bpy.types.Object:
@@ -227,10 +227,10 @@ def found(name: ObjectName) -> bpy.types.Object:
     InputError
         If it was deleted.
     """
-    thing = find(name)
-    if thing is None:
+    obj = find(name)
+    if obj is None:
         raise InputError(f"'{name.name}' was deleted: choose another object, or take it out of the settings.")
-    return thing
+    return obj
 
 
 def user_folder() -> Path:

@@ -26,27 +26,27 @@ _ORIGINAL, _SLOT, _LAYER = "softground_original", "softground_slot", "softground
 _STRENGTH, _SPAN, _STANDING = "softground_strength", "softground_span", "softground_standing"
 
 
-def is_on(thing: bpy.types.Object) -> bool:
+def is_on(obj: bpy.types.Object) -> bool:
     """Whether the object is animated by such a copy."""
-    return _copy_on(thing) is not None
+    return _copy_on(obj) is not None
 
 
 def put(
-    thing: bpy.types.Object,
+    obj: bpy.types.Object,
     curves: Sequence[LayerCurve],
     frames: tuple[float, float],
     notes: Mapping[str, str],
     strength: float,
 ) -> None:
     """Animate the object by a copy of its action with the curves in it; see `nla_layer.add_layer`."""
-    layer = new_action(f"{thing.name} Response Keys", thing, curves)
+    layer = new_action(f"{obj.name} Response Keys", obj, curves)
     for key, text in notes.items():
         layer[key] = text
-    animation = thing.animation_data or thing.animation_data_create()
+    animation = obj.animation_data or obj.animation_data_create()
     original, slot = animation.action, slot_of(animation)
     if original is None:
-        copy = bpy.data.actions.new(f"{thing.name} Response")
-        copied_slot, _ = new_channels(copy, thing.name)
+        copy = bpy.data.actions.new(f"{obj.name} Response")
+        copied_slot, _ = new_channels(copy, obj.name)
     else:
         copy = original.copy()
         copy.use_fake_user = False
@@ -58,51 +58,51 @@ def put(
     animated = {(curve.data_path, curve.array_index) for curve in _original_curves(copy)}
     copy[_STANDING] = json.dumps(
         [
-            (curve.path, curve.index, value_of(thing, curve.path, curve.index))
+            (curve.path, curve.index, value_of(obj, curve.path, curve.index))
             for curve in curves
             if (curve.path, curve.index) not in animated
         ]
     )
     _assign(animation, copy, copied_slot)
-    set_strength(thing, strength)
+    set_strength(obj, strength)
 
 
-def remove(thing: bpy.types.Object) -> None:
+def remove(obj: bpy.types.Object) -> None:
     """Animate the object by the original again, and remove the copy."""
-    copy = _copy_on(thing)
+    copy = _copy_on(obj)
     if copy is None:
         return
     layer = copy[_LAYER]
-    _set_aside(thing, copy)
+    _set_aside(obj, copy)
     for action in (copy, layer):
         if action.users == 0:
             bpy.data.actions.remove(action)
-    animation = thing.animation_data
+    animation = obj.animation_data
     if animation and animation.action is None and not animation.nla_tracks and not animation.drivers:
-        thing.animation_data_clear()
-    thing.update_tag(refresh={"TIME", "OBJECT", "DATA"})
+        obj.animation_data_clear()
+    obj.update_tag(refresh={"TIME", "OBJECT", "DATA"})
 
 
-def notes_of(thing: bpy.types.Object) -> dict[str, str]:
+def notes_of(obj: bpy.types.Object) -> dict[str, str]:
     """What was noted with the layer."""
-    layer = _copy_on(thing)[_LAYER]
+    layer = _copy_on(obj)[_LAYER]
     return {key: str(layer[key]) for key in layer.keys()}  # noqa: SIM118  (an ID is no mapping)
 
 
-def strength_of(thing: bpy.types.Object) -> float:
+def strength_of(obj: bpy.types.Object) -> float:
     """How much of the layer shows, 0 to 2."""
-    return float(_copy_on(thing)[_STRENGTH])
+    return float(_copy_on(obj)[_STRENGTH])
 
 
-def original_of(thing: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
+def original_of(obj: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
     """The user's own action and slot under the copy."""
-    return _original(_copy_on(thing))
+    return _original(_copy_on(obj))
 
 
-def set_strength(thing: bpy.types.Object, strength: float) -> None:
+def set_strength(obj: bpy.types.Object, strength: float) -> None:
     """Compose the copy anew, with so much of the layer in it."""
-    copy = _copy_on(thing)
-    channels = channels_of(copy, slot_of(thing.animation_data))
+    copy = _copy_on(obj)
+    channels = channels_of(copy, slot_of(obj.animation_data))
     layer = list(action_curves(copy[_LAYER]))
     source = {(curve.data_path, curve.array_index): curve for curve in _original_curves(copy)}
     standing = {(path, index): value for path, index, value in json.loads(copy[_STANDING])}
@@ -122,23 +122,23 @@ def set_strength(thing: bpy.types.Object, strength: float) -> None:
             group = curve.group.name if curve.group else ""
             add_curve(channels, LayerCurve(path, curve.array_index, group, frames, column))
     copy[_STRENGTH] = strength
-    thing.update_tag(refresh={"TIME", "OBJECT", "DATA"})
+    obj.update_tag(refresh={"TIME", "OBJECT", "DATA"})
 
 
 @contextmanager
-def without(thing: bpy.types.Object) -> Iterator[None]:
+def without(obj: bpy.types.Object) -> Iterator[None]:
     """The object as animated by the original alone."""
-    copy, animation = _copy_on(thing), thing.animation_data
+    copy, animation = _copy_on(obj), obj.animation_data
     slot = slot_of(animation)
-    _set_aside(thing, copy)
+    _set_aside(obj, copy)
     try:
         yield
     finally:
         _assign(animation, copy, slot)
 
 
-def _copy_on(thing: bpy.types.Object) -> Any:
-    action: Any = thing.animation_data.action if thing.animation_data else None
+def _copy_on(obj: bpy.types.Object) -> Any:
+    action: Any = obj.animation_data.action if obj.animation_data else None
     return action if action is not None and _LAYER in action else None
 
 
@@ -159,11 +159,11 @@ def _assign(animation: Any, action: bpy.types.Action | None, slot: Any) -> None:
         set_slot(animation, slot)
 
 
-def _set_aside(thing: bpy.types.Object, copy: Any) -> None:
+def _set_aside(obj: bpy.types.Object, copy: Any) -> None:
     """Put the original in the copy's place, and what nothing animated to where it stood."""
-    _assign(thing.animation_data, *_original(copy))
+    _assign(obj.animation_data, *_original(copy))
     for path, index, value in json.loads(copy[_STANDING]):
-        set_value(thing, path, index, value)
+        set_value(obj, path, index, value)
 
 
 def _frames(copy: Any, first: float, last: float) -> Array:

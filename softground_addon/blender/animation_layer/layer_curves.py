@@ -40,10 +40,10 @@ class LayerCurve:
 _LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
 
 
-def new_action(name: str, thing: bpy.types.Object, curves: Sequence[LayerCurve]) -> bpy.types.Action:
+def new_action(name: str, obj: bpy.types.Object, curves: Sequence[LayerCurve]) -> bpy.types.Action:
     """An action of such curves, with one slot for the object where there are slots."""
     action = bpy.data.actions.new(name)
-    _, channels = new_channels(action, thing.name)
+    _, channels = new_channels(action, obj.name)
     for curve in curves:
         add_curve(channels, curve)
     return action
@@ -59,11 +59,11 @@ def add_curve(channels: Any, curve: LayerCurve) -> None:
     written.update()
 
 
-def value_of(thing: bpy.types.Object, path: str, index: int) -> float:
+def value_of(obj: bpy.types.Object, path: str, index: int) -> float:
     """What a channel stands at now."""
-    return float(thing.path_resolve(path)[index])
+    return float(obj.path_resolve(path)[index])
 
 
-def set_value(thing: bpy.types.Object, path: str, index: int, value: float) -> None:
+def set_value(obj: bpy.types.Object, path: str, index: int, value: float) -> None:
     """Set a channel."""
-    thing.path_resolve(path)[index] = value
+    obj.path_resolve(path)[index] = value

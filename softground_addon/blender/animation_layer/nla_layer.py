@@ -27,30 +27,30 @@ STANDING = "SoftGround Standing Pose"
 _OWN_TRACKS = (RESPONSE, EXTRA, SOURCE, STANDING)
 
 
-def has_layer(thing: bpy.types.Object) -> bool:
+def has_layer(obj: bpy.types.Object) -> bool:
     """Whether a layer lies on the object's animation."""
-    return _track(thing, RESPONSE) is not None or copied_action.is_on(thing)
+    return _track(obj, RESPONSE) is not None or copied_action.is_on(obj)
 
 
-def check_layerable(thing: bpy.types.Object) -> None:
+def check_layerable(obj: bpy.types.Object) -> None:
     """Raise InputError, naming the remedy, where no layer can be put on the object."""
-    if thing.library is not None:
+    if obj.library is not None:
         raise InputError(
-            f"'{thing.name}' is linked and cannot be given keys: make a library override of it (Object > Library "
+            f"'{obj.name}' is linked and cannot be given keys: make a library override of it (Object > Library "
             "Override > Make), or switch the response off."
         )
-    animation = thing.animation_data
+    animation = obj.animation_data
     if animation is None:
         return
     if animation.use_tweak_mode:
-        raise InputError(f"An NLA strip of '{thing.name}' is being tweaked: leave tweak mode (Tab in the NLA editor).")
+        raise InputError(f"An NLA strip of '{obj.name}' is being tweaked: leave tweak mode (Tab in the NLA editor).")
     solo = next((track for track in animation.nla_tracks if track.is_solo and track.name not in _OWN_TRACKS), None)
     if solo is not None:
-        raise InputError(f"NLA track '{solo.name}' of '{thing.name}' is solo, which mutes any layer: end its solo.")
+        raise InputError(f"NLA track '{solo.name}' of '{obj.name}' is solo, which mutes any layer: end its solo.")
 
 
 def add_layer(
-    thing: bpy.types.Object,
+    obj: bpy.types.Object,
     curves: Sequence[LayerCurve],
     frames: tuple[float, float],
     notes: Mapping[str, str] | None = None,
@@ -61,7 +61,7 @@ def add_layer(
 
     Parameters
     ----------
-    thing : bpy.types.Object
+    obj : bpy.types.Object
         Local or overridden.
     curves : sequence of LayerCurve
     frames : (float, float)
@@ -74,18 +74,18 @@ def add_layer(
     InputError
         If the object can take no layer.
     """
-    check_layerable(thing)
-    strength = strength_of(thing)
-    remove_layer(thing)
-    if thing.animation_data is not None and not thing.animation_data.use_nla:
-        copied_action.put(thing, curves, frames, notes or {}, 1.0 if strength is None else strength)
+    check_layerable(obj)
+    strength = strength_of(obj)
+    remove_layer(obj)
+    if obj.animation_data is not None and not obj.animation_data.use_nla:
+        copied_action.put(obj, curves, frames, notes or {}, 1.0 if strength is None else strength)
         return
-    standing = _standing_values(thing, curves)
-    action = new_action(f"{thing.name} Response", thing, curves)
+    standing = _standing_values(obj, curves)
+    action = new_action(f"{obj.name} Response", obj, curves)
     for key, text in (notes or {}).items():
         action[key] = text
-    animation = thing.animation_data or thing.animation_data_create()
-    span = _whole_span(thing, frames)
+    animation = obj.animation_data or obj.animation_data_create()
+    span = _whole_span(obj, frames)
     own = animation.action
     if own is not None:
         settings = (animation.action_blend_type, animation.action_extrapolation, animation.action_influence)
@@ -96,39 +96,39 @@ def add_layer(
         if settings[2] != 1.0:
             _set_influence(strip, settings[2])
     if standing:
-        below = new_action(f"{thing.name} Standing Pose", thing, standing)
+        below = new_action(f"{obj.name} Standing Pose", obj, standing)
         strip = _add_strip(animation, STANDING, below, slot_of_action(below), span, bottom=True)
         strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
     for name in (RESPONSE, EXTRA):
         strip = _add_strip(animation, name, action, slot_of_action(action), frames)
         strip.blend_type, strip.extrapolation = "COMBINE", "NOTHING"
-    set_strength(thing, 1.0 if strength is None else strength)
+    set_strength(obj, 1.0 if strength is None else strength)
 
 
-def notes_of(thing: bpy.types.Object) -> dict[str, str]:
+def notes_of(obj: bpy.types.Object) -> dict[str, str]:
     """What was noted with the layer; nothing where there is none."""
-    if copied_action.is_on(thing):
-        return copied_action.notes_of(thing)
-    strip = _strip(thing, RESPONSE)
+    if copied_action.is_on(obj):
+        return copied_action.notes_of(obj)
+    strip = _strip(obj, RESPONSE)
     action = strip.action if strip else None
     return {key: str(action[key]) for key in action.keys()} if action else {}  # noqa: SIM118
 
 
-def remove_layer(thing: bpy.types.Object) -> None:
+def remove_layer(obj: bpy.types.Object) -> None:
     """Take the layer off; the object is animated as before. Nothing happens where there is none."""
-    copied_action.remove(thing)
-    if not has_layer(thing):
+    copied_action.remove(obj)
+    if not has_layer(obj):
         return
-    animation = thing.animation_data
+    animation = obj.animation_data
     assert animation is not None
-    source, standing = _strip(thing, SOURCE), _strip(thing, STANDING)
+    source, standing = _strip(obj, SOURCE), _strip(obj, STANDING)
     values = _constants(standing) if standing else []
     restored = None
     if source is not None and source.action is not None:
         restored = (source.action, slot_of(source), source.blend_type, source.extrapolation, _influence(source))
-    left_over = {strip.action for name in (RESPONSE, STANDING) if (strip := _strip(thing, name)) and strip.action}
+    left_over = {strip.action for name in (RESPONSE, STANDING) if (strip := _strip(obj, name)) and strip.action}
     for name in _OWN_TRACKS:
-        track = _track(thing, name)
+        track = _track(obj, name)
         if track is not None:
             animation.nla_tracks.remove(track)
     if restored is not None:
@@ -136,43 +136,43 @@ def remove_layer(thing: bpy.types.Object) -> None:
         set_slot(animation, slot)
         animation.action_blend_type, animation.action_extrapolation, animation.action_influence = restored[2:]
     for path, index, value in values:
-        set_value(thing, path, index, value)
+        set_value(obj, path, index, value)
     for action in left_over:
         if action.users == 0:
             bpy.data.actions.remove(action)
     if animation.action is None and not animation.nla_tracks and not animation.drivers:
-        thing.animation_data_clear()
-    thing.update_tag(refresh={"TIME", "OBJECT", "DATA"})
+        obj.animation_data_clear()
+    obj.update_tag(refresh={"TIME", "OBJECT", "DATA"})
 
 
-def strength_of(thing: bpy.types.Object) -> float | None:
+def strength_of(obj: bpy.types.Object) -> float | None:
     """How much of the layer shows, 0 to 2; None where there is none."""
-    if copied_action.is_on(thing):
-        return copied_action.strength_of(thing)
-    strips = [_strip(thing, name) for name in (RESPONSE, EXTRA)]
+    if copied_action.is_on(obj):
+        return copied_action.strength_of(obj)
+    strips = [_strip(obj, name) for name in (RESPONSE, EXTRA)]
     return sum(_influence(strip) for strip in strips if strip) if strips[0] else None
 
 
-def set_strength(thing: bpy.types.Object, strength: float) -> None:
+def set_strength(obj: bpy.types.Object, strength: float) -> None:
     """Scale the layer, 0 to 2: its keys count once through one strip and once more through another."""
-    if copied_action.is_on(thing):
-        copied_action.set_strength(thing, strength)
+    if copied_action.is_on(obj):
+        copied_action.set_strength(obj, strength)
         return
     for name, influence in ((RESPONSE, min(strength, 1.0)), (EXTRA, max(strength - 1.0, 0.0))):
-        strip, track = _strip(thing, name), _track(thing, name)
+        strip, track = _strip(obj, name), _track(obj, name)
         if strip is not None and track is not None:
             _set_influence(strip, influence)
             track.mute = influence == 0.0
 
 
 @contextmanager
-def without_layer(thing: bpy.types.Object) -> Iterator[None]:
+def without_layer(obj: bpy.types.Object) -> Iterator[None]:
     """The object as animated by the user alone."""
-    if copied_action.is_on(thing):
-        with copied_action.without(thing):
+    if copied_action.is_on(obj):
+        with copied_action.without(obj):
             yield
         return
-    tracks = [track for name in (RESPONSE, EXTRA) if (track := _track(thing, name)) and not track.mute]
+    tracks = [track for name in (RESPONSE, EXTRA) if (track := _track(obj, name)) and not track.mute]
     names = [track.name for track in tracks]
     for track in tracks:
         track.mute = True
@@ -180,16 +180,16 @@ def without_layer(thing: bpy.types.Object) -> Iterator[None]:
         yield
     finally:
         for name in names:
-            track = _track(thing, name)
+            track = _track(obj, name)
             if track is not None:
                 track.mute = False
 
 
-def own_action(thing: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
+def own_action(obj: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
     """The user's active action and its slot, also where a copy of it is at work."""
-    if copied_action.is_on(thing):
-        return copied_action.original_of(thing)
-    animation = thing.animation_data
+    if copied_action.is_on(obj):
+        return copied_action.original_of(obj)
+    animation = obj.animation_data
     return (animation.action, slot_of(animation)) if animation else (None, None)
 
 
@@ -198,24 +198,24 @@ def slot_of_action(action: bpy.types.Action) -> Any:
     return next(iter(getattr(action, "slots", ())), None)
 
 
-def animated_paths(thing: bpy.types.Object) -> set[tuple[str, int]]:
+def animated_paths(obj: bpy.types.Object) -> set[tuple[str, int]]:
     """Data paths and indices that the object's action, strips and drivers set."""
-    animation = thing.animation_data
+    animation = obj.animation_data
     if animation is None:
         return set()
     strips = [strip for track in animation.nla_tracks for strip in track.strips]
-    owned = [own_action(thing), *((strip.action, slot_of(strip)) for strip in strips)]
+    owned = [own_action(obj), *((strip.action, slot_of(strip)) for strip in strips)]
     curves = [curve for action, slot in owned if action for curve in action_curves(action, slot)]
     return {(curve.data_path, curve.array_index) for curve in (*curves, *animation.drivers)}
 
 
-def _track(thing: bpy.types.Object, name: str) -> bpy.types.NlaTrack | None:
-    animation = thing.animation_data
+def _track(obj: bpy.types.Object, name: str) -> bpy.types.NlaTrack | None:
+    animation = obj.animation_data
     return next((track for track in animation.nla_tracks if track.name == name), None) if animation else None
 
 
-def _strip(thing: bpy.types.Object, name: str) -> bpy.types.NlaStrip | None:
-    track = _track(thing, name)
+def _strip(obj: bpy.types.Object, name: str) -> bpy.types.NlaStrip | None:
+    track = _track(obj, name)
     return track.strips[0] if track is not None and track.strips else None
 
 
@@ -265,10 +265,10 @@ def _new_top_track(animation: bpy.types.AnimData) -> bpy.types.NlaTrack:
     return tracks.new(prev=tracks[-1]) if len(tracks) else tracks.new()
 
 
-def _whole_span(thing: bpy.types.Object, frames: tuple[float, float]) -> tuple[int, int]:
+def _whole_span(obj: bpy.types.Object, frames: tuple[float, float]) -> tuple[int, int]:
     """Every frame at which the shot may be played, so that the user's action goes on as before beyond its keys."""
     starts, ends = [float(frames[0])], [float(frames[1])]
-    animation = thing.animation_data
+    animation = obj.animation_data
     if animation and animation.action:
         starts.append(animation.action.frame_range[0])
         ends.append(animation.action.frame_range[1])
@@ -282,12 +282,12 @@ _MARGIN = 1000
 """Frames before and after a shot in which the user's action still plays as it would alone."""
 
 
-def _standing_values(thing: bpy.types.Object, curves: Sequence[LayerCurve]) -> list[LayerCurve]:
+def _standing_values(obj: bpy.types.Object, curves: Sequence[LayerCurve]) -> list[LayerCurve]:
     """One key each for the channels that the layer changes and nothing animates."""
-    animated = animated_paths(thing)
+    animated = animated_paths(obj)
     return [
         LayerCurve(
-            curve.path, curve.index, curve.group, np.array([0.0]), np.array([value_of(thing, curve.path, curve.index)])
+            curve.path, curve.index, curve.group, np.array([0.0]), np.array([value_of(obj, curve.path, curve.index)])
         )
         for curve in curves
         if (curve.path, curve.index) not in animated

@@ -75,8 +75,8 @@ def clear(ground: bpy.types.Object) -> None:
     InputError
         If the ground or the copy that carries the bake cannot be changed.
     """
-    for thing in dict.fromkeys((ground, display_mesh_of(ground))):
-        ground_checks.check_writable(thing)
+    for obj in dict.fromkeys((ground, display_mesh_of(ground))):
+        ground_checks.check_writable(obj)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
 

@@ -33,8 +33,8 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
 def check_usable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if a bake could not be written to this ground."""
     detail = trail_detail.detail_of(ground)
-    for thing in filter(None, (ground, detail)):
-        check_writable(thing)
+    for obj in filter(None, (ground, detail)):
+        check_writable(obj)
     if detail:
         check_playable(detail)
     name = ground.name

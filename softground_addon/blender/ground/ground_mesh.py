@@ -188,21 +188,21 @@ def to_world_of(ground: bpy.types.Object, unit_scale: float) -> Array:
     return matrix
 
 
-def placed_by_parents(thing: bpy.types.Object) -> Matrix | None:
+def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
     """Object space to world space by an object's own values and those of its parents, hidden or not.
 
     Blender keeps no world matrix of what is hidden. None where constraints, physics, bones or vertices have a say in
     it: only Blender can tell then, by evaluating the object in a scene that shows it.
     """
-    parent, body = thing.parent, thing.rigid_body
-    if any(not one.mute for one in thing.constraints) or (body and body.type == "ACTIVE"):
+    parent, body = obj.parent, obj.rigid_body
+    if any(not one.mute for one in obj.constraints) or (body and body.type == "ACTIVE"):
         return None
     if parent is None:
-        return thing.matrix_basis
-    if thing.parent_type in _BY_PARTS or (parent.type == "CURVE" and parent.data.use_path):
+        return obj.matrix_basis
+    if obj.parent_type in _BY_PARTS or (parent.type == "CURVE" and parent.data.use_path):
         return None
     above = placed_by_parents(parent)
-    return None if above is None else above @ thing.matrix_parent_inverse @ thing.matrix_basis
+    return None if above is None else above @ obj.matrix_parent_inverse @ obj.matrix_basis
 
 
 @contextmanager

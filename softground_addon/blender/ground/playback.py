@@ -107,7 +107,7 @@ def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
 def remove(ground: bpy.types.Object) -> None:
     """Take the playback off a ground and copies of it with the same mesh; nothing happens where there is none."""
     mesh = cast("bpy.types.Mesh", ground.data)
-    copies = [thing for thing in bpy.data.objects if thing.data == mesh] if mesh.users > 1 else []
+    copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
     for shown in {ground, *copies}:
         while modifier := modifier_of(shown):
             shown.modifiers.remove(modifier)

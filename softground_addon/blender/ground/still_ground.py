@@ -19,9 +19,9 @@ _PLACING = ("location", "rotation_", "scale", "delta_", "constraints[", "matrix_
 """How the paths of what places an object begin."""
 
 
-def mover_of(thing: bpy.types.Object) -> bpy.types.Object | None:
+def mover_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """The object whose animation moves an object: itself, a parent, or what it or a parent is constrained to."""
-    waiting, known = [thing], set()
+    waiting, known = [obj], set()
     while waiting:
         node = waiting.pop(0)
         if node in known:

@@ -48,11 +48,9 @@ def detail_of(ground: bpy.types.Object) -> bpy.types.Object | None:
 
 def _detail_of_old(ground: bpy.types.Object) -> bpy.types.Object | None:
     """The copy of a ground in a file of version 0.1."""
-    candidates = [
-        thing for thing in bpy.data.objects if thing.get(DETAIL_OF) == ground and thing.library == ground.library
-    ]
+    candidates = [obj for obj in bpy.data.objects if obj.get(DETAIL_OF) == ground and obj.library == ground.library]
     # If the user has renamed it, it is the one that was there first in this session.
-    return min(candidates, key=lambda thing: (thing.get(NAMED) != thing.name, thing.session_uid), default=None)
+    return min(candidates, key=lambda obj: (obj.get(NAMED) != obj.name, obj.session_uid), default=None)
 
 
 def region_around(footfalls: Keys, cell_size: float, reach: float) -> Region:

@@ -152,7 +152,7 @@ class LiveMode:
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        owner = next((thing for thing in bpy.data.objects if thing.session_uid == self._owner.uid), None)
+        owner = next((obj for obj in bpy.data.objects if obj.session_uid == self._owner.uid), None)
         ground = owner or self._ground.object(None)
         if ground is not None:
             baked_ground.clear(ground)

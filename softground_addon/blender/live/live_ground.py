@@ -109,7 +109,7 @@ class LiveGround:
         """The ground, which mostly is a likely one; None if it is gone or no longer what live mode made of it."""
         found = likely
         if found is None or found.session_uid != self._uid:
-            found = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
+            found = next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
         if found is None:
             return None
         mesh = ground_mesh.mesh_of(found)

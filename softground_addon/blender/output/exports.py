@@ -174,12 +174,12 @@ def _only(scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, en
     if display_mesh.name not in layer.objects:
         raise InputError(f"'{display_mesh.name}' is not in the current view layer: include its collection first.")
     hidden = display_mesh.hide_get(), display_mesh.hide_viewport, display_mesh.hide_render
-    selected = [thing for thing in layer.objects if thing.select_get()]
+    selected = [obj for obj in layer.objects if obj.select_get()]
     active, frames = layer.objects.active, (scene.frame_start, scene.frame_end)
     frame, subframe = scene.frame_current, scene.frame_subframe
     try:
-        for thing in selected:
-            thing.select_set(False)
+        for obj in selected:
+            obj.select_set(False)
         display_mesh.hide_viewport = display_mesh.hide_render = False
         layer.update()
         display_mesh.hide_set(False)
@@ -192,8 +192,8 @@ def _only(scene: bpy.types.Scene, display_mesh: bpy.types.Object, start: int, en
         display_mesh.select_set(False)
         display_mesh.hide_set(hidden[0])
         display_mesh.hide_viewport, display_mesh.hide_render = hidden[1:]
-        for thing in selected:
-            thing.select_set(True)
+        for obj in selected:
+            obj.select_set(True)
         layer.objects.active = active
         scene.frame_start, scene.frame_end = frames
         scene.frame_set(frame, subframe=subframe)

@@ -109,15 +109,15 @@ def _path_of(name: str) -> str:
     return f'["{bpy.utils.escape_identifier(name)}"]'
 
 
-def _animate(thing: bpy.types.Object, name: str, frames: Array, values: Array, *, constant: bool) -> None:
+def _animate(obj: bpy.types.Object, name: str, frames: Array, values: Array, *, constant: bool) -> None:
     """Key a custom property at every frame."""
-    thing[name] = 0.0
-    thing.id_properties_ui(name).update(min=0.0, description="Normal force of the ground in newtons")
+    obj[name] = 0.0
+    obj.id_properties_ui(name).update(min=0.0, description="Normal force of the ground in newtons")
     if constant:
-        thing.id_properties_ui(name).update(max=1.0, description="Whether the sole touches the ground")
+        obj.id_properties_ui(name).update(max=1.0, description="Whether the sole touches the ground")
     path = _path_of(name)
-    thing.keyframe_insert(path, frame=float(frames[0]))
-    animation: Any = thing.animation_data
+    obj.keyframe_insert(path, frame=float(frames[0]))
+    animation: Any = obj.animation_data
     curves = compat.action_curves(animation.action, compat.slot_of(animation))
     curve: Any = next(curve for curve in curves if curve.data_path == path)
     curve.keyframe_points.clear()

@@ -65,10 +65,10 @@ def of_positions(mesh: bpy.types.Mesh) -> str:
     return f"{zlib.crc32(rest.data):08x}"
 
 
-def of_weights(thing: bpy.types.Object, groups: Container[str]) -> str:
+def of_weights(obj: bpy.types.Object, groups: Container[str]) -> str:
     """How strongly the vertices of a mesh belong to some of its vertex groups; of a large mesh, a sample of them."""
-    numbers = {group.index: group.name for group in thing.vertex_groups if group.name in groups}
-    vertices = ground_mesh.mesh_of(thing).vertices
+    numbers = {group.index: group.name for group in obj.vertex_groups if group.name in groups}
+    vertices = ground_mesh.mesh_of(obj).vertices
     looked_at = range(0, len(vertices), -(-len(vertices) // _LOOKED_AT)) if numbers and len(vertices) else ()
     return joined(
         f"{index} {numbers[member.group]} {member.weight:.6g}"
@@ -88,10 +88,10 @@ def of_attribute(mesh: bpy.types.Mesh, name: str) -> str:
     return f"{zlib.crc32(values.data):08x}"
 
 
-def of_place(things: Iterable[bpy.types.Object]) -> str:
+def of_place(objects: Iterable[bpy.types.Object]) -> str:
     """Where objects stand in their parents, but for what their own animation decides."""
     values = []
-    for one in things:
+    for one in objects:
         animated = _animated(one)
         values += [
             value
@@ -103,13 +103,13 @@ def of_place(things: Iterable[bpy.types.Object]) -> str:
     return f"{zlib.crc32(np.array(values, dtype=np.float32).tobytes()):08x}"
 
 
-def of_keys(thing: bpy.types.Object) -> str:
+def of_keys(obj: bpy.types.Object) -> str:
     """The keys of the user's own actions and strips, and when they are played."""
-    animation = thing.animation_data
+    animation = obj.animation_data
     if animation is None:
         return ""
     found = set()
-    action, slot = nla_layer.own_action(thing)
+    action, slot = nla_layer.own_action(obj)
     if action:
         found.add(_of_action(action, slot))
     for track, strip in _own_strips(animation):
@@ -124,13 +124,13 @@ def of_keys(thing: bpy.types.Object) -> str:
     return " ".join(sorted(found))
 
 
-def of_animation(thing: bpy.types.Object) -> str:
+def of_animation(obj: bpy.types.Object) -> str:
     """What decides, beside its keys, how an object moves: curves, strips, drivers, constraints, physics and bones."""
-    animated = animated_paths_of(thing)
-    told: list[str] = [thing.rotation_mode]
-    animation = thing.animation_data
+    animated = animated_paths_of(obj)
+    told: list[str] = [obj.rotation_mode]
+    animation = obj.animation_data
     if animation is not None:
-        action, slot = nla_layer.own_action(thing)
+        action, slot = nla_layer.own_action(obj)
         curves = set(_of_curves(action_curves(action, slot))) if action else set()
         for track, strip in _own_strips(animation):
             if strip.action:
@@ -140,13 +140,13 @@ def of_animation(thing: bpy.types.Object) -> str:
         told += sorted(curves)
         for driver in animation.drivers:
             told += _of_driver(driver)
-    for owner in (thing, *(thing.pose.bones if thing.pose else ())):
+    for owner in (obj, *(obj.pose.bones if obj.pose else ())):
         for constraint in owner.constraints:
             told += of_settings(constraint, animated)
-    if thing.rigid_body is not None:
-        told += of_settings(thing.rigid_body)
-    if thing.pose is not None:
-        told += _of_bones(thing)
+    if obj.rigid_body is not None:
+        told += of_settings(obj.rigid_body)
+    if obj.pose is not None:
+        told += _of_bones(obj)
     return joined(told)
 
 
@@ -189,17 +189,17 @@ def _plain(value: Any) -> str:
     return str([_plain(part) for part in value] if hasattr(value, "__len__") and not isinstance(value, str) else value)
 
 
-def animated_paths_of(thing: bpy.types.Object) -> set[str]:
+def animated_paths_of(obj: bpy.types.Object) -> set[str]:
     """Data paths that something sets at each frame."""
-    return {path for path, _ in _animated(thing)}
+    return {path for path, _ in _animated(obj)}
 
 
-def _animated(thing: bpy.types.Object) -> set[tuple[str, int]]:
+def _animated(obj: bpy.types.Object) -> set[tuple[str, int]]:
     """Data paths and indices that something sets at each frame, the ground's response to the rig included."""
-    animation = thing.animation_data
+    animation = obj.animation_data
     action = animation and animation.action
     answer = action_curves(action, slot_of(animation)) if action else ()
-    return nla_layer.animated_paths(thing) | {(curve.data_path, curve.array_index) for curve in answer}
+    return nla_layer.animated_paths(obj) | {(curve.data_path, curve.array_index) for curve in answer}
 
 
 def _own_strips(animation: bpy.types.AnimData) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
@@ -267,9 +267,9 @@ def _value_of(target: Any) -> str:
         return "missing"
 
 
-def _of_bones(thing: bpy.types.Object) -> Iterator[str]:
+def _of_bones(obj: bpy.types.Object) -> Iterator[str]:
     """How the bones of an armature lie at rest, and how those are posed that nothing animates."""
-    armature: Any = thing.data
+    armature: Any = obj.data
     yield armature.pose_position
     for bone in armature.bones:
         yield f"{bone.name} {bone.parent.name if bone.parent else ''} {bone.use_inherit_rotation}"
@@ -278,8 +278,8 @@ def _of_bones(thing: bpy.types.Object) -> Iterator[str]:
         values = np.empty(len(armature.bones) * (16 if part == "matrix_local" else 3), dtype=np.float32)
         armature.bones.foreach_get(part, values)
         yield f"{zlib.crc32(values.data):08x}"
-    animated = _animated(thing)
-    for bone in thing.pose.bones:
+    animated = _animated(obj)
+    for bone in obj.pose.bones:
         path = bone.path_from_id()
         pose = [
             value

@@ -71,9 +71,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     display_mesh = display_mesh_of(ground)
     if not ground_mesh.is_baked(display_mesh):
         return ()
-    if edited := next(
-        (thing for thing in (ground, display_mesh, *_bodies_of(scene, wanted)) if thing.mode == "EDIT"), None
-    ):
+    if edited := next((obj for obj in (ground, display_mesh, *_bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
         return (f"'{edited.name}' is in Edit Mode",)
     if playback.modifier_of(display_mesh) is None:
         return (f"'{display_mesh.name}' has lost its playback, and shows one moment only",)
@@ -110,7 +108,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
 def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
     """Hashes of what the motions of a shot are read from: keys, rigs, what they follow, and the meshes that print."""
     ground = settings.found(wanted.ground) if wanted.ground else None
-    movers = [thing for one in wanted.characters for thing in _movers_of(one)]
+    movers = [obj for one in wanted.characters for obj in _movers_of(one)]
     return {
         **{f"{ANIMATION}:{mover.name}": input_hashes.of_keys(mover) for mover in movers},
         **{f"{PLACE}:{mover.name}": input_hashes.of_place([mover, *ancestors(mover)]) for mover in movers},
@@ -223,16 +221,16 @@ def _worn_by(scene: bpy.types.Scene, character: CharacterSettings) -> list[bpy.t
 
 def _bodies_of(scene: bpy.types.Scene, wanted: BakeSettings) -> list[bpy.types.Object]:
     """The meshes whose undersides print."""
-    return [thing for one in wanted.characters for thing in (*_worn_by(scene, one), *_things_of(one))]
+    return [obj for one in wanted.characters for obj in (*_worn_by(scene, one), *_things_of(one))]
 
 
 def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
     """The meshes whose undersides print."""
     bones = {bone for sole in character.soles for bone in (sole.bone, sole.toe_bone) if bone}
     told = []
-    for thing in _things_of(character):
-        modifiers = (text for modifier in thing.modifiers for text in input_hashes.of_settings(modifier))
-        told.append(f"{_of_mesh(thing)} {input_hashes.joined(modifiers)}")
+    for obj in _things_of(character):
+        modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
+        told.append(f"{_of_mesh(obj)} {input_hashes.joined(modifiers)}")
     told += [
         f"{_of_mesh(worn)} {worn.parent_bone} {input_hashes.of_weights(worn, bones)} {input_hashes.of_place([worn])}"
         for worn in _worn_by(scene, character)
@@ -240,6 +238,6 @@ def _of_body(scene: bpy.types.Scene, character: CharacterSettings) -> str:
     return input_hashes.joined(sorted(told))
 
 
-def _of_mesh(thing: bpy.types.Object) -> str:
-    mesh = ground_mesh.mesh_of(thing)
+def _of_mesh(obj: bpy.types.Object) -> str:
+    mesh = ground_mesh.mesh_of(obj)
     return f"{input_hashes.of_topology(mesh)} {input_hashes.of_positions(mesh)}"

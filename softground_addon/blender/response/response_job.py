@@ -72,7 +72,7 @@ class CharacterResponse:
 
 
 def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
-    """Those that can respond to the ground, with their armatures: things without a rig cannot."""
+    """Those that can respond to the ground, with their armatures: props without a rig cannot."""
     return [(one, settings.found(one.armature)) for one in characters if one.armature]
 
 
@@ -247,7 +247,7 @@ def has_layers(scene: bpy.types.Scene) -> bool:
 
 def _layered(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
     """Armatures with a layer: of characters, and of what was one when it was baked."""
-    armatures = (thing for thing in scene.objects if thing.type == "ARMATURE" and thing.library is None)
+    armatures = (obj for obj in scene.objects if obj.type == "ARMATURE" and obj.library is None)
     return (armature for armature in armatures if nla_layer.has_layer(armature))
 
 
