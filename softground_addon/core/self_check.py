@@ -44,7 +44,7 @@ PERSON_MASS, PERSON_LEG = 77.5, 0.87
 """A person of 1.78 m [kg], hip to ground [m] (0.491 of stature; Drillis and Contini 1966)."""
 LEG_OF_STATURE = 0.491
 MASS_RANGE = 4.0
-"""Ratio of mass to that of a person of the same leg length beyond which it is asked about."""
+"""Ratio of mass to that of the body's skin, or of a person of the same leg length, beyond which it is asked about."""
 TALLEST, SMALLEST = 20.0, 0.05
 """Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
 APART = 0.02
@@ -155,13 +155,14 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             f"Scale it by {scale}, its meshes with it, or leave it if it is meant so.",
         )
         return  # with its size, the mass that suits it changes
-    likely = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3
+    likely, by = motion.skin.mass if motion.skin else 0.0, "what has the volume of its skin"
+    if not likely:
+        likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "a person on legs of its length"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
         yield Finding(
             "mass_of_size",
             "warning",
-            f"'{motion.name}' weighs {motion.mass:g} kg on legs of {motion.leg_length:.2g} m: a person of that "
-            f"size weighs about {float(f'{likely:.2g}'):g} kg.",
+            f"'{motion.name}' weighs {motion.mass:g} kg, and {by} about {float(f'{likely:.2g}'):g} kg.",
             "Set Mass in the Character panel.",
         )
 

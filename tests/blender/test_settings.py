@@ -21,6 +21,7 @@ NO_INPUT = {
     "active_character": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.response_strength": "how much of a baked layer shows; moves the layer itself",
+    "characters.skin_mass": "what the panel suggests for the mass",
     "own_time": "what Slow Down gives back",
     "slowed_time": "what Slow Down has set",
 }

@@ -52,6 +52,8 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     character.name = armature.name
     character.armature = armature
     _fill(character, mapping)
+    if mapping.mass:
+        character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
     _take_frames(scene, animated_frames(armature))
     character.sole_length = length
@@ -224,6 +226,7 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
 
 
 def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
+    character.skin_mass = mapping.mass
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:

@@ -14,8 +14,9 @@ from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..settings import found, name_of, units_of
 from .recording import Recording
-from .rig_mapping import RigMapping, SoleSource, map_rig
+from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
 from .rig_sampling import is_animated, record
+from .skin_mass import skin_mass
 from .skin_sampling import FollowedSkin, followed_skin, read_skin
 from .skin_stances import UNDERSIDE
 from .sole_extraction import bone_families
@@ -56,17 +57,15 @@ def recognise(
         If neither the skin, nor the names, nor the rest pose show any contact.
     """
     rig = name_of(armature)
-    seen: tuple[SoleSource, ...] = ()
-    if frames and is_animated(armature):
-        seen = yield from _contacts_of_skin(scene, armature, frames)
-        armature = found(rig)
+    seen, mass = yield from _shown_by_skin(scene, armature, frames)
+    armature = found(rig)
     try:
         mapping = map_rig(armature)
     except InputError:
         if not seen:
             raise
         mapping = RigMapping(method="skin")
-    return RigMapping(mapping.joints, _joined(armature, mapping.soles, seen), mapping.method)
+    return RigMapping(mapping.joints, _joined(armature, mapping.soles, seen), mapping.method, mass)
 
 
 def _joined(
@@ -83,28 +82,38 @@ def _joined(
     return (*soles, *(replace(contact, limb=contact.limb or bool(soles)) for contact in left))
 
 
-def _contacts_of_skin(
-    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int]
-) -> jobs.Job[tuple[SoleSource, ...]]:
-    """The contacts that the skin shows."""
+def _shown_by_skin(
+    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None
+) -> jobs.Job[tuple[tuple[SoleSource, ...], float]]:
+    """The contacts and the mass [kg] that the skin shows."""
+    require_armature(armature)
+    if armature.mode == "EDIT":
+        return (), 0.0
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
     skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
     armature = found(rig)
-    if skin is None or armature.mode == "EDIT" or armature.data.pose_position == "REST":
-        return ()
+    if skin is None or armature.mode == "EDIT":
+        return (), 0.0
     units = units_of(scene)
-    first, last = (round(frame / units.time_stretch) for frame in frames)
-    samples = range(first, min(last, first + MOST_FRAMES) + 1)
+    samples = range(scene.frame_current, scene.frame_current + 1)
+    moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
+    if frames and moves:
+        first, last = (round(frame / units.time_stretch) for frame in frames)
+        samples = range(first, min(last, first + MOST_FRAMES) + 1)
     reading = record(scene, armature, samples, skin.bones, units)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    weighing = skin_mass.slices(skin, found(rig), recording.of(np.array([0])))
+    mass = yield from jobs.meanwhile(read, weighing)
+    if not moves:
+        return (), mass
     following = followed_skin.slices(skin, found(rig), recording, units.frame_rate, linked=True)
     followed = yield from jobs.meanwhile(read, following)
     if followed is None:
-        return ()
+        return (), mass
     contacts = yield from jobs.meanwhile(read, find_contacts.slices(followed.motion))
     bearing = np.flatnonzero(contacts.bears.any(axis=0))
     sources = (_source(number, contacts, followed, recording) for number in bearing)
-    return tuple(source for source in sources if source)
+    return tuple(source for source in sources if source), mass
 
 
 def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:

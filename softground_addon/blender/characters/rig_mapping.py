@@ -33,11 +33,14 @@ class RigMapping:
         What prints, feet first.
     method : str
         How they were found: by "names" or "rest pose", or as the "settings" have them.
+    mass : float
+        That its skin suggests [kg], 0 where none does.
     """
 
     joints: Mapping[str, BoneEnd] = field(default_factory=dict)
     soles: tuple[SoleSource, ...] = ()
     method: str = "names"
+    mass: float = 0.0
 
 
 def map_rig(armature: bpy.types.Object) -> RigMapping:

@@ -272,7 +272,7 @@ def followed_skin(
         Whether to tell which parts hang together.
     """
     rig = name_of(armature)
-    body = np.flatnonzero(~_carried(skin, armature))
+    body = np.flatnonzero(~carried(skin, armature))
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
     height = (yield from skinned.slices(skin, armature, probes, body))[..., 2]
     size = float(np.median(np.ptp(height, axis=1)))
@@ -295,7 +295,7 @@ def followed_skin(
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
 
 
-def _carried(skin: RigSkin, armature: bpy.types.Object) -> NDArray[np.bool_]:
+def carried(skin: RigSkin, armature: bpy.types.Object) -> NDArray[np.bool_]:
     """Vertices of what a character carries: hung on bones that hang from bones with a skin.
 
     A robot of rigid pieces has no such skin above them; there they are its body.

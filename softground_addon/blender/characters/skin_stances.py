@@ -15,6 +15,7 @@ from ...core.skin.contacts import find_contacts
 from ..settings import found, name_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource
+from .skin_mass import skin_mass
 from .skin_sampling import FollowedSkin, RigSkin, followed_skin, skinned
 from .sole_extraction import FootMesh, bone_families, limb_family
 
@@ -109,7 +110,8 @@ def skin_stances(
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
-    skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height)
+    mass = yield from skin_mass.slices(skin, armature, recording.of(np.array([0])))
+    skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, skin_there)
 
 

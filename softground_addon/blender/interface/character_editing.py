@@ -56,6 +56,32 @@ class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
+MUCH = 2.0
+"""Ratio of a mass to that of the skin from which the panel suggests the latter."""
+
+
+def suggested_mass(character: Any) -> float:
+    """Mass that a character's skin suggests where its own differs much [kg], 0 where it does not."""
+    mass, skin = character.mass, character.skin_mass
+    return float(skin) if skin > 0 and not skin / MUCH < mass < skin * MUCH else 0.0
+
+
+class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
+    """Set the mass to what the volume of the character's skin weighs at the density of water, as bodies do"""
+
+    bl_idname = "softground.mass_by_volume"
+    bl_label = "Mass by Volume"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        character = active_character(settings.scene_of(context))
+        if not character.skin_mass > 0:
+            raise InputError(f"'{character_setup.title_of(character)}' has no skin to go by: type its mass.")
+        character.mass = character.skin_mass
+        return {"FINISHED"}
+
+
 class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
     """Find the feet and joints of the character again, by its skin, the names of its bones or its rest pose. Esc
     cancels"""
@@ -146,6 +172,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
 
 CLASSES = (
     SOFTGROUND_OT_remove_character,
+    SOFTGROUND_OT_mass_by_volume,
     SOFTGROUND_OT_detect_bones,
     SOFTGROUND_OT_add_contact,
     SOFTGROUND_OT_add_sole,

@@ -12,7 +12,7 @@ from .. import session, settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
 from . import bake_result, prediction, preset_menu
-from .character_editing import active_character, active_sole
+from .character_editing import active_character, active_sole, suggested_mass
 from .panel_base import SidebarPanel
 
 
@@ -78,6 +78,9 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             if not is_thing(character):
                 layout.prop(character, "armature")
             layout.prop(character, "mass")
+            if suggested_mass(character):
+                text = f"{suggested_mass(character):g} kg by Volume"
+                layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
             layout.prop(character, "force_model")
 
 

@@ -88,6 +88,9 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         soft_max=500.0,
         precision=1,
     )
+    skin_mass: FloatProperty(
+        name="Mass of the Skin", description="What its skin weighs by volume, 0 where unknown", options={"HIDDEN"}
+    )
     force_model: EnumProperty(
         name="Forces",
         description="How the force under each foot is estimated from the animation",

@@ -182,6 +182,8 @@ class LowSkin:
         Slower than this it may rest: the faster the body, the faster [m/s].
     height : float
         Of the body [m].
+    mass : float
+        That its volume suggests [kg], 0 where it suggests none.
     """
 
     frames: Array
@@ -189,6 +191,7 @@ class LowSkin:
     rise: Array
     calm: float
     height: float
+    mass: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,27 @@
+"""What hangs together: connected components of a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.intp]
+
+
+def components(count: int, one: Indices, other: Indices) -> Indices:
+    """Number of the component that each of `count` nodes is in, from 0 on, where `one` and `other` (L,) are linked.
+
+    Examples
+    --------
+    >>> components(5, np.array([0, 3]), np.array([1, 4]))
+    array([0, 0, 1, 2, 2])
+    """
+    label = np.arange(count)
+    while True:
+        lower = np.minimum(label[one], label[other])
+        known = label.copy()
+        for end in (one, other):
+            np.minimum.at(label, label[end], lower)
+        label = label[label]  # a node of a label is in that label's own component
+        if (label == known).all():
+            return np.asarray(np.unique(label, return_inverse=True)[1])
