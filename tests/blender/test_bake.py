@@ -10,7 +10,7 @@ import pytest
 
 from softground_addon.blender import mesh_arrays
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.character_setup import set_up_automatically
+from softground_addon.blender.characters.selection import set_up_automatically
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.ground.display_key import DISPLAY_KEY

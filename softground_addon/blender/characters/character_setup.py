@@ -11,13 +11,14 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.props import mass_properties
+from ...core.numerics.components import components
 from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .prop_extraction import surface_of
 from .recognition import SHARE, recognise
-from .rig_mapping import RigMapping, instances_armature, require_armature
-from .rig_sampling import is_animated, is_simulated, sample_character
+from .rig_mapping import CHOOSE_CONTACTS, RigMapping, require_armature
+from .rig_sampling import is_simulated, sample_character
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
@@ -30,13 +31,16 @@ def add_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> 
     Raises
     ------
     InputError
-        If there is no armature, it is a character already, or its feet are not found.
+        If there is no armature, or it is a character already.
     """
     return jobs.run(adding_character(scene, armature))
 
 
 def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) -> jobs.Job[SoftGroundCharacter]:
-    """What `add_character` does, in steps; nothing is changed before the last."""
+    """What `add_character` does, in steps; nothing is changed before the last.
+
+    Where no feet are found its list of soles is empty, for the user to fill.
+    """
     require_armature(armature)
     assert armature is not None
     settings = scene.softground
@@ -93,7 +97,7 @@ def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> 
 
 def _fit_ground(scene: bpy.types.Scene) -> None:
     """Let the ground fit a character that was just added: by the default preset if it is the first."""
-    if len(scene.softground.characters) == 1:
+    if len(characters_of(scene)) == 1:
         take_defaults(scene)
     fit_cells(scene)
 
@@ -198,12 +202,12 @@ def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
     """Bake the frames of the first character; widen the range for further ones."""
     if not frames:
-        if len(scene.softground.characters) == 1:
+        if len(characters_of(scene)) == 1:
             scene.softground.frame_start, scene.softground.frame_end = scene.frame_start, scene.frame_end
         return
     settings = scene.softground
     start, end = _frames_of_scene(scene, frames)
-    if len(settings.characters) > 1:
+    if len(characters_of(scene)) > 1:
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end
 
@@ -221,6 +225,8 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     armature = scene.softground.characters[number].armature
     require_armature(armature)
     mapping = yield from recognise(scene, armature, animated_frames(armature))
+    if not mapping.soles:
+        raise InputError(f"No feet are found in '{armature.name}': {CHOOSE_CONTACTS}.")
     _fill(scene.softground.characters[number], mapping)
     return [source.name for source in mapping.soles]
 
@@ -265,6 +271,51 @@ def add_bone_contacts(character: SoftGroundCharacter, bones: Iterable[str]) -> l
         sole.side = _side_of(bone)
     character.active_sole = len(character.soles) - 1
     return fresh
+
+
+LEAST_SHARE = 0.05
+"""Share of the weights on some vertices from which a bone carries them."""
+
+
+def add_vertex_contacts(character: SoftGroundCharacter, skin: bpy.types.Object) -> list[str]:
+    """Let what carries the selected vertices of a character's mesh print, a contact for each patch of them; its names.
+
+    Raises
+    ------
+    InputError
+        If none is selected, or no bone carries them.
+    """
+    skin.update_from_editmode()
+    mesh = skin.data
+    assert isinstance(mesh, bpy.types.Mesh)
+    chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("select", chosen)
+    edges = np.zeros(2 * len(mesh.edges), dtype=np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    one, other = edges.reshape(-1, 2)[chosen[edges.reshape(-1, 2)].all(axis=1)].T
+    patch, bones = components(len(chosen), one, other), character.armature.data.bones
+    carried: dict[str, set[str]] = {}
+    for number in np.unique(patch[chosen]):
+        weights: dict[str, float] = {}
+        for vertex in np.flatnonzero(chosen & (patch == number)).tolist():
+            for element in mesh.vertices[vertex].groups:
+                name = skin.vertex_groups[element.group].name
+                if name in bones and bones[name].use_deform:
+                    weights[name] = weights.get(name, 0.0) + element.weight
+        least = LEAST_SHARE * sum(weights.values())
+        if least > 0:
+            main = max(weights, key=weights.__getitem__)
+            carried.setdefault(main, set()).update(name for name, weight in weights.items() if weight >= least)
+    if not carried:
+        raise InputError(
+            f"No vertex of '{skin.name}' is selected that a bone of '{title_of(character)}' carries: select those that "
+            "touch the ground."
+        )
+    added = add_bone_contacts(character, carried)
+    for name in added:
+        for bone in sorted(carried[name]):
+            character.soles[name].parts.add().name = bone
+    return added
 
 
 def add_object_contacts(
@@ -340,32 +391,3 @@ def leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
     followed = [getattr(one, "target", None) for one in constraints]
     followed += [weighted.target for one in constraints if one.type == "ARMATURE" for weighted in one.targets]
     return {leader for leader in followed if leader is not None} - {thing}
-
-
-def set_up_automatically(scene: bpy.types.Scene) -> None:
-    """Make the scene's only armature a character where no character is set up yet.
-
-    Raises
-    ------
-    InputError
-        If there is no armature or more than one, or its feet are not found.
-    """
-    if scene.softground.characters:
-        return
-    armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
-    if not armatures:
-        inside = next(filter(instances_armature, scene.objects), None)
-        if inside:
-            require_armature(inside)
-        raise InputError(
-            f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
-            "with Add Character in the SoftGround panel."
-        )
-    moving = [armature for armature in armatures if is_animated(armature)]
-    if len(armatures) > 1 and len(moving) != 1:
-        names = ", ".join(f"'{armature.name}'" for armature in armatures)
-        raise InputError(
-            f"Scene '{scene.name}' has several armatures ({names}): add those that walk with Add Character in the "
-            "SoftGround panel and save the file."
-        )
-    add_character(scene, (moving or armatures)[0])

@@ -49,12 +49,12 @@ def recognise(
     Returns
     -------
     Job of RigMapping
-        Leaving it changes nothing.
+        Without soles where neither the skin, nor the names, nor the rest pose show any. Leaving it changes nothing.
 
     Raises
     ------
     InputError
-        If neither the skin, nor the names, nor the rest pose show any contact.
+        If the armature or its meshes cannot be read.
     """
     rig = name_of(armature)
     seen, mass = yield from _shown_by_skin(scene, armature, frames)
@@ -62,8 +62,6 @@ def recognise(
     try:
         mapping = map_rig(armature)
     except InputError:
-        if not seen:
-            raise
         mapping = RigMapping(method="skin")
     return RigMapping(mapping.joints, _joined(armature, mapping.soles, seen), mapping.method, mass)
 

@@ -43,6 +43,13 @@ class RigMapping:
     mass: float = 0.0
 
 
+CHOOSE_CONTACTS = (
+    "select the bones that touch the ground in Pose Mode, or vertices of the mesh in Edit Mode, and press Add Contact "
+    "in the Character panel"
+)
+"""What to do where no feet are found."""
+
+
 def map_rig(armature: bpy.types.Object) -> RigMapping:
     """Joints and feet of an armature.
 
@@ -122,6 +129,14 @@ def instances_armature(thing: bpy.types.Object) -> bool:
     """Whether an object shows an armature of the collection that it instances, as linked characters are at first."""
     collection = thing.instance_collection
     return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)
+
+
+def instances_mesh(thing: bpy.types.Object) -> bool:
+    """Whether an object shows a mesh of the collection that it instances, and no armature."""
+    collection = thing.instance_collection
+    if collection is None or instances_armature(thing):
+        return False
+    return any(part.type == "MESH" for part in collection.all_objects)
 
 
 def require_armature(armature: bpy.types.Object | None) -> None:

@@ -26,7 +26,7 @@ from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_p
 from .motion_assembly import assemble_motion
 from .prop_extraction import check_things, prop_motion
 from .recording import Recording
-from .rig_mapping import RigMapping, SoleSource, require_armature
+from .rig_mapping import CHOOSE_CONTACTS, RigMapping, SoleSource, require_armature
 from .skin_sampling import read_skin
 from .skin_stances import LONGEST, skin_stances
 from .sole_extraction import meshes_on
@@ -386,7 +386,7 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
     name = armature.name
     _check_mass(name, mass)
     if not mapping.soles:
-        raise InputError(f"'{name}' has no soles: add a foot bone or an object to the character's list of soles.")
+        raise InputError(f"'{name}' has nothing to print with: {CHOOSE_CONTACTS}.")
     bones = armature.data.bones
     for source in mapping.soles:
         if not source.bone and not source.object:

@@ -22,7 +22,7 @@ from ...core.files import files, report
 from ...core.ground import presets
 from .. import jobs, settings
 from ..baking import bake_job
-from ..characters.character_setup import set_up_automatically
+from ..characters.selection import set_up_automatically
 from ..output import export_formats
 from ..settings import user_folder
 from . import cli_arguments, program

@@ -103,8 +103,8 @@ class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
 
 
 class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
-    """Let the selected bones or objects print too: hands, knees, canes, snowshoes. Each presses with whatever side of
-    it faces down"""
+    """Let the selected bones, objects, or vertices of the skin print too: hands, knees, canes, snowshoes. Each presses
+    with whatever side of it faces down"""
 
     bl_idname = "softground.add_contact"
     bl_label = "Add Contact"
@@ -120,6 +120,12 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
                 raise InputError(f"'{posed.name}' is no character yet: press Add Character first.")
             bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
             added = character_setup.add_bone_contacts(character, bones)
+        elif context.mode == "EDIT_MESH" and context.object is not None:
+            rig = context.object.find_armature()
+            character = next((one for one in scene.softground.characters if rig and one.armature == rig), None)
+            if character is None:
+                raise InputError(f"'{context.object.name}' is the skin of no character: press Add Character first.")
+            added = character_setup.add_vertex_contacts(character, context.object)
         else:
             characters = scene.softground.characters
             things = [thing for thing in context.selected_objects if all(thing != one.armature for one in characters)]

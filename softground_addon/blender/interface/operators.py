@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
+from typing import Literal
 
 import bpy
 
@@ -12,7 +13,8 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from .. import jobs, session, settings
-from ..characters import character_setup, recognition
+from ..characters import character_setup, recognition, selection
+from ..characters.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..command_line import program
 from ..ground import baked_ground, ground_checks, ground_mesh, look
 from ..ground.created_ground import create_ground
@@ -21,29 +23,37 @@ from ..reading import analysis, shots
 from ..response import response_job
 from .modal_bake import Reading
 
+Reports = list[tuple[Literal["INFO", "WARNING"], str]]
+"""What to say, and how urgent it is."""
+
 
 class SOFTGROUND_OT_add_character(Reading):
-    """Add the active armature: its feet, hips and limbs are recognized by their names or by the rest pose. Without an
-    armature, add the selected mesh objects as things that fall, roll or slide. Its animation is read; Esc cancels"""
+    """Add the selected characters: their feet, hips and limbs are recognized by the skin, by their names or by the rest
+    pose. Selected objects without a rig are added as things that fall, roll or slide. The animation is read, which Esc
+    cancels"""
 
     bl_idname = "softground.add_character"
     bl_label = "Add Character"
     cancelled = "Add Character cancelled: nothing was changed"
 
-    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[str]:
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[Reports]:
         return _added(scene, bpy.context.active_object, list(bpy.context.selected_objects))
 
-    def _show(self, result: str) -> None:
-        self.report({"INFO"}, result)
+    def _show(self, result: Reports) -> None:
+        for kind, text in result:
+            self.report({kind}, text)
 
 
-def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> jobs.Job[str]:
-    """Add the active armature or the selected objects, and read the shot for its prediction; what to say of it."""
+def _added(
+    scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]
+) -> jobs.Job[Reports]:
+    """Add what is selected, and read the shot for its prediction; the reports of it, each with its kind."""
     options = scene.softground
     before = len(options.characters), options.active_character, options.frame_start, options.frame_end
     fresh, cells = settings.untouched(scene), (options.cell_size, options.cells_along_sole)
-    text, stays = (yield from _add(scene, active, selected)), False
+    stays = False
     try:
+        reports = yield from _add(scene, active, selected)
         yield jobs.Progress("sample", recognition.SHARE)
         if not bpy.app.background:
             with suppress(InputError):  # it says so when the user asks for the depth, or bakes
@@ -57,24 +67,28 @@ def _added(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: li
             options.cell_size, options.cells_along_sole = cells
             for group, field in fresh:
                 group.property_unset(field)
-    return text
+    return reports
 
 
-def _add(scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]) -> jobs.Job[str]:
-    armature = _armature_of(active)
-    if armature is None or armature.type != "MESH":
-        character = yield from character_setup.adding_character(scene, armature)
-        return f"Added '{character.name}' with " + ", ".join(sole.name for sole in character.soles)
-    things = [thing for thing in selected if thing.type == "MESH" and not thing.find_armature()]
-    added = character_setup.add_things(scene, dict.fromkeys([armature, *things]))
-    return "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)
-
-
-def _armature_of(thing: bpy.types.Object | None) -> bpy.types.Object | None:
-    """The object itself, or the armature that deforms it: clicking a character mostly selects its mesh."""
-    if thing is not None and thing.type == "MESH":
-        return thing.find_armature() or thing
-    return thing
+def _add(
+    scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]
+) -> jobs.Job[Reports]:
+    rigs, things = selection.chosen(scene, active, selected)
+    reports: Reports = []
+    for name in [settings.name_of(rig) for rig in rigs]:
+        character = yield from character_setup.adding_character(scene, settings.found(name))
+        soles = ", ".join(sole.name for sole in character.soles)
+        if soles:
+            reports.append(("INFO", f"Added '{character.name}' with {soles}"))
+        else:
+            reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
+    added = character_setup.add_things(scene, things) if things else []
+    if added:
+        reports.append(("INFO", "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)))
+    for thing in things:
+        if not selection.moves(thing):
+            reports.append(("WARNING", f"'{thing.name}' does not move: give it keys or a rigid body before you bake"))
+    return reports
 
 
 class SOFTGROUND_OT_create_ground(bpy.types.Operator):
@@ -86,6 +100,12 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
+        thing = context.active_object
+        if thing is not None and thing.select_get() and instances_mesh(thing):
+            raise InputError(
+                f"'{thing.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
+                "Apply > Make Instances Real), select the mesh that is walked on, and press Create Ground again."
+            )
         chosen = _selected_ground(context)
         if chosen is not None:
             ground_checks.check_usable(chosen)

@@ -77,11 +77,27 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         if character:
             if not is_thing(character):
                 layout.prop(character, "armature")
+            if not is_set_up(character):
+                _note(layout, "Was deleted: undo that, or take it out with -", "ERROR")
+            elif not any(sole.bone or sole.object for sole in character.soles):
+                _no_contacts(layout, character)
             layout.prop(character, "mass")
             if suggested_mass(character):
                 text = f"{suggested_mass(character):g} kg by Volume"
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
             layout.prop(character, "force_model")
+
+
+def _no_contacts(layout: Any, character: Any) -> None:
+    """What prints, where nothing was found: from a selection, or a bone by name or eyedropper."""
+    box = layout.box().column(align=True)
+    box.label(text="No feet found: choose what prints", icon="ERROR")
+    box.operator("softground.add_contact", text="Add from Selected Bones / Vertices", icon="PLUS")
+    if not character.soles:
+        box.operator("softground.add_sole", text="Choose a Bone", icon="EYEDROPPER")
+    elif character.armature:
+        box.prop_search(character.soles[0], "bone", character.armature.data, "bones")
+        box.prop(character.soles[0], "object")
 
 
 class _OfCharacter(SidebarPanel):

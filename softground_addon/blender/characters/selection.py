@@ -1,0 +1,125 @@
+"""Whom a user means: from what is selected, or from all of a scene, to the rigs and objects that print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import bpy
+
+from ...core.errors import InputError
+from .character_setup import add_character, ancestors, leaders
+from .rig_mapping import instances_armature, require_armature
+from .rig_sampling import is_animated, is_simulated
+from .sole_extraction import meshes_on
+
+
+def chosen(
+    scene: bpy.types.Scene, active: bpy.types.Object | None, selected: Iterable[bpy.types.Object]
+) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
+    """Armatures and other objects that are to be added to a scene's characters.
+
+    Where what is selected neither is a rig nor moves, such as a camera or Blender's first cube, the one rig of the
+    scene that does is meant.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to add.
+    """
+    picked = list(dict.fromkeys(thing for thing in (active, *selected) if thing is not None))
+    known = {character.armature for character in scene.softground.characters}
+    rigs = list(dict.fromkeys(skin_rig(scene, rig) for thing in picked for rig in _rigs_of(thing, known)))
+    fresh = [rig for rig in rigs if rig not in known]
+    things = [thing for thing in picked if thing.type == "MESH" and not _rigs_of(thing, known)]
+    moving = [thing for thing in things if moves(thing)]
+    if rigs and (not moving or (active is not None and _rigs_of(active, known))):
+        return fresh or rigs[:1], []
+    if fresh or moving:
+        return fresh, moving if fresh else things
+    walkers = [rig for rig in walkers_of(scene) if rig not in known]
+    if len(walkers) == 1:
+        return walkers, []
+    if not things:
+        if len(walkers) > 1:
+            raise InputError(f"Several rigs move here ({_names(walkers)}): select those that walk.")
+        require_armature(active)
+    return [], things
+
+
+def moves(thing: bpy.types.Object) -> bool:
+    """Whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
+    return is_animated(thing) or is_simulated(thing)
+
+
+def _rigs_of(thing: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The armature that an object is or wears, or hangs on if it is not `known` yet; those below an empty."""
+    if thing.type == "ARMATURE" or instances_armature(thing):
+        return [thing]
+    if thing.type == "MESH":
+        above = [one for one in ancestors(thing) if one.type == "ARMATURE" and one not in known]
+        wears = thing.find_armature()
+        return [wears] if wears else above[:1]
+    return [below for below in thing.children_recursive if below.type == "ARMATURE"]
+
+
+def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Object:
+    """The armature that moves the skin where another one controls it; itself if it does, or none is found."""
+    if armature.type != "ARMATURE" or meshes_on(scene, armature):
+        return armature
+    followers = [
+        other
+        for other in scene.objects
+        if other.type == "ARMATURE" and armature in _all_leaders(other) and meshes_on(scene, other)
+    ]
+    return followers[0] if len(followers) == 1 else armature
+
+
+def _all_leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+    """What an object follows by its constraints and parents, and what those follow."""
+    found: set[bpy.types.Object] = set()
+    waiting = [thing]
+    while waiting:
+        one = waiting.pop()
+        further = (leaders(one) | set(ancestors(one))) - found
+        found |= further
+        waiting += further
+    return found - {thing}
+
+
+def walkers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The armatures of a scene that move; where some of them move a skin, those."""
+    moving = [thing for thing in scene.objects if thing.type == "ARMATURE" and is_animated(thing)]
+    rigs = list(dict.fromkeys(skin_rig(scene, rig) for rig in moving))
+    return [rig for rig in rigs if meshes_on(scene, rig)] or rigs
+
+
+def set_up_automatically(scene: bpy.types.Scene) -> None:
+    """Make the scene's only rig that moves a skin, or moves at all, a character where none is set up yet.
+
+    Raises
+    ------
+    InputError
+        If there is no armature, or more than one that could be meant.
+    """
+    if scene.softground.characters:
+        return
+    armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
+    if not armatures:
+        inside = next(filter(instances_armature, scene.objects), None)
+        if inside:
+            require_armature(inside)
+        raise InputError(
+            f"Scene '{scene.name}' has no armature: open a shot with an animated character, or add what falls or rolls "
+            "with Add Character in the SoftGround panel."
+        )
+    rigs = walkers_of(scene) or armatures
+    if len(rigs) > 1:
+        raise InputError(
+            f"Scene '{scene.name}' has several armatures ({_names(rigs)}): add those that walk with Add Character in "
+            "the SoftGround panel and save the file."
+        )
+    add_character(scene, rigs[0])
+
+
+def _names(things: Sequence[bpy.types.Object]) -> str:
+    return ", ".join(f"'{thing.name}'" for thing in things)
