@@ -2,12 +2,14 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
 
 from softground_addon.batch import receipts
 
+ROOT = Path(__file__).parents[2]
 OPTIONS = ["--preset=snow", "--save=baked.blend"]
 
 
@@ -51,6 +53,19 @@ def test_a_file_that_has_changed_or_is_gone_undoes_it(baked, name):
     assert done(baked) is None
     (baked / name).unlink()
     assert done(baked) is None
+
+
+@pytest.mark.parametrize("year", [1971, 2037])
+def test_a_clock_that_was_set_changes_nothing(baked, year):
+    for path in baked.iterdir():
+        os.utime(path, (moment := (year - 1970) * 365 * 86400, moment))
+    assert done(baked) == {"steps": 4}
+
+
+def test_nothing_reads_a_clock_that_can_be_set():
+    read = re.compile(r"time\.time|time_ns|datetime|localtime|gmtime|st_[mac]time|getmtime")
+    sources = [path for folder in ("softground_addon", "farm") for path in (ROOT / folder).rglob("*.py")]
+    assert [str(path) for path in sources if read.search(path.read_text(encoding="utf-8"))] == []
 
 
 @pytest.mark.parametrize(

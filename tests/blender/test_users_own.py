@@ -3,6 +3,7 @@
 import bpy
 import pytest
 
+from softground_addon.blender import mesh_arrays
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data, playback
 from tests.blender import fingerprints
 from tests.blender.grounds import field, refusal
@@ -143,3 +144,43 @@ def test_whatever_fails_while_the_ground_is_written_it_is_given_back(short_walk,
     with pytest.raises(RuntimeError, match="MemoryError"):
         bpy.ops.softground.bake()
     assert fingerprints.of_file() == before
+
+
+def played_heights(scene, shown):
+    """What the playback makes of a ground, at some frames."""
+    played = []
+    for frame in (1, 12, 30):
+        scene.frame_set(frame)
+        mesh = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        played.append(mesh_arrays.positions(mesh).tobytes())
+    scene.frame_set(1)
+    return played
+
+
+@pytest.mark.parametrize("shape_keys", [True, False])
+@pytest.mark.parametrize("copied", [False, True])
+@pytest.mark.parametrize("part", ["attach", "write_soles"])
+def test_a_bake_that_fails_while_it_is_written_leaves_the_one_before(short_walk, monkeypatch, part, copied, shape_keys):
+    def fail(*_arguments, **_named):
+        raise MemoryError(part)
+
+    options = short_walk.softground
+    options.tread, options.shape_keys = 0.003, shape_keys
+    ground = field(short_walk, **({} if copied else FINE))
+    options.detail = "AUTO"
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    shown = baked_ground.display_mesh_of(ground)
+    assert (shown != ground) == copied
+    users_key = shown.shape_key_add(name="Theirs") if shape_keys else None
+    if users_key:
+        users_key.points[3].co.z += 0.123
+    before, played = fingerprints.of_file(), played_heights(short_walk, shown)
+    options.material.youngs_modulus *= 0.5
+    monkeypatch.setattr(playback if part == "attach" else ground_mesh, part, fail)
+    with pytest.raises(RuntimeError, match="MemoryError"):
+        bpy.ops.softground.bake()
+    assert fingerprints.of_file() == before
+    assert played_heights(short_walk, shown) == played
+    monkeypatch.undo()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert played_heights(short_walk, shown) != played

@@ -84,12 +84,12 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             shape_keys=made_with.shape_keys,
             marks=marks,
         )
-        name, error, show = place.display_mesh, spans.error, place.publish if place.is_draft else None
+        is_draft, error, show = place.is_draft, spans.error, place.publish
         del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
-        if show:
+        if is_draft:
             yield Progress("write", 0.9)
-            show()
-    return Published(settings.found(name), error)
+        shown = show()
+    return Published(shown, error)
 
 
 def sign(

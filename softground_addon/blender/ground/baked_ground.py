@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,16 +41,16 @@ class Place:
     display_mesh : bpy.types.Object
         What takes the prints.
     publish : callable
-        Takes away what stands in its way, and shows the display_mesh.
+        Shows the written display mesh, takes away what stood in its place, and returns what carries the bake.
     is_draft : bool
-        Whether the display_mesh is a new object, in no scene yet.
+        Whether the display mesh is a new object, in no scene yet.
     """
 
     index: Indices
     position: Array
     display_mesh: ObjectName
-    publish: Callable[[], object]
-    is_draft: bool = False
+    publish: Callable[[], bpy.types.Object]
+    is_draft: bool = True
 
 
 def display_mesh_of(ground: bpy.types.Object) -> bpy.types.Object:
@@ -86,28 +87,35 @@ def on_created(scene: bpy.types.Scene, draft: bpy.types.Object, layout: Layout, 
     index = np.flatnonzero(trail.covers(*layout.vertices[:, :2].T))
     name = name_of(draft)
 
-    def publish() -> None:
+    def publish() -> bpy.types.Object:
         created_ground.publish(scene, found(name), surface)
+        return found(name)
 
-    return Place(index, layout.vertices[index], name, publish, is_draft=True)
+    return Place(index, layout.vertices[index], name, publish)
 
 
 def on_detail(ground: bpy.types.Object, draft: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """A draft of the ground refined along the trail; a bake that lies on the ground itself is taken off."""
     below, above = name_of(ground), name_of(draft)
+    if there := trail_detail.detail_of(ground):  # and gets what is written to the draft
+        ground_checks.check_playable(there)
 
-    def publish() -> None:
+    def publish() -> bpy.types.Object:
         ground_mesh.restore(found(below))
-        trail_detail.publish(found(below), found(above))
+        return trail_detail.publish(found(below), found(above))
 
-    there = trail_detail.detail_of(ground)
-    return Place(index, vertices[index], name_of(there or draft), publish, is_draft=there is None)
+    return Place(index, vertices[index], above, publish)
 
 
 def on_itself(ground: bpy.types.Object, index: Indices, vertices: Array) -> Place:
     """The ground itself; a detail that stood in for it is taken away."""
     name = name_of(ground)
-    return Place(index, vertices[index], name, lambda: trail_detail.remove(found(name)))
+
+    def publish() -> bpy.types.Object:
+        trail_detail.remove(found(name))
+        return found(name)
+
+    return Place(index, vertices[index], name, publish, is_draft=False)
 
 
 def write(
@@ -120,11 +128,10 @@ def write(
     unit_scale: float,
     shape_keys: bool = True,
     marks: Array | None = None,
-) -> Job[bpy.types.Object]:
-    """Put a bake on its place: the finished ground, the record, and the playback. Returns what carries it.
+) -> Job[None]:
+    """Put a bake on its place: the finished ground, the record, and the playback. It still has to be published.
 
-    What is there already is written in one step. A draft, which takes several, still has to be published: that takes
-    memory of its own, which what is given here may have left by then.
+    What is in the scene already is written in one step, and is as it was before if that fails.
 
     Parameters
     ----------
@@ -148,20 +155,46 @@ def write(
     ground_checks.check_playable(found(place.display_mesh))
     sample = sample.moved_at(spans.point)  # what never moves stays exactly where it is
     up = ground_mesh.up_of(found(place.display_mesh), unit_scale)
-    if not place.is_draft:
-        place.publish()
-    try:
+    with nullcontext() if place.is_draft else _as_before_if_it_fails(place.display_mesh):
         ground_mesh.write(found(place.display_mesh), place.index, sample, stored, unit_scale, shape_keys=shape_keys)
         if place.is_draft:
             yield Progress("write", 0.9)
         display_mesh = found(place.display_mesh)
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
         ground_mesh.write_soles(display_mesh, place.index, marks)
+
+
+@contextmanager
+def _as_before_if_it_fails(name: ObjectName) -> Iterator[None]:
+    """Give a ground back what it was, with the bake that was on it, where what is done to it fails."""
+    if not ground_mesh.is_baked(found(name)):
+        try:
+            yield
+        except BaseException:
+            ground_mesh.restore(found(name))
+            raise
+        return
+    older: Any = ground_mesh.mesh_of(found(name)).copy()
+    played = [(name_of(shown), modifier.node_group) for shown, modifier in playback.playing(found(name))]
+    for _, group in played:
+        group.use_fake_user = True  # or it goes with its last modifier
+    try:
+        yield
     except BaseException:
-        if not place.is_draft:  # which whoever made it takes away
-            ground_mesh.restore(found(place.display_mesh))
+        playback.remove(found(name))
+        newer: Any = ground_mesh.mesh_of(found(name))
+        kept = newer.name
+        newer.user_remap(older)
+        ground_mesh.remove_mesh(newer)
+        older.name = kept
+        for shown, group in played:
+            playback.play(found(shown), group)
+            group.use_fake_user = False
         raise
-    return display_mesh
+    ground_mesh.remove_mesh(older)
+    for _, group in played:
+        group.use_fake_user = False
+    playback.remove_unused()
 
 
 def stored_record(ground: bpy.types.Object) -> memoryview:

@@ -364,6 +364,12 @@ def discard(ground: bpy.types.Object) -> None:
         bpy.data.meshes.remove(mesh)
 
 
+def remove_mesh(mesh: bpy.types.Mesh) -> None:
+    """Remove a mesh that nobody shows, with its shape keys."""
+    display_key.drop_all(mesh)
+    bpy.data.meshes.remove(mesh)
+
+
 def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Positions without the bake, (V, 3) in the object's own space and units.
 

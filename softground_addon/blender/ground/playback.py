@@ -69,15 +69,21 @@ def attach(
     remove(ground)
     mesh = cast("bpy.types.Mesh", ground.data)
     _write_attributes(mesh, vertices, spans)
-    active = ground.modifiers.active
-    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = nodes.build(
+    group = nodes.build(
         table=table,
         up=up.tolist(),
         frame_rate=spans.frame_rate,
         few=len(vertices) < FEW * len(mesh.vertices),
         settled=mesh.shape_keys is None,
     )
+    return play(ground, group)
+
+
+def play(ground: bpy.types.Object, group: bpy.types.NodeTree) -> Any:
+    """Have an object play a node group by a modifier of its own, the first."""
+    active = ground.modifiers.active
+    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = group
     modifier.show_in_editmode = False
     modifier.show_expanded = False
     ground.modifiers.move(len(ground.modifiers) - 1, 0)
@@ -104,16 +110,39 @@ def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     return None
 
 
-def remove(ground: bpy.types.Object) -> None:
-    """Take the playback off a ground and copies of it with the same mesh; nothing happens where there is none."""
+def playing(ground: bpy.types.Object) -> list[tuple[bpy.types.Object, Any]]:
+    """The objects that show a ground's mesh and play it, the ground or copies of it, each with its modifier."""
     mesh = cast("bpy.types.Mesh", ground.data)
     copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
-    for shown in {ground, *copies}:
-        while modifier := modifier_of(shown):
-            shown.modifiers.remove(modifier)
+    return [(shown, modifier) for shown in {ground, *copies} if (modifier := modifier_of(shown))]
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take the playback off a ground and copies of it with the same mesh; nothing happens where there is none."""
+    while shown := playing(ground):
+        for obj, modifier in shown:
+            obj.modifiers.remove(modifier)
+    remove_unused()
+    own_data.remove(cast("bpy.types.Mesh", ground.data), own_data.OF_PLAYBACK)
+
+
+def hand_over(source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Have an object play what another one plays, under the name of what it played; its mesh is left alone."""
+    new, old = modifier_of(source), modifier_of(target)
+    name = old.node_group.name if old else ""
+    while old:
+        target.modifiers.remove(old)
+        old = modifier_of(target)
+    remove_unused()
+    if new is not None:
+        play(target, new.node_group)
+        new.node_group.name = name or new.node_group.name
+
+
+def remove_unused() -> None:
+    """Remove what nobody plays any more, also of a modifier that the user has deleted."""
     for group in [one for one in bpy.data.node_groups if nodes.is_playback(one) and not (one.users or one.library)]:
-        _remove_group(group)  # also of a modifier that the user has deleted
-    own_data.remove(mesh, own_data.OF_PLAYBACK)
+        _remove_group(group)
 
 
 def _remove_group(group: bpy.types.NodeTree) -> None:

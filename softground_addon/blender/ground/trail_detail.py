@@ -104,11 +104,11 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
 def publish(ground: bpy.types.Object, draft: bpy.types.Object) -> bpy.types.Object:
     """Show the refined ground in place of the ground, which is hidden.
 
-    Where there is a copy already, it gets the mesh, and the draft stays out.
+    Where there is a copy already, it gets the mesh and the playback, and the draft stays out.
     """
     detail = detail_of(ground)
     if detail is not None:
-        _exchange_mesh(detail, ground_mesh.mesh_of(draft))
+        _exchange(detail, draft)
         ground[DETAIL] = detail
         return detail
     _forget_deleted(ground)
@@ -158,16 +158,16 @@ def _choose_instead(shown: bpy.types.Object, gone: bpy.types.Object) -> None:
                     layer.objects.active = shown
 
 
-def _exchange_mesh(detail: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Give the copy a new mesh of the same name; its materials and what the user added to the object stay."""
-    old: Any = detail.data
+def _exchange(detail: bpy.types.Object, draft: bpy.types.Object) -> None:
+    """Give the copy the draft's mesh, under the name of its own; its materials and what the user added to it stay."""
+    old, mesh = ground_mesh.mesh_of(detail), ground_mesh.mesh_of(draft)
     for place, material in enumerate(old.materials):
         if place < len(mesh.materials):
             mesh.materials[place] = material
         else:
             mesh.materials.append(material)
     detail.data = mesh
-    playback.remove(detail)  # not from the old mesh, which a copy of the user's may show
+    playback.hand_over(draft, detail)
     name = old.name
     if not old.users:
         bpy.data.meshes.remove(old)
