@@ -85,15 +85,15 @@ def test_forces_and_timing_are_within_the_bars(name, per_foot, total):
     ("name", "per_foot"),
     [
         ("walk_subject01", 0.036),
-        ("opencap4_walking1", 0.050),
-        ("opencap4_walking2", 0.050),
+        ("opencap4_walking1", 0.048),
+        ("opencap4_walking2", 0.047),
         ("opencap4_walkingTI1", 0.068),  # with the plates' own timing 0.060
         ("run_rajagopal", 0.050),
-        ("hamner04_run200", 0.127),
-        ("hamner04_run400", 0.112),
+        ("hamner04_run200", 0.123),
+        ("hamner04_run400", 0.099),
         ("opencap4_DJ1", 0.110),
         ("opencap4_DJ2", 0.110),
-        ("opencap4_DJAsym1", 0.160),  # half of its total's error alone is 0.111
+        ("opencap4_DJAsym1", 0.150),  # half of its total's error alone is 0.096
         ("opencap4_squats1", 0.020),
         ("opencap4_STS1", 0.032),
     ],

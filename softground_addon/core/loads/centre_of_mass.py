@@ -6,6 +6,7 @@ parameters", J. Biomechanics 29(9), table 4, male; four-legged animals have thei
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,9 +43,9 @@ class _MassTable:
 
 _HUMAN = _MassTable(
     trunk=0.4346,
-    # The upper end is midway between the neck joint, from which de Leva gives 0.5138, and the middle of the shoulders,
-    # from which he gives 0.4310.
-    trunk_centre=0.4724,
+    # As de Leva gives it from the neck joint. Half of the upper end is between the shoulders, from which he gives less:
+    # his trunk is stiff, one that bends takes its belly along with the hips (docs/forces.md, "Where the constants").
+    trunk_centre=0.5138,
     head=0.0694,
     head_centre=0.20,  # 0.5·243 mm of 603 mm
     limbs=(
@@ -88,6 +89,8 @@ _TOWARD_HIPS = {
 }
 """The joint that carries the mass of one that is not mapped."""
 
+_LEG_JOINTS = ("hip", "knee", "ankle")
+
 _FRACTION_DEVIATION = 0.2
 """Standard deviation of a body part's mass fraction about de Leva's, relative: people differ, and markers and bones
 slide against the flesh that they stand for."""
@@ -106,16 +109,23 @@ class MassPoints:
         Of the body mass; they sum to 1.
     parts : (K,) int array
         Index of the body part that each point belongs to; left and right limbs are one part.
+    legs : (K,) bool array
+        The points on limbs that stand, as far as their joints are mapped.
     """
 
     positions: Array
     fractions: Array
     parts: NDArray[np.intp]
+    legs: NDArray[np.bool_]
 
     @cached_property
     def centre(self) -> Array:
         """Centre of mass, (N, 3) [m]."""
         return self.fractions @ self.positions
+
+    def legs_moment(self) -> Array:
+        """What the legs contribute to `centre`, (N, 3) [m]."""
+        return (self.fractions * self.legs) @ self.positions
 
     def part_centres(self) -> Array:
         """Centre of mass of each part, (N, parts, 3) [m]."""
@@ -146,15 +156,16 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
         (table.trunk * (1 - table.trunk_centre) / 2, shoulders),
         (table.head, neck + table.head_centre * trunk_length * unit(joints["head"] - neck)),
     ]
-    parts = list(range(len(points)))
+    parts, legs = list(range(len(points))), [False] * len(points)
     for part, (fraction, start, end, centre) in enumerate(table.limbs, start=len(points)):
         for side in "lr":
             proximal, distal = joints[f"{start}_{side}"], joints[f"{end}_{side}"]
             points.append((fraction, proximal + centre * (distal - proximal)))
             parts.append(part)
+            legs.append((motion.four_legged or start in _LEG_JOINTS) and f"{end}_{side}" in motion.joints)
     fractions = np.array([fraction for fraction, _ in points])
     positions = np.stack([position for _, position in points], axis=1)
-    return MassPoints(positions, fractions / fractions.sum(), np.array(parts))
+    return MassPoints(positions, fractions / fractions.sum(), np.array(parts), np.array(legs))
 
 
 def fitted_to_free_fall(
@@ -199,7 +210,7 @@ def fitted_to_free_fall(
     change -= along * (deviation @ change) / (deviation @ along)
     misfit = ((missed + np.einsum("rp,p->r", scaled, change)) ** 2).sum() + (change**2).sum()
     fractions = points.fractions * (np.maximum(prior + deviation * change, 0.0) / prior)[points.parts]
-    return MassPoints(points.positions, fractions / fractions.sum(), points.parts), float(misfit)
+    return dataclasses.replace(points, fractions=fractions / fractions.sum()), float(misfit)
 
 
 class _Joints:

@@ -7,8 +7,8 @@ from softground_addon.core.loads.body_dynamics import body_dynamics
 from softground_addon.core.motion.motion import CharacterMotion, steps_per_frame
 
 GRAVITY = 9.81
-UPPER = 0.3975
-"""Part of the mass that a body with hips and neck only has at its neck: half of the trunk, head and arms (de Leva)."""
+UPPER = 0.3795
+"""Part of the mass that a body with hips and neck only has at its neck: 0.486 of the trunk, head and arms (de Leva)."""
 
 
 @pytest.mark.parametrize("seconds", [0.5, 1.5])
