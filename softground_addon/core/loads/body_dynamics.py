@@ -23,8 +23,8 @@ CUTOFF = 16.0
 gait (Winter 2009, "Biomechanics and Motor Control of Human Movement", chapter 3: 6 Hz and more). It holds where the
 motion itself does not tell better."""
 PASSES = 1.07
-"""Trunk, head and arms pass the low-pass twice, for the flesh on them follows the bones slowly; the legs, which bring the
-impacts, once. Two passes together cut lower than one: this raises the cut-off of each."""
+"""Trunk, head and arms pass the low-pass twice, for the flesh on them follows the bones slowly; the legs, which bring
+the impacts, once. Two passes together cut lower than one: this raises the cut-off of each."""
 SLOW_CUTOFF = 5.0
 """Cut-off that shows how a body leans while it stands, in the same unit (2.5 Hz)."""
 CUTOFF_RANGE = 2.0
@@ -159,6 +159,11 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
         if (pulling == pulled).all():
             break
         pulled = pulling
+    # A force that steps at the edges of a flight is between its values there: that impulse is the stance's.
+    for first, last in zip(*runs(~flying), strict=True):
+        impulse = force[first:last, 2].sum()
+        if impulse > 0:
+            force[first:last] *= force[max(first - 1, 0) : last + 1, 2].sum() / impulse
     force[flying | pulled] = 0.0
     return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 

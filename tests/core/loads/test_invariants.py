@@ -126,7 +126,7 @@ def test_flights_stay_flights_in_slow_motion_and_forces_what_they_were(slowed):
     assert np.sqrt((error**2).mean()) < 0.06
 
 
-@pytest.mark.parametrize(("name", "noise"), [("walk", 0.001), ("walk", 0.003), ("jog", 0.001), ("run", 0.001)])
+@pytest.mark.parametrize(("name", "noise"), [(name, noise) for name in GAITS for noise in (0.001, 0.003)])
 def test_jitter_and_sliding_feet_change_no_weight(name, noise):
     random = np.random.default_rng(4)
     motion, _ = motion_and_forces(GAITS[name], rate=60.0, seconds=5.0)
