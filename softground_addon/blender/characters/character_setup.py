@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import ceil, floor, log10
-from typing import Any
 
 import bpy
 import numpy as np
@@ -15,6 +14,7 @@ from ...core.numerics.components import components
 from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
+from .frame_ranges import ancestors, animated_frames
 from .prop_extraction import surface_of
 from .recognition import SHARE, recognise
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, require_armature
@@ -49,7 +49,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
             f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
         )
     rig = name_of(armature)
-    mapping = yield from recognise(scene, armature, animated_frames(armature))
+    mapping = yield from recognise(scene, armature, animated_frames(scene, armature))
     length = yield from _shortest_sole(scene, found(rig), mapping)
     armature = found(rig)
     character = settings.characters.add()
@@ -59,7 +59,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     if mapping.mass:
         character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
-    _take_frames(scene, animated_frames(armature))
+    _take_frames(scene, animated_frames(scene, armature))
     character.sole_length = length
     _fit_ground(scene)
     return character
@@ -75,7 +75,7 @@ _POSES = 16
 
 def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> jobs.Job[float]:
     """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
-    first, last = _frames_of_scene(scene, animated_frames(armature))
+    first, last = _frames_of_scene(scene, animated_frames(scene, armature))
     frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
     reading = sample_character(scene, armature, mapping, mass=1.0, frames=frames)
     try:
@@ -164,15 +164,6 @@ def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
             raise InputError(f"'{thing.name}' prints already, as a sole of '{title_of(character)}'.")
 
 
-def ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
-    """An object's parents, nearest first."""
-    found, parent = [], thing.parent
-    while parent is not None:
-        found.append(parent)
-        parent = parent.parent
-    return found
-
-
 def _root(thing: bpy.types.Object) -> bpy.types.Object:
     return ([thing, *ancestors(thing)])[-1]
 
@@ -196,7 +187,7 @@ def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int
     if is_simulated(thing) and scene.rigidbody_world:
         cache = scene.rigidbody_world.point_cache
         return max(cache.frame_start, scene.frame_start), min(cache.frame_end, scene.frame_end)
-    return animated_frames(thing)
+    return animated_frames(scene, thing)
 
 
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
@@ -210,6 +201,7 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
     if len(characters_of(scene)) > 1:
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end
+    settings.animated_frames = start, end
 
 
 def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
@@ -224,7 +216,7 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     """
     armature = scene.softground.characters[number].armature
     require_armature(armature)
-    mapping = yield from recognise(scene, armature, animated_frames(armature))
+    mapping = yield from recognise(scene, armature, animated_frames(scene, armature))
     if not mapping.soles:
         raise InputError(f"No feet are found in '{armature.name}': {CHOOSE_CONTACTS}.")
     _fill(scene.softground.characters[number], mapping)
@@ -356,38 +348,3 @@ def title_of(character: SoftGroundCharacter) -> str:
 def characters_of(scene: bpy.types.Scene) -> list[SoftGroundCharacter]:
     """The scene's characters whose armature or objects are still there."""
     return [character for character in scene.softground.characters if is_set_up(character)]
-
-
-def animated_frames(
-    armature: bpy.types.Object, followers: frozenset[bpy.types.Object] = frozenset()
-) -> tuple[int, int] | None:
-    """First and last frame of the object's action and NLA strips, and of those that it is parented to.
-
-    Where there are none, of what its constraints follow; `followers` are those that are asked about already.
-    """
-    ranges: list[tuple[float, float]] = []
-    for node in (armature, *ancestors(armature)):
-        animation = node.animation_data
-        if animation:
-            strips = [
-                strip for track in animation.nla_tracks if not track.mute for strip in track.strips if not strip.mute
-            ]
-            ranges += [(strip.frame_start, strip.frame_end) for strip in strips]
-            if animation.action:
-                frames = animation.action.frame_range
-                ranges.append((frames[0], frames[1]))
-    if not ranges:
-        followers |= {armature}
-        ranges += [found for leader in leaders(armature) - followers if (found := animated_frames(leader, followers))]
-    if not ranges:
-        return None
-    return floor(min(start for start, _ in ranges)), ceil(max(end for _, end in ranges))
-
-
-def leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
-    """Objects that the constraints of an object and of its bones follow."""
-    bones = thing.pose.bones if thing.pose else ()
-    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints if not one.mute]
-    followed = [getattr(one, "target", None) for one in constraints]
-    followed += [weighted.target for one in constraints if one.type == "ARMATURE" for weighted in one.targets]
-    return {leader for leader in followed if leader is not None} - {thing}

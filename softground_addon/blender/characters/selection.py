@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 import bpy
 
 from ...core.errors import InputError
-from .character_setup import add_character, ancestors, leaders
+from .character_setup import add_character
+from .frame_ranges import ancestors, leaders
 from .rig_mapping import instances_armature, require_armature
 from .rig_sampling import is_animated, is_simulated
 from .sole_extraction import meshes_on

@@ -9,7 +9,7 @@ import bpy
 from ...core.errors import InputError
 from .. import jobs, settings
 from ..characters import character_setup
-from ..characters.character_setup import ancestors
+from ..characters.frame_ranges import ancestors
 from ..operator_base import reports_errors
 from .modal_bake import Reading
 

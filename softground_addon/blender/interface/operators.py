@@ -13,7 +13,7 @@ from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
 from .. import jobs, session, settings
-from ..characters import character_setup, recognition, selection
+from ..characters import character_setup, frame_ranges, recognition, selection
 from ..characters.rig_mapping import CHOOSE_CONTACTS, instances_mesh
 from ..command_line import program
 from ..ground import baked_ground, ground_checks, ground_mesh, look
@@ -129,7 +129,7 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
         return None
     characters = settings.scene_of(context).softground.characters
-    above = character_setup.ancestors(thing)
+    above = frame_ranges.ancestors(thing)
     belongs = any(one.armature in above or any(sole.object == thing for sole in one.soles) for one in characters)
     return None if belongs else thing
 

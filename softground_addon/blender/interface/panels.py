@@ -265,6 +265,8 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(options, "frame_start")
         column.prop(options, "frame_end")
+        if apart := _apart_from_scene(settings.scene_of(context)):
+            _note(layout, apart)
         if state.is_baking:
             layout.enabled = True
             column.enabled = False
@@ -281,6 +283,16 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
             bake_result.draw(layout, options, summary)
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
+
+
+def _apart_from_scene(scene: Any) -> str:
+    """Why the bake leaves out frames of the scene, or goes on beyond its end; empty where they agree."""
+    options = scene.softground
+    start, end = options.frame_start, options.frame_end
+    if not options.characters or (scene.frame_start >= start and end == scene.frame_end):
+        return ""
+    whose = "The animation" if (start, end) == tuple(options.animated_frames) else "The bake"
+    return f"{whose} is from {start} to {end}, the scene from {scene.frame_start} to {scene.frame_end}"
 
 
 def _live_buttons(layout: Any, state: Any) -> None:

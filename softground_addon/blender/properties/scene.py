@@ -123,6 +123,9 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    animated_frames: IntVectorProperty(
+        name="Animated Frames", description="As Add Character has set Start and End", size=2, options={"HIDDEN"}
+    )
     own_time: IntVectorProperty(
         name="Own Time Stretching", description="As the user had it before Slow Down", size=2, options={"HIDDEN"}
     )

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.files import report
 from ...core.settings import Acts, BakeSettings, CharacterSettings
 from .. import settings
-from ..characters.character_setup import ancestors, leaders
+from ..characters.frame_ranges import ancestors, leaders
 from ..characters.rig_sampling import object_named
 from ..characters.sole_extraction import meshes_on
 from ..compat import SERIES
