@@ -62,8 +62,9 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
     lasting = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(bears[:, part]), strict=True):
-            may_go_on = first == 0 or last == len(bears)  # beyond the shot
-            lasting[first:last, part] = may_go_on or last - first > longest
+            # What bears at an end of the shot may go on beyond it; at a single frame, nobody saw it slow down.
+            least = 1 if first == 0 or last == len(bears) else longest
+            lasting[first:last, part] = last - first > least
     return lasting
 
 

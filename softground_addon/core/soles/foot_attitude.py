@@ -22,7 +22,7 @@ _STILL_SPEED = 0.05
 """A foot slower than this, over sqrt(g·leg length), is still (0.15 m/s for a man)."""
 
 _STILL_SHARE = 0.2
-"""Of a foot that never is still, the slowest part of its low instants counts."""
+"""Of feet that never are still, the slowest part of their low instants counts, and at least `_FEWEST_INSTANTS`."""
 
 _LOW_CLEARANCE = 0.05
 """Height above the foot's own lowest position within `_FLOOR_WINDOW`, over leg length, up to which a foot is low."""
@@ -92,11 +92,16 @@ def planted_instants(
     planted = [near & (speed <= _STILL_SPEED) for near, speed in zip(low, speeds, strict=True)]
     if sum(int(still.sum()) for still in planted) < _FEWEST_INSTANTS:
         planted = [
-            near & (speed <= np.quantile(speed[near], _STILL_SHARE)) if near.any() else near
+            near & (speed <= _slow(speed[near])) if near.any() else near
             for near, speed in zip(low, speeds, strict=True)
         ]
     fewest = min(_FEWEST_INSTANTS, int((~held).sum()))
     return [stands & (stands.sum() >= fewest) for stands in planted]
+
+
+def _slow(speeds: Array) -> float:
+    """The speed up to which the slowest of some instants count, however few they are (K,)."""
+    return max(float(np.quantile(speeds, _STILL_SHARE)), float(np.sort(speeds)[:_FEWEST_INSTANTS][-1]))
 
 
 def _held(points: Array, tolerance: float) -> NDArray[np.bool_]:

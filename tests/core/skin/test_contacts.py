@@ -113,6 +113,14 @@ def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) ->
         assert (found.bears == whole.bears[:end])[:-1].all(), end
 
 
+@pytest.mark.parametrize("seen", [1, 2, 3])
+def test_a_foot_that_comes_down_as_the_shot_ends_bears_once_two_frames_show_it(seen: int) -> None:
+    skin, stands = animal(2, duty=0.5, stride=0.6)
+    end = next(frame for frame in range(50, FRAMES) if stands[frame, 0] and not stands[frame - 1, 0]) + seen
+    found = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
+    assert found.bears[-1, found.group[0]] == (seen > 1)
+
+
 def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
     skin, stands = animal(2, duty=0.6, stride=0.6)
     positions = skin.positions.copy()

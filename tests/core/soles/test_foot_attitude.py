@@ -56,6 +56,17 @@ def test_a_still_foot_in_the_air_is_not_planted():
     assert not up.any()
 
 
+def test_a_foot_that_is_down_for_a_few_frames_of_a_sprint_is_planted_in_them():
+    path, stands = stepping(cycles=1, stance=6, swing=14)
+    path[..., 0] += 1e-3 * (np.arange(len(path))[:, None] + 5.0) ** 2  # never still: it slides, ever faster
+    other = path[::-1] + (0, 0.2, 0)
+    for planted, down in zip(
+        planted_instants([path, other], frame_rate=RATE, leg_length=0.9), (stands, stands[::-1]), strict=True
+    ):
+        assert planted.sum() >= 3
+        assert not (planted & ~down).any()
+
+
 @pytest.mark.parametrize("scale", [0.05, 1.0, 20.0])
 def test_being_planted_does_not_depend_on_size(scale):
     path, _ = stepping()
