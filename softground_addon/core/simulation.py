@@ -30,6 +30,11 @@ Array = NDArray[np.float64]
 LONGEST_TRACK = 8.0
 """Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
 
+LONGEST_SLIDE = 0.25
+"""How far a foot slides within one print, in body heights: further on, it is another place that it prints, ..."""
+SHORTEST_SLIDE = 0.08
+"""... if it takes as long for it [s]."""
+
 
 @dataclass(frozen=True)
 class FrameResult:
@@ -164,7 +169,7 @@ class _Waiting:
         while self._contacts and self._contacts[0].first < end:
             contact = self._contacts.popleft()
             earlier = self._latest.get(contact.of)
-            goes_on = contact.points is None and earlier is not None and earlier.layout.end == contact.since
+            goes_on = earlier is not None and earlier.layout.end == contact.since
             opened = self._latest[contact.of] = OpenContact(contact.layout(self._frames), earlier if goes_on else None)
             yield opened
 
@@ -215,7 +220,15 @@ class _Contact:
 def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
     """The contacts of a sole of a character, which appears at a step of the time grid."""
     motion = character.motion.soles[index]
-    tracks = list(_tracks(motion, character.contacts.touching[:, index]))
+    skin = character.motion.skin
+    tracks = list(
+        _tracks(
+            motion,
+            character.contacts.touching[:, index],
+            furthest=LONGEST_SLIDE * skin.height if skin else np.inf,
+            shortest=SHORTEST_SLIDE / character.motion.time_step,
+        )
+    )
     points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.prop else None
     for since, end in tracks:
         begin = max(since, 1 - offset)  # the first step of the grid is a state, it presses nothing
@@ -223,17 +236,27 @@ def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -
             yield _Contact(character, (number, index), slice(begin, end), since + offset, begin + offset, points)
 
 
-def _tracks(motion: SoleMotion, touching: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First steps of the contacts, and the steps after their last; those of a body that travels far are cut."""
-    prop = motion.sole.prop
+def _tracks(
+    motion: SoleMotion, touching: NDArray[np.bool_], *, furthest: float, shortest: float
+) -> Iterator[tuple[int, int]]:
+    """First steps of the contacts, and the steps after their last; those of a body that travels far are cut.
+
+    Those of a foot that slides, in a gait on the spot or on skates, are cut into even pieces of at most `furthest` [m]
+    and on average at least `shortest` steps.
+    """
+    prop, place = motion.sole.prop, motion.transforms[:, 0, :2, 3]
     for first, end in zip(*runs(touching), strict=True):
-        begin = int(first)
         if prop is not None:
-            place = motion.transforms[:, 0, :2, 3]
-            for step in range(begin + 1, int(end)):
-                if np.abs(place[step] - place[begin]).max() > LONGEST_TRACK * prop.extent.max():
-                    yield begin, step
-                    begin = step
+            limit = LONGEST_TRACK * prop.extent.max()
+        else:
+            slide = float(np.abs(place[first:end] - place[first]).max())
+            pieces = min(np.ceil(slide / furthest), (end - first) // shortest)
+            limit = slide / pieces if pieces > 1 else np.inf
+        begin = int(first)
+        for step in range(begin + 1, int(end)):
+            if np.abs(place[step] - place[begin]).max() > limit:
+                yield begin, step
+                begin = step
         yield begin, int(end)
 
 

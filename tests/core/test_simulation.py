@@ -1,6 +1,7 @@
 """Footprints of whole motions: closed forms, and independence of everything that must not matter."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -10,6 +11,7 @@ from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain, Window
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose
@@ -341,6 +343,27 @@ def test_a_sliding_sole_leaves_a_continuous_track_however_long():
     assert track.min() > 0.8 * track.max() > 0
     assert footprint.rim_m3 == pytest.approx(0.1 * footprint.compressed_m3, rel=1e-9)
     assert memory_of(ground) < 1.5e6
+
+
+@pytest.mark.parametrize(("slide", "seconds", "prints"), [(0.2, 1.0, 1), (1.1, 1.0, 3), (1.1, 0.2, 2), (1.1, 0.1, 1)])
+def test_a_foot_of_a_body_of_known_height_that_slides_prints_place_after_place(slide, seconds, prints):
+    count = round(seconds * 120) + 1
+    x = np.linspace(0, slide, count)
+    transforms = pose(np.stack([x, 0 * x, 0 * x], -1))[:, None]
+    loads = loads_of([box_sole(0.25, 0.09)], [transforms], np.full((count, 1), 500.0), np.ones((count, 1), bool), 30.0)
+    skin = LowSkin(loads.motion.frames, np.zeros((count, 1, 3)), np.zeros((count, 1)), 0.3, 1.78)
+    known = replace(loads, motion=replace(loads.motion, skin=skin))
+    whole, (one,) = pressed(loads, SNOW)
+    ground, found = pressed(known, SNOW)
+    assert len(found) == prints
+    places = np.array([0.0] + [footprint.position[0] for footprint in found] + [slide])
+    assert np.diff(places).max() < slide / prints + 0.05  # evenly along the way
+    step = 1 / 4
+    for footprint, after in pairwise(found):
+        assert after.start_frame - footprint.end_frame == pytest.approx(step)
+    along = np.linspace(0.0, slide, 50)
+    np.testing.assert_allclose(ground.sample(along, 0 * along)[0], whole.sample(along, 0 * along)[0], rtol=0.25)
+    assert sum(footprint.compressed_m3 for footprint in found) == pytest.approx(one.compressed_m3, rel=0.1)
 
 
 def test_tiny_and_giant_characters_print_alike_in_proportion():

@@ -46,6 +46,11 @@ EVEN_FALL = 0.35
 """A body falls evenly, and so in slow motion, where its acceleration varies by less than this part of itself."""
 MOST_ROUNDS = 12
 """Rounds in which a body comes to fall freely where it would be pulled down."""
+MOST_PULLED = 0.2
+"""A body that would fall for more than this share of the time that it touches bobs higher than it could: its bobbing
+is taken for lower, ..."""
+LOWER_BOB = 1.25
+"""... by so much at a time."""
 STEADY_ENDS = 0.01
 """How much a force of 1 body weight is expected at both ends of the action, where half of the evidence is missing."""
 
@@ -136,7 +141,8 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     the motion is nowhere near free fall while nothing touches, it stays as it was.
 
     A body on its feet that the motion asks to be pulled down, as when it bobs too fast by hand, falls freely there too:
-    cutting the force off instead would leave it more than its weight on average.
+    cutting the force off instead would leave it more than its weight on average. Where it would fall for most of its
+    stances, and strike like a hammer between, it bobs less.
     """
     flying = flights(airborne, body, motion.time_step)
     pulled = ~airborne & (body.force[:, 2] < 0)
@@ -148,17 +154,23 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     sampled, each = motion.on_frames, _of_each_pass(points, cutoff, motion.frame_step)
     path = np.zeros((len(sampled), 3))
     path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff)
-    # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
-    for _ in range(MOST_ROUNDS):
-        falling = _inner(flying) | pulled
-        centre, _, acceleration = smooth_path(
-            path, motion.time_step, each, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
-        )
-        force = acceleration / fall + (0.0, 0.0, 1.0)
-        pulling = ~airborne & (force[:, 2] < 0)
-        if (pulling == pulled).all():
+    acted = fall
+    while True:
+        # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
+        for _ in range(MOST_ROUNDS):
+            falling = _inner(flying) | pulled
+            centre, _, acceleration = smooth_path(
+                path, motion.time_step, each, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
+            )
+            force = acceleration / fall + (0.0, 0.0, 1.0)
+            pulling = ~airborne & (force[:, 2] < 0)
+            if (pulling == pulled).all():
+                break
+            pulled = pulling
+        if pulled.sum() <= MOST_PULLED * (~airborne).sum() or fall >= RATES_OF_FALL[1] * motion.gravity:
             break
-        pulled = pulling
+        fall *= LOWER_BOB
+    centre[:, 2] += (acted / fall - 1) * (centre[:, 2] - centre[:, 2].mean())
     # A force that steps at the edges of a flight is between its values there: that impulse is the stance's.
     for first, last in zip(*runs(~flying), strict=True):
         impulse = force[first:last, 2].sum()

@@ -79,6 +79,15 @@ def test_a_bob_by_hand_weighs_what_the_body_weighs(height, period, cycles, rate)
     assert_sound(loads)
 
 
+@pytest.mark.parametrize("height", [0.04, 0.06, 0.08])
+def test_feet_that_stand_under_a_body_bobbing_by_hand_bear_it_most_of_the_time(height):
+    """Some animators let a body come down several times as fast as it could fall."""
+    loads = loads_of(bobbing(height, 8, 8, 24.0))
+    force = loads.forces.total[:, 2] / (loads.motion.mass * loads.motion.gravity)
+    assert (force > 0.01).mean() > 0.75
+    assert force.max() < 6.0
+
+
 @given(height=st.floats(0.0, 0.1), period=st.integers(8, 40), window=st.tuples(st.floats(0, 1), st.floats(0, 1)))
 @settings(max_examples=40, deadline=None)
 def test_the_impulse_is_the_change_of_momentum_over_any_window(height, period, window):
