@@ -59,7 +59,7 @@ def test_a_still_foot_in_the_air_is_not_planted():
 def test_a_foot_that_is_down_for_a_few_frames_of_a_sprint_is_planted_in_them():
     path, stands = stepping(cycles=1, stance=6, swing=14)
     path[..., 0] += 1e-3 * (np.arange(len(path))[:, None] + 5.0) ** 2  # never still: it slides, ever faster
-    other = path[::-1] + (0, 0.2, 0)
+    other = path[::-1] + np.array((0, 0.2, 0))
     for planted, down in zip(
         planted_instants([path, other], frame_rate=RATE, leg_length=0.9), (stands, stands[::-1]), strict=True
     ):
