@@ -266,3 +266,14 @@ def test_zero_length_and_missing_toe_bones_give_a_sensible_sole(scene):
         pose = sole.transforms[0, 0]
         np.testing.assert_allclose(pose[:3, 2], (0, 0, 1), atol=1e-4)
         np.testing.assert_allclose(pose[:3, 0], (0, -1, 0), atol=0.05)  # where the character faces
+
+
+def test_a_shoe_whose_bone_is_gone_prints_no_more(scene):
+    armature = standing()
+    bare = [sole.sole.area for sole in sample(armature).soles]
+    mesh = bpy.data.meshes.new("Shoe")
+    mesh.from_pydata(LEFT_BOOT[0], [], LEFT_BOOT[1])
+    shoe = bpy.data.objects.new("Shoe", mesh)
+    scene.collection.objects.link(shoe)
+    shoe.parent, shoe.parent_type, shoe.parent_bone = armature, "BONE", "gone"
+    assert [sole.sole.area for sole in sample(armature).soles] == bare

@@ -27,8 +27,9 @@ from ...core.soles.soles import PlacedSole, prop_sole
 from .recording import Recording
 from .rig_at_rest import RestPose
 from .rig_mapping import RigMapping, SoleSource
+from .skin_sampling import RigSkin
 from .skin_stances import SkinStances
-from .sole_extraction import find_foot_meshes, find_limb_meshes, foot_sole
+from .sole_extraction import bone_families, foot_sole, limb_family, skin_meshes
 
 _REST_IS_FLAT = np.radians(10.0)
 """Feet with a mesh whose rest pose stands flat to this angle are taken as modelled: flat."""
@@ -41,10 +42,10 @@ _SAME_SIZE = 0.2
 
 
 def assemble_motion(
-    scene: bpy.types.Scene,
     armature: bpy.types.Object,
     mapping: RigMapping,
     recording: Recording,
+    skin: RigSkin | None,
     *,
     mass: float,
     carried: Mapping[str, SoleMotion],
@@ -56,10 +57,10 @@ def assemble_motion(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     armature : bpy.types.Object
     mapping : RigMapping
     recording : Recording
+    skin : RigSkin or None
     mass : float
         [kg]
     carried : mapping of str to SoleMotion
@@ -86,8 +87,8 @@ def assemble_motion(
         [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
     )
     yield len(recording.frames)
-    unseen = [source for source in sources if source.name not in standing]
-    meshes = find_foot_meshes(scene, rest.armature, unseen, rest.world)
+    unseen = {source.name: bone_families(armature, source) for source in sources if source.name not in standing}
+    meshes = skin_meshes(skin, unseen, rest.world)
     meshes |= stances.meshes if stances else {}
     yield len(recording.frames)
     flats = _flat_feet(feet, planted, rest, facing=rest.facing(mapping), leg=leg, modelled=meshes.keys())
@@ -101,7 +102,7 @@ def assemble_motion(
         placed = foot_sole(foot.source, flat, size, mesh, has_toes=has_toes, mirrored=rest.is_mirrored)
         motions[foot.source.name] = foot.motion_of(placed, flat)
         yield len(recording.frames)
-    motions.update(_limb_motions(scene, mapping, recording, rest))
+    motions.update(_limb_motions(mapping, recording, rest, skin))
     motions.update(carried)
     if stances:
         for name, bears in stances.bears.items():
@@ -133,18 +134,17 @@ GIVE = 0.04
 
 
 def _limb_motions(
-    scene: bpy.types.Scene, mapping: RigMapping, recording: Recording, rest: RestPose
+    mapping: RigMapping, recording: Recording, rest: RestPose, skin: RigSkin | None
 ) -> dict[str, SoleMotion]:
     """Limbs that print by whatever side faces down: the skin that moves with the bone, or a bar around it."""
-    meshes = find_limb_meshes(scene, rest.armature, mapping, rest.world)
+    limbs = [source for source in mapping.soles if source.limb and not source.object]
+    families = {source.name: (limb_family(rest.armature, source, mapping), frozenset[str]()) for source in limbs}
+    meshes = skin_meshes(skin, families, rest.world)
     motions = {}
-    for source in mapping.soles:
-        if not source.limb or source.object:
-            continue
+    for source in limbs:
         head, tail = rest.end(source.bone, "head"), rest.end(source.bone, "tail")
         if source.name in meshes:
             vertices, triangles = meshes[source.name].vertices, meshes[source.name].triangles
-            vertices, triangles = _used(vertices, triangles)
         else:
             length = float(np.linalg.norm(tail - head))
             vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
@@ -154,12 +154,6 @@ def _limb_motions(
         transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
         motions[source.name] = SoleMotion(sole, transforms[:, None])
     return motions
-
-
-def _used(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """A mesh without the vertices that no triangle uses."""
-    kept, index = np.unique(triangles, return_inverse=True)
-    return vertices[kept], index.reshape(-1, 3)
 
 
 def along_bone(matrices: Array, distance: float) -> Array:

@@ -27,9 +27,8 @@ from .motion_assembly import assemble_motion
 from .prop_extraction import check_things, prop_motion
 from .recording import Recording
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, SoleSource, require_armature
-from .skin_sampling import read_skin
+from .skin_sampling import meshes_on, read_skin
 from .skin_stances import LONGEST, skin_stances
-from .sole_extraction import meshes_on
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -103,11 +102,12 @@ def sample_character(
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
-    if on_bones and len(frames) <= LONGEST and meshes_on(scene, armature):
+    if on_bones and meshes_on(scene, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene, armature))
         armature = found(rig)
+    followed = skin if len(frames) <= LONGEST else None
     units = units or units_of(scene)
-    bones += skin.bones if skin else ()
+    bones += followed.bones if followed else ()
     recording = yield from record(scene, armature, frames, bones, units, things, recorder)
     armature = found(rig)
     _check_recording(armature.name, recording)
@@ -118,12 +118,11 @@ def sample_character(
     }
     rate = units.frame_rate / frames.step
     stances = None
-    if skin:
-        stances = yield from meanwhile(len(frames), skin_stances(skin, armature, mapping, recording, rate))
+    if followed:
+        stances = yield from meanwhile(len(frames), skin_stances(followed, armature, mapping, recording, rate))
         armature = found(rig)
-    return (
-        yield from assemble_motion(scene, armature, mapping, recording, mass=mass, carried=carried, stances=stances)
-    )
+    assembling = assemble_motion(armature, mapping, recording, skin, mass=mass, carried=carried, stances=stances)
+    return (yield from assembling)
 
 
 def record(

@@ -6,6 +6,7 @@ takes milliseconds, while Blender evaluates every mesh of a scene at every frame
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import bpy
@@ -19,7 +20,6 @@ from ...core.skin.skin_motion import SkinMotion
 from .. import mesh_arrays
 from ..settings import ObjectName, found, name_of
 from .recording import Recording
-from .sole_extraction import meshes_on
 
 Indices = NDArray[np.intp]
 
@@ -59,6 +59,33 @@ class RigSkin:
     part: Indices
     hung: NDArray[np.bool_]
 
+    def weight_of(self, bones: Collection[str]) -> Array:
+        """How much of each vertex some bones move, (V,)."""
+        total = np.zeros(len(self.vertices))
+        for name, (vertex, weight) in zip(self.bones, self.weights, strict=True):
+            if name in bones:
+                total[vertex] += weight
+        return total
+
+
+def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """The rendered mesh objects that an armature deforms or that hang on its bones."""
+    return [
+        thing
+        for thing in scene.objects
+        if thing.type == "MESH" and not thing.hide_render and (_deformed_by(thing, armature) or _hangs(thing, armature))
+    ]
+
+
+def _deformed_by(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return any(m.type == "ARMATURE" and m.object == armature for m in thing.modifiers) or (
+        thing.parent == armature and thing.parent_type == "ARMATURE"
+    )
+
+
+def _hangs(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return thing.parent == armature and thing.parent_type == "BONE" and thing.parent_bone in armature.data.bones
+
 
 @sliced
 def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigSkin | None]:
@@ -78,7 +105,7 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
             )
         if not len(_mesh_of(thing).polygons):
             continue
-        if thing.parent == armature and thing.parent_type == "BONE":
+        if _hangs(thing, armature):
             pieces.append(_hung(thing, armature))
         else:
             pieces.append((yield from _deformed(name, rig)))

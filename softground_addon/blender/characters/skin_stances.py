@@ -149,8 +149,4 @@ def _mesh(
     low = vertices[triangles, 2].min(axis=1) < highest
     if not low.any():
         return None
-    toe_weight = np.zeros(len(skin.vertices))
-    for name, (vertex, weight) in zip(skin.bones, skin.weights, strict=True):
-        if name in toes:
-            toe_weight[vertex] += weight
-    return FootMesh(vertices, np.clip(toe_weight[used], 0.0, 1.0), triangles[low])
+    return FootMesh(vertices, np.clip(skin.weight_of(toes)[used], 0.0, 1.0), triangles[low])

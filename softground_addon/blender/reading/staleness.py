@@ -16,7 +16,7 @@ from ...core.settings import Acts, BakeSettings, CharacterSettings
 from .. import settings
 from ..characters.frame_ranges import ancestors, leaders
 from ..characters.rig_sampling import object_named
-from ..characters.sole_extraction import meshes_on
+from ..characters.skin_sampling import meshes_on
 from ..compat import SERIES
 from ..ground import ground_mesh, painted_ground, playback
 from ..ground.baked_ground import display_mesh_of
