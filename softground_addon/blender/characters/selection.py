@@ -11,7 +11,7 @@ from .character_setup import add_character
 from .frame_ranges import ancestors, leaders
 from .rig_mapping import instances_armature, require_armature
 from .rig_sampling import is_animated, is_simulated
-from .sole_extraction import meshes_on
+from .skin_sampling import meshes_on
 
 
 def chosen(
