@@ -34,8 +34,8 @@ _CROSSINGS: dict[int, tuple[tuple[int, int], ...]] = {
 """Marching squares: sides that the contour enters and leaves by, the inside on its left. The four bits of the key tell
 which corners are inside: bottom left, bottom right, top right, top left."""
 
-_DISTANCE_BLOCK = 2_000_000
-"""Point-segment pairs handled at once, to bound memory."""
+_DISTANCE_BLOCK = 8_000
+"""Point-segment pairs handled at once: tables so small that their memory is used again, and not had anew."""
 
 
 def trace_loops(coverage: Array, origin: Array, spacing: float) -> list[Array]:
@@ -123,18 +123,18 @@ def signed_distance(points: Array, loops: Sequence[Array]) -> Array:
 
 
 def _distance_to_segments(points: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    length_squared = np.maximum(np.einsum("si,si->s", along, along), np.finfo(float).tiny)
-    offset = points[:, None] - start
-    position = np.clip(np.einsum("psi,si->ps", offset, along) / length_squared, 0.0, 1.0)
-    gap = offset - position[..., None] * along
-    distance = np.sqrt(np.einsum("psi,psi->ps", gap, gap).min(axis=1))
+    x, y = points.T[..., None]
+    along_x, along_y = (end - start).T
+    length_squared = np.maximum(along_x**2 + along_y**2, np.finfo(float).tiny)
+    offset_x, offset_y = x - start[:, 0], y - start[:, 1]
+    position = np.clip((offset_x * along_x + offset_y * along_y) / length_squared, 0.0, 1.0)
+    gap_x, gap_y = offset_x - position * along_x, offset_y - position * along_y
+    distance = np.sqrt((gap_x**2 + gap_y**2).min(axis=1))
 
-    straddles = (start[:, 1] > points[:, 1:]) != (end[:, 1] > points[:, 1:])
-    rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
-    crossing = start[:, 0] + offset[..., 1] / rise * along[:, 0]
-    inside = (straddles & (crossing > points[:, :1])).sum(axis=1) % 2 == 1
-    return np.where(inside, -distance, distance)
+    point, segment = np.nonzero((start[:, 1] > y) != (end[:, 1] > y))
+    crossing = start[segment, 0] + offset_y[point, segment] / along_y[segment] * along_x[segment]
+    crossings = np.bincount(point[crossing > x[point, 0]], minlength=len(points))
+    return np.where(crossings % 2 == 1, -distance, distance)
 
 
 def as_one_polygon(loops: Sequence[Array]) -> Array:

@@ -147,17 +147,19 @@ def continue_outside(heights: Array) -> Array:
         Equal to the input where that is a number.
     """
     known = np.isfinite(heights)
-    filled = _spread_nearest(heights, known)
+    border = np.pad(_spread_nearest(heights, known), 1, mode="edge")
     for _ in range(_RELAXATIONS):
-        border = np.pad(filled, 1, mode="edge")
+        border[0], border[-1], border[:, 0], border[:, -1] = border[1], border[-2], border[:, 1], border[:, -2]
         mean = (border[:-2, 1:-1] + border[2:, 1:-1] + border[1:-1, :-2] + border[1:-1, 2:]) / 4
-        filled = np.where(known, heights, mean)
-    return filled
+        border[1:-1, 1:-1] = np.where(known, heights, mean)
+    return border[1:-1, 1:-1].copy()
 
 
 def _spread_nearest(heights: Array, known: NDArray[np.bool_]) -> Array:
     """Each unknown node takes the height of the nearest known one."""
-    source = np.argwhere(known)
+    around = np.pad(known, 1, mode="edge")
+    enclosed = around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
+    source = np.argwhere(known & ~enclosed)  # of the enclosed ones none is the nearest
     target = np.argwhere(~known)
     filled = heights.copy()
     block = max(1, _PAIR_BLOCK // max(len(source), 1))
