@@ -107,7 +107,7 @@ def test_auto_rig_pro_is_keyed_on_what_its_animators_key_in_ik_and_in_fk(scene):
     assert not [bone for bone in by_fk if "_ik" in bone]
 
 
-@pytest.mark.parametrize("armature", ["walker", "ik", "rigify"], indirect=True)
+@pytest.mark.parametrize("armature", ["walker", "ik", pytest.param("rigify", marks=pytest.mark.slow)], indirect=True)
 def test_the_users_keys_pose_and_constraints_are_the_same_bytes_after_clearing(armature):
     scene = bpy.context.scene
     set_up(armature)
