@@ -24,9 +24,9 @@ EDGE = 0.06
 class Score:
     """Errors of one model on one trial; see `score`.
 
-    Forces are vertical but for the anterior-posterior one, in body weights; `rms_bw_foot` is of both feet together, and
-    `share_rms_bw` what remains of it if the estimated shares are given the measured total. Times are of where the force
-    crosses `LOADED`: mean absolute error, and the mean error as bias, late being positive.
+    Forces are vertical unless named anterior-posterior or medio-lateral, in body weights; `rms_bw_foot` is of both feet
+    together, and `share_rms_bw` what remains of it if the estimated shares are given the measured total. Times are of
+    where the force crosses `LOADED`: mean absolute error, and the mean error as bias, late being positive.
     """
 
     rms_bw_foot: float
@@ -40,6 +40,8 @@ class Score:
     toe_off_ms: float
     toe_off_bias_ms: float
     rms_bw_anterior_posterior: float
+    rms_bw_foot_anterior_posterior: float
+    rms_bw_foot_medio_lateral: float
     mean_cycle_bw: float
     frames_scored: int
 
@@ -114,6 +116,8 @@ def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rat
         toe_off_ms=_mean(np.abs(leaves)) * 1e3,
         toe_off_bias_ms=_mean(leaves) * 1e3,
         rms_bw_anterior_posterior=_rms(error[scored, :, 0].sum(axis=1)),
+        rms_bw_foot_anterior_posterior=_rms(error[scored, :, 0]),
+        rms_bw_foot_medio_lateral=_rms(error[scored, :, 1]),
         mean_cycle_bw=_mean_over_cycles(total, measured[..., 2]) / weight,
         frames_scored=int(scored.sum()),
     )

@@ -51,6 +51,10 @@ def test_all_errors_are_those_that_were_made():
     assert result.rms_bw_total == pytest.approx(0.0, abs=1e-12)
     assert result.share_rms_bw == pytest.approx(result.rms_bw_foot)
     assert result.rms_bw_foot == pytest.approx(np.hypot(result.rms_bw_left, result.rms_bw_right) / np.sqrt(2))
+    skewed = score(measured + np.array((7.0, 14.0, 0.0)), measured, frames((0, 200)), weight=WEIGHT, rate=RATE)
+    assert skewed.rms_bw_foot_anterior_posterior == pytest.approx(0.01)
+    assert skewed.rms_bw_foot_medio_lateral == pytest.approx(0.02)
+    assert skewed.rms_bw_foot == 0.0
     heavier = score(1.1 * measured, measured, frames((0, 200)), weight=WEIGHT, rate=RATE)
     assert heavier.share_rms_bw == pytest.approx(0.0, abs=1e-12)
     assert heavier.rms_bw_total == pytest.approx(0.1)

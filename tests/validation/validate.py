@@ -47,12 +47,14 @@ COLUMNS = {
     "toe_off_ms": "{:>7.1f}",
     "toe_off_bias_ms": "{:>7.1f}",
     "rms_bw_anterior_posterior": "{:>7.3f}",
+    "rms_bw_foot_anterior_posterior": "{:>7.3f}",
+    "rms_bw_foot_medio_lateral": "{:>7.3f}",
     "mean_cycle_bw": "{:>7.3f}",
     "frames_scored": "{:>7d}",
 }
 HEADINGS = (
     *("trial", "path", "model", "foot", "left", "right", "total", "share", "peak"),
-    *("HS ms", "bias", "TO ms", "bias", "AP", "mean", "frames"),
+    *("HS ms", "bias", "TO ms", "bias", "AP", "AP foot", "ML foot", "mean", "frames"),
 )
 
 
@@ -110,7 +112,7 @@ def estimates(motion: CharacterMotion) -> Iterator[tuple[str, Array]]:
 
 
 def print_table(rows: list[dict[str, object]]) -> None:
-    """Errors in body weights (vertical, and AP: along the progress), of timing in ms."""
+    """Errors in body weights (vertical; AP along the progress, ML across it), of timing in ms."""
     print("{:<18} {:<7} {:<17} ".format(*HEADINGS[:3]) + " ".join(f"{heading:>7}" for heading in HEADINGS[3:]))
     for row in rows:
         print(" ".join(form.format(row[key]) for key, form in COLUMNS.items()))

@@ -26,6 +26,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 FOOT_FRACTION = 0.08
 """Mass that stops with a landing foot, of the body mass (Clark, Ryan and Weyand 2017)."""
+LOWEST_MEETING = 0.5
+"""Least height above the ground at which forces meet, in leg lengths: a body that lies presses straight down."""
 IMPACT_TIME = 0.16
 """Time in which it stops, in sqrt(leg length/gravity) (50 ms for an adult)."""
 
@@ -123,11 +125,31 @@ def whole_body_forces(
     target = point_of_action(motion, lowest, contacts.touching, body)
     pressure = centres_of_pressure(motion, lowest, share, target, np.clip(total[:, 2], 0.0, 1.0))
     forces = body_weight * share[..., None] * total[:, None]
+    forces[..., :2] += forces[..., 2:] * _along_legs(motion, body.centre, share, pressure)
     if crisp_landings:
         impacts = _foot_impacts(motion, contacts, 1 / (2 * body.cutoff))
         forces[..., 2] = np.maximum(forces[..., 2] + impacts, 0.0)
     weight = np.minimum(body_weight * share, forces[..., 2])
     return ContactForces(forces, forces.sum(axis=1), pressure, weight, forces[..., 2] - weight)
+
+
+def _along_legs(motion: CharacterMotion, centre: Array, share: Array, pressure: Array) -> Array:
+    """How much more each force leans than their sum does, (N, S, 2): legs push along themselves.
+
+    Feet that bear together push against each other so that their forces meet above the body's centre (Maus et al. 2010,
+    "Upright human gait did not provide a major mechanical challenge for our ancestors", Nature Communications 1,
+    doi:10.1038/ncomms1073), each as far from there as its hip is from the other.
+    """
+    toward = -pressure[..., :2]
+    hips = [motion.joints.get(f"hip_{side}") for side in "lr"]
+    if hips[0] is not None and hips[1] is not None and not motion.four_legged:
+        half = (hips[0] - hips[1])[:, :2] / 2
+        for index, sole in enumerate(motion.soles):
+            toward[:, index] += {"L": half, "R": -half}.get(sole.sole.side, 0.0)
+    height = centre[:, 2] - (share * pressure[..., 2]).sum(axis=1)
+    lean = toward / np.maximum(height, LOWEST_MEETING * motion.leg_length)[:, None, None]
+    leaning: Array = lean - (share[..., None] * lean).sum(axis=1, keepdims=True)
+    return leaning
 
 
 def _landing_deceleration(motion: CharacterMotion, contacts: Contacts, characteristic_time: float) -> Array:

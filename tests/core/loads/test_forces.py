@@ -1,5 +1,7 @@
 """The forces of both models, against numbers worked out by hand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -109,7 +111,7 @@ def test_a_jump_has_no_force_in_flight_two_feet_alike_and_the_weight_on_average(
     forces = whole_body_forces(motion, touching)
     air = (motion.times > takeoff) & (motion.times < landing)
     assert np.all(forces.total[air] == 0)
-    assert forces.forces[:, 0] == pytest.approx(forces.forces[:, 1], abs=1e-6 * WEIGHT)
+    assert forces.forces[:, 0] == pytest.approx(forces.forces[:, 1] * (1.0, -1.0, 1.0), abs=1e-6 * WEIGHT)
     assert forces.total[:, 2].mean() == pytest.approx(WEIGHT, rel=0.02)
     # Uniform deceleration from sqrt(2·g·0.3) over 0.25 m: 1 + 0.3/0.25 = 2.2 body weights.
     assert forces.total[:, 2].max() / WEIGHT == pytest.approx(2.2, abs=0.15)
@@ -179,3 +181,18 @@ def test_crisp_landings_move_momentum_in_time_and_add_none():
     assert 250 < extra.max() < 511
     assert np.argmax(extra) == pytest.approx(120 + 0.024 * 240, abs=2)
     assert crisp.total == pytest.approx(crisp.forces.sum(axis=1), abs=1e-9)
+
+
+def test_feet_apart_push_against_each_other_along_their_legs():
+    """Each foot of a body at rest presses along the line from its hip; together they press straight down."""
+    count, places = 60, {"hips": (0.0, 0.0, 0.9), "hip_l": (0.0, 0.1, 0.9), "hip_r": (0.0, -0.1, 0.9)}
+    feet = [flat_sole(np.tile((0.0, y, 0.0), (count, 1))) for y in (0.3, -0.3)]
+    feet = [
+        dataclasses.replace(foot, sole=dataclasses.replace(foot.sole, side=side))
+        for foot, side in zip(feet, "LR", strict=True)
+    ]
+    joints = {name: np.tile(place, (count, 1)) for name, place in places.items()}
+    forces = whole_body_forces(character(feet, mass=MASS, **joints), contacts(np.ones((count, 2), dtype=bool)))
+    lean = (0.3 - 0.1) / 0.9
+    assert forces.forces[30] == pytest.approx(WEIGHT / 2 * np.array([[0, -lean, 1], [0, lean, 1]]), abs=0.1)
+    assert forces.total[30] == pytest.approx((0.0, 0.0, WEIGHT), abs=1e-3)
