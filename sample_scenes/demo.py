@@ -151,6 +151,7 @@ def bake_lane(scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cel
     settings = scene.softground
     settings.ground = None
     settings.characters.clear()
+    settings.ground_margin = 0.0  # they lie side by side
     if cell_size:
         settings.cell_size = cell_size
     bpy.ops.object.select_all(action="DESELECT")

@@ -158,6 +158,7 @@ def bake(
     shot = scene.softground
     shot.ground = ground
     shot.characters.clear()
+    shot.ground_margin = 0.0  # grounds lie side by side
     if cell_size:
         shot.cell_size = cell_size
     for walker in walkers:

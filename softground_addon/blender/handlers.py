@@ -9,10 +9,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import session
-from .baking import bake_report
 from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
 from .interface import modal_bake, overlay
+from .interface.outdated import compare_bake
 from .live import live
 from .reading import analysis
 
@@ -47,19 +47,6 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         return
     elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
         _later(compare_prediction)
-
-
-def compare_bake() -> float | None:
-    """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
-    if session.current().is_baking:
-        return SETTLED
-    windows = bpy.context.window_manager.windows
-    if windows:
-        state, reasons = session.current(), "\n".join(bake_report.stale_reasons(windows[0].scene))
-        if state.stale != reasons:
-            state.stale = reasons
-            session.redraw()
-    return None
 
 
 def compare_prediction() -> float | None:

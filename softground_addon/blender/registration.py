@@ -17,6 +17,7 @@ from .interface import (
     menus,
     modal_bake,
     operators,
+    outdated,
     overlay,
     panels,
     prediction,
@@ -70,6 +71,7 @@ def register() -> None:
         look_followers.append(look.follow)
         undo.callback(look_followers.clear)
         undo.callback(prediction.unregister)
+        undo.callback(outdated.forget)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())

@@ -151,6 +151,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         detail=options.detail,
         shape_keys=options.shape_keys,
         tread_m=typed(options.tread),
+        margin_m=typed(options.ground_margin),
         keep_forces=options.keep_forces,
     )
 

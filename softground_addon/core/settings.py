@@ -154,6 +154,8 @@ class BakeSettings(SceneUnits):
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
     shape_keys : bool
     tread_m : float
+    margin_m : float
+        How far a ground that is made reaches beyond the walk.
     keep_forces : bool
     """
 
@@ -173,6 +175,7 @@ class BakeSettings(SceneUnits):
     detail: str = field(metadata=_on(Acts.WRITING))
     shape_keys: bool = field(metadata=_on(Acts.WRITING))
     tread_m: float = field(metadata=_on(Acts.WRITING))
+    margin_m: float = field(metadata=_on(Acts.OUTPUT))
     keep_forces: bool = field(metadata=_on(Acts.OUTPUT))
 
     def between(self, first: Acts, last: Acts) -> dict[str, Any]:

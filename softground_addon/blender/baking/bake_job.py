@@ -210,11 +210,14 @@ def _created(
     """A draft of a ground that fits the walk, as the place for a bake."""
     reach = created_ground.reach_of(wanted.material)
     yield Progress("write", 0.2)
-    layout = created_ground.lay_out(plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
+    wide = created_ground.widened(scene, plan, wanted.margin_m)
+    layout = created_ground.lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)
-    name = settings.name_of(drafts.enter_context(created_ground.draft(layout)))
+    name = settings.name_of(
+        drafts.enter_context(created_ground.draft(layout, created_ground.soft_edge(wanted.margin_m)))
+    )
     yield Progress("write", 0.3)
     return baked_ground.on_created(scene, settings.found(name), layout, trail, wanted.surface)
 

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 FLOATING = "floating_mm"
 """Entry of a bake's summary: how far feet float above their prints [mm]."""
 
+LAST_FRAME = "last_frame"
+"""Entry of a bake's summary: the frame at which its last contact ends."""
+
 
 def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding]:
     """What the user should know of a ground that changes its shape over time, taken at a frame."""
@@ -45,7 +48,8 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
     shown = {key: totals[key] for key in ground_mesh.SHOWN}
-    return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"])}
+    last = max((step["frame_end"] for step in result["steps"]), default=0.0)
+    return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"]), LAST_FRAME: last}
 
 
 def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
@@ -54,6 +58,7 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
         "steps": len(footprints),
         "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
         "peak_force_n": max((float(footprint.peak_force_n) for footprint in footprints), default=0.0),
+        LAST_FRAME: max((float(footprint.end_frame) for footprint in footprints), default=0.0),
     }
 
 

@@ -1,22 +1,23 @@
-"""The ground that the add-on makes: as large as the walk, fine where feet come down, coarse elsewhere."""
+"""The ground that the add-on makes: wide around the walk, fine where feet come down, its edge soft."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.ground.heightfield import Terrain
 from ...core.ground.material import GroundMaterial
 from ...core.ground_plan import GroundPlan
 from ...core.meshing.graded_grid import GradedGrid, graded_grid
 from ...core.settings import BakeSettings
 from ..settings import find, name_of
 from .ground_mesh import discard, mesh_of, write_positions
-from .materials import ensure_material
+from .materials import EDGE, ensure_material
 
 Array = NDArray[np.float64]
 
@@ -56,10 +57,53 @@ class Layout:
 
 def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
     """A new ground with the material of the preset, set as the scene's ground."""
-    layout = lay_out(plan, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
-    with draft(layout) as ground:
+    wide = widened(scene, plan, wanted.margin_m)
+    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
+    with draft(layout, soft_edge(wanted.margin_m)) as ground:
         publish(scene, ground, wanted.surface)
     return ground
+
+
+FARTHEST = 30.0
+"""How far a ground reaches beyond the walk where the camera sees far [m]."""
+
+
+def widened(scene: bpy.types.Scene, plan: GroundPlan, margin: float) -> GroundPlan:
+    """A plan that reaches further: by a margin [m] on all sides, and over what the scene's camera sees of it.
+
+    Without a margin it stays as narrow as it is.
+    """
+    if not margin > 0:
+        return plan
+    seen = _seen(scene, (plan.lower + plan.upper) / 2, plan.terrain)
+    near = np.stack([plan.lower - margin, plan.upper + margin])
+    seen = np.clip(seen, near[0] - FARTHEST, near[1] + FARTHEST)
+    places = np.concatenate([near, seen])
+    return replace(plan, lower=places.min(axis=0), upper=places.max(axis=0))
+
+
+def soft_edge(margin: float) -> float:
+    """Width of the edge over which a ground with some margin ends softly [m]."""
+    return margin / 2
+
+
+def _seen(scene: bpy.types.Scene, middle: Array, terrain: Terrain) -> Array:
+    """Where the corners of the camera's picture lie on the ground, (N, 2) [m]; far away for those above the horizon."""
+    camera = scene.camera
+    if camera is None or not isinstance(camera.data, bpy.types.Camera):
+        return np.zeros((0, 2))
+    scale = scene.unit_settings.scale_length
+    matrix = np.array(camera.matrix_world)
+    corners = np.array(camera.data.view_frame(scene=scene)) @ matrix[:3, :3].T + matrix[:3, 3]
+    if camera.data.type == "ORTHO":
+        origin, ray = corners * scale, np.broadcast_to(-matrix[:3, 2], (4, 3))
+    else:
+        origin, ray = np.broadcast_to(matrix[:3, 3] * scale, (4, 3)), corners - matrix[:3, 3]
+    height = float(terrain.heights(*middle[:, None])[0])
+    down = ray[:, 2] < 0
+    far = 2 * FARTHEST / np.maximum(np.linalg.norm(ray[:, :2], axis=1), 1e-9)
+    reach = np.where(down, (height - origin[:, 2]) / np.where(down, ray[:, 2], -1.0), far)
+    return np.asarray(origin[:, :2] + np.clip(reach, 0.0, far)[:, None] * ray[:, :2])
 
 
 def reach_of(material: GroundMaterial) -> float:
@@ -92,8 +136,11 @@ def lay_out(plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: flo
 
 
 @contextmanager
-def draft(layout: Layout) -> Iterator[bpy.types.Object]:
-    """The ground as an object that is in no scene yet; one that is in none at the end is taken away."""
+def draft(layout: Layout, edge: float = 0.0) -> Iterator[bpy.types.Object]:
+    """The ground as an object that is in no scene yet; one that is in none at the end is taken away.
+
+    Its material fades out over the width of its edge [m].
+    """
     mesh = bpy.data.meshes.new("SoftGround")
     mesh.vertices.add(len(layout.local))
     mesh.loops.add(len(layout.corner_vertex))
@@ -106,6 +153,12 @@ def draft(layout: Layout) -> Iterator[bpy.types.Object]:
     uv = layout.local[:, :2] - layout.local[:, :2].min(axis=0)
     layer = mesh.uv_layers.new(name="UVMap")  # over the whole ground, its longer side from 0 to 1
     layer.uv.foreach_set("vector", (uv / uv.max())[layout.corner_vertex].ravel())
+    if edge > 0:
+        place = layout.vertices[:, :2]
+        inward = np.minimum(place - place.min(axis=0), place.max(axis=0) - place).min(axis=1)
+        fading = mesh.attributes.new(EDGE, "FLOAT", "POINT")
+        fading.data.foreach_set("value", np.clip(1.0 - inward / edge, 0.0, 1.0).astype(np.float32))
+        del fading
     ground = bpy.data.objects.new("SoftGround", mesh)
     ground.location = layout.location.tolist()
     name = name_of(ground)
@@ -118,12 +171,22 @@ def draft(layout: Layout) -> Iterator[bpy.types.Object]:
 
 
 def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> None:
-    """Put a draft into a scene as its ground, with the render material of some surface."""
+    """Put a draft into a scene as its ground, with the render material of some surface: as what was made last, selected
+    and in the active collection."""
     mesh_of(ground).materials.append(ensure_material(surface))
-    scene.collection.objects.link(ground)
+    layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+    assert layer is not None
+    active = layer.active_layer_collection
+    shown = active is not None and active.is_visible and active.collection.is_editable
+    (active.collection if active and shown else scene.collection).objects.link(ground)
     scene.softground.ground = ground
-    for layer in scene.view_layers:
-        layer.update()
+    for one in scene.view_layers:
+        one.update()
+    if layer.objects.active is None or layer.objects.active.mode == "OBJECT":
+        for other in list(layer.objects.selected):
+            other.select_set(False, view_layer=layer)
+        ground.select_set(True, view_layer=layer)
+        layer.objects.active = ground
 
 
 def _graded(plan: GroundPlan, cell_size: float, reach: float) -> tuple[GradedGrid, float]:

@@ -25,6 +25,9 @@ MARK = "softground_surface"
 OVER = "softground_over"
 """Custom property of the add-on's copies of the user's materials, with the material that they are of."""
 
+EDGE = "ground_edge"
+"""Float attribute of a mesh that lets the add-on's materials fade out, as it goes from 0 to 1."""
+
 BLEND = "surface_blend"
 """Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
@@ -263,6 +266,11 @@ def _material(
     tree.nodes.clear()
     graph = Graph(tree)
     shader, height = build(graph)
+    ragged = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.5, 4.0, 0.6) * 0.5
+    fading = graph.ramp(graph.attribute(EDGE) + ragged, 0.55, 1.05)  # noise is 0.5 on average: nothing fades at 0
+    clear = graph.out(graph.node("ShaderNodeBsdfTransparent"))
+    shader = graph.out(graph.node("ShaderNodeMixShader", {0: fading, 1: shader, 2: clear}))
+    material.use_transparent_shadow = False  # a ground throws no shadow by its edge, and they take time
     # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
     relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
     graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Displacement": graph.out(relief)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from math import ceil
 from typing import Any
 
 import bpy
@@ -98,4 +99,23 @@ def warnings_of(scene: bpy.types.Scene) -> list[str]:
     return ground_mesh.warnings_of(baked_ground.display_mesh_of(ground)) if ground else []
 
 
-CLASSES = (SOFTGROUND_OT_show_warnings,)
+def last_step(scene: bpy.types.Scene) -> int:
+    """The frame from which on all prints of the bake on the scene's ground are there."""
+    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(scene.softground.ground))
+    return ceil(summary.get(bake_report.LAST_FRAME) or scene.softground.frame_end)
+
+
+class SOFTGROUND_OT_go_to_last_step(OnBake, bpy.types.Operator):
+    """Go to the frame at which the last foot leaves its print: from there on all of them are seen"""
+
+    bl_idname = "softground.go_to_last_step"
+    bl_label = "Go to Last Step"
+    bl_options = {"REGISTER"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        scene.frame_set(last_step(scene))
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_show_warnings, SOFTGROUND_OT_go_to_last_step)

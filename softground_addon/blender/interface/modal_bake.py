@@ -15,6 +15,7 @@ from ..baking import bake_job, sink_feet
 from ..characters.character_setup import characters_of
 from ..operator_base import reports_errors
 from ..reading import analysis
+from . import bake_result
 from .panel_base import CATEGORY
 
 TICK = 0.02
@@ -246,11 +247,8 @@ class _Bake(ModalJob):
         return analysis.own_changes(scene)
 
 
-class SOFTGROUND_OT_bake(_Bake):
-    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
-
-    bl_idname = "softground.bake"
-    bl_label = "Bake Footprints"
+class _BakeFootprints(_Bake):
+    """What both buttons that bake do."""
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[bake_job.BakeResult]:
         return bake_job.bake(scene)
@@ -259,13 +257,30 @@ class SOFTGROUND_OT_bake(_Bake):
         totals: Any = result.report["totals"]
         text = f"{totals['steps']} steps, deepest print {totals['max_depth_m'] * 100:.1f} cm"
         steps: Any = result.report["steps"]
-        now = settings.scene_of(bpy.context).frame_current
-        if steps and all(now < step["frame_start"] for step in steps):  # the ground looks as it did before
-            text += ". Press Play to see them"
+        scene = settings.scene_of(bpy.context)
+        if steps and all(scene.frame_current < step["frame_start"] for step in steps):
+            if bpy.app.background:
+                text += ". Press Play to see them"
+            else:  # the ground would look as it did before
+                scene.frame_set(bake_result.last_step(scene))
         self.report({"INFO"}, text)
         warnings: Any = result.report["warnings"]
         for warning in warnings:  # the status bar shows the last that is told
             self.report({"WARNING"}, warning)
+
+
+class SOFTGROUND_OT_bake(_BakeFootprints):
+    """Press the footprints of all characters into the ground, over the whole frame range. Esc cancels"""
+
+    bl_idname = "softground.bake"
+    bl_label = "Bake Footprints"
+
+
+class SOFTGROUND_OT_bake_again(_BakeFootprints):
+    """Something has changed since the bake on the ground: bake it anew. Esc cancels"""
+
+    bl_idname = "softground.bake_again"
+    bl_label = "Bake Again"
 
 
 class SOFTGROUND_OT_sink_feet(_Bake):
@@ -382,4 +397,10 @@ def _is_harmless(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     return False
 
 
-CLASSES = (SOFTGROUND_OT_bake, SOFTGROUND_OT_sink_feet, SOFTGROUND_OT_hold_window, SOFTGROUND_OT_cancel_bake)
+CLASSES = (
+    SOFTGROUND_OT_bake,
+    SOFTGROUND_OT_bake_again,
+    SOFTGROUND_OT_sink_feet,
+    SOFTGROUND_OT_hold_window,
+    SOFTGROUND_OT_cancel_bake,
+)

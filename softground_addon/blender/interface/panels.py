@@ -11,7 +11,7 @@ from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
-from . import bake_result, prediction, preset_menu
+from . import bake_result, outdated, prediction, preset_menu
 from .character_editing import active_character, active_sole, suggested_mass
 from .panel_base import SidebarPanel
 
@@ -273,16 +273,22 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
             layout.progress(factor=state.progress, text=state.status)
             layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
             return
-        column = layout.column()
-        column.scale_y = 1.4
-        column.operator("softground.bake", icon="MOD_DYNAMICPAINT")
-        _live_buttons(layout, state)
-        layout.operator("softground.clear_bake", icon="TRASH")
         summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
         if summary:
-            bake_result.draw(layout, options, summary)
+            outdated.watch(settings.scene_of(context))
+        is_outdated = bool(summary and state.stale)
+        column = layout.column()
+        column.scale_y = 1.4
+        column.alert = is_outdated
+        column.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
+        _live_buttons(layout, state)
+        row = layout.row(align=True)
+        row.operator("softground.go_to_last_step", icon="NEXT_KEYFRAME")
+        row.operator("softground.clear_bake", icon="TRASH")
+        if summary:
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
+            bake_result.draw(layout, options, summary)
 
 
 def _apart_from_scene(scene: Any) -> str:

@@ -75,6 +75,15 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         ),
         default=True,
     )
+    ground_margin: FloatProperty(
+        name="Margin (m)",
+        description="How far a ground that SoftGround creates reaches beyond the walk, with an edge that fades out. "
+        "With a margin it also fills the camera's view; 0 ends close around the steps",
+        default=3.0,
+        min=0.0,
+        soft_max=20.0,
+        precision=1,
+    )
     detail: EnumProperty(
         name="Detail",
         description="Whether a fine copy of the ground along the trail takes the prints, with the ground hidden",
