@@ -27,6 +27,7 @@ from .interface import (
 from .live import live
 from .output import export_formats, force_curves
 from .properties.material import look_followers
+from .properties.scene import depth_field
 
 _SETTINGS: tuple[tuple[Any, type], ...] = (
     (bpy.types.Scene, properties.SoftGroundSettings),
@@ -47,9 +48,9 @@ CLASSES = (
     *export_formats.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
-    *bake_result.CLASSES,
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
+    *bake_result.CLASSES,
 )
 
 _registered = ExitStack()
@@ -70,6 +71,8 @@ def register() -> None:
             undo.callback(part.unregister)
         look_followers.append(look.follow)
         undo.callback(look_followers.clear)
+        depth_field.update(get=prediction.shown_cm, set=prediction.type_cm)
+        undo.callback(depth_field.clear)
         undo.callback(prediction.unregister)
         undo.callback(outdated.forget)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)

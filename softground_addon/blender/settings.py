@@ -147,6 +147,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         frames=(options.frame_start, options.frame_end),
         **asdict(units_of(scene)),
         response=_response(options, grounded=grounded),
+        sink_feet=options.sink_feet,
         output=options.output,
         detail=options.detail,
         shape_keys=options.shape_keys,
@@ -194,7 +195,8 @@ def character_of(character: Any) -> CharacterSettings:
 
 def _response(options: Any, *, grounded: bool) -> ResponseOptions | None:
     """What is asked of the characters, None if nothing."""
-    grounded = grounded or (options.grounding.use and options.output != "PRINTS")
+    sunk = options.sink_feet and options.output == "BOTH" and any(one.armature for one in options.characters)
+    grounded = grounded or sunk or (options.grounding.use and options.output != "PRINTS")
     tilted = options.tilt.use and (grounded or options.output != "PRINTS")
     if not (tilted or grounded):
         return None
@@ -273,14 +275,14 @@ def holds(scene: bpy.types.Scene, preset: Preset) -> bool:
 
 
 def take_defaults(scene: bpy.types.Scene) -> None:
-    """Set what the user has not set of the ground to the default preset, and the cells to fit the soles.
+    """Set what the user has not set of the ground to the default preset, let feet sink, and fit the cells to the soles.
 
     For the first character of a scene. The defaults of the properties themselves are those of version 0.1: a file keeps
     only what was set, and the others are to stay as they were when it was saved.
     """
     preset = presets.find(presets.DEFAULT)
     options = scene.softground
-    for group, field, value in _of_preset(scene, preset):
+    for group, field, value in _defaults(scene, preset):
         if not group.is_property_set(field):
             setattr(group, field, value)
     if not options.is_property_set("cell_size") and not options.is_property_set("cells_along_sole"):
@@ -290,7 +292,7 @@ def take_defaults(scene: bpy.types.Scene) -> None:
 def untouched(scene: bpy.types.Scene) -> list[tuple[Any, str]]:
     """The settings that `take_defaults` would set, as groups and names."""
     options = scene.softground
-    fields = [(group, field) for group, field, _ in _of_preset(scene, presets.find(presets.DEFAULT))]
+    fields = [(group, field) for group, field, _ in _defaults(scene, presets.find(presets.DEFAULT))]
     fields += [(options, "cell_size"), (options, "cells_along_sole")]
     return [(group, field) for group, field in fields if not group.is_property_set(field)]
 
@@ -302,6 +304,11 @@ def _of_preset(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, A
     said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
     return [one for one in said if one[2] is not None]
+
+
+def _defaults(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, Any]]:
+    """What a scene starts with beside the cells."""
+    return [*_of_preset(scene, preset), (scene.softground, "sink_feet", True)]
 
 
 COARSER = 4.0

@@ -115,8 +115,8 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "no_print",
             "error",
             f"'{motion.name}' leaves no print in these frames",
-            "look in the Character panel whether its soles are what touches the ground, and in the viewport whether "
-            "they face down.",
+            "look in Contacts, under Advanced, whether its soles are what touches the ground, and in the viewport "
+            "whether they face down.",
         )
     missed = missed_steps(motion, character.contacts)
     if missed:
@@ -335,7 +335,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
                 "on",
-                "look in the Character panel whether its contacts are the parts that touch the ground.",
+                "look in Contacts, under Advanced, whether its contacts are the parts that touch the ground.",
             )
         )
     rests = touching.rests
@@ -347,7 +347,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact in the Character panel.",
+                "add what rests there with Add Contact, under Advanced.",
             )
         )
     return found

@@ -150,6 +150,8 @@ class BakeSettings(SceneUnits):
     frames : (int, int)
         First and last of the scene.
     response : ResponseOptions or None
+    sink_feet : bool
+        Whether feet are let down where a rig can take it, and are left as they are where not.
     output : 'BOTH', 'PRINTS' or 'RESPONSE'
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
     shape_keys : bool
@@ -171,6 +173,7 @@ class BakeSettings(SceneUnits):
     cell_size_m: float = field(metadata=_on(Acts.PRESSING))
     frames: tuple[int, int]
     response: ResponseOptions | None = field(metadata=_on(Acts.RESPONDING))
+    sink_feet: bool = field(metadata=_on(Acts.OUTPUT))
     output: str = field(metadata=_on(Acts.OUTPUT))
     detail: str = field(metadata=_on(Acts.WRITING))
     shape_keys: bool = field(metadata=_on(Acts.WRITING))

@@ -60,8 +60,9 @@ COARSE = 4.0
 
 
 def coarse(scene: bpy.types.Scene) -> None:
-    """Settings with which tests bake quickly: flat pressure in cells of a centimetre, no tread."""
+    """Settings with which tests bake quickly: prints alone, flat pressure in cells of a centimetre, no tread."""
     options = scene.softground
+    options.sink_feet = False
     options.cell_size, options.pressure, options.tread = 0.01, "UNIFORM", 0.0
 
 

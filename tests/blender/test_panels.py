@@ -8,7 +8,7 @@ import pytest
 
 from softground_addon.blender import jobs, registration
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.interface import bake_result, panels, preset_menu
+from softground_addon.blender.interface import bake_result, ground_options_panel, panels, prediction, preset_menu
 from softground_addon.blender.reading import analysis
 from softground_addon.core.ground import presets
 from tests.blender.shots import import_motion, walker
@@ -46,7 +46,15 @@ def test_everything_has_a_tooltip_and_search_finds_it(addon):
 def test_panels_come_in_the_order_of_work(addon):
     shown = [cls for cls in panels.CLASSES if issubclass(cls, bpy.types.Panel)]
     order = [cls.bl_label for cls in shown if not hasattr(cls, "bl_parent_id")]
-    assert order[:3] == ["Character", "Ground", "Bake"]
+    assert order == ["Character", "Ground", "Bake", "Advanced"]
+
+
+def test_all_that_is_not_on_the_first_screen_is_closed_under_advanced(addon):
+    every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
+    below = [cls for cls in every if getattr(cls, "bl_parent_id", "")]
+    assert {cls.bl_parent_id for cls in below} == {"SOFTGROUND_PT_advanced"}
+    closed = [cls for cls in every if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())]
+    assert {cls.bl_label for cls in closed} == {cls.bl_label for cls in below} | {"Advanced"}
 
 
 def test_the_material_is_shown_in_field_units(shot):
@@ -71,13 +79,41 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
     assert shot.softground.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(expected, rel=0.02)
 
 
+def test_a_depth_that_is_typed_is_that_of_a_bake(shot):
+    options = shot.softground
+    options.depth_cm = 5.0
+    assert options.depth_cm == 0.0, "nothing is known of the shot yet"
+    bpy.ops.softground.predict_depth()
+    assert prediction.of(shot) is not None
+    stiffness = options.material.youngs_modulus
+    options.depth_cm = 5.0
+    assert options.material.youngs_modulus != stiffness
+    bpy.ops.softground.bake()
+    assert options.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(0.05, rel=0.02)
+    stiffness = options.material.youngs_modulus
+    options.depth_cm = 1e5
+    assert options.material.youngs_modulus == stiffness, "no ground gives that"
+
+
+def test_the_selected_mesh_is_the_ground_by_a_button_of_its_own(shot):
+    assert not bpy.ops.softground.use_as_ground.poll()
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    mine = bpy.context.active_object
+    assert bpy.ops.softground.create_ground(use_selected=False) == {"FINISHED"}
+    assert shot.softground.ground != mine
+    bpy.context.view_layer.objects.active = mine
+    mine.select_set(True)
+    assert bpy.ops.softground.use_as_ground() == {"FINISHED"}
+    assert shot.softground.ground == mine
+
+
 def test_the_cells_to_expect_are_those_that_a_bake_prints(shot):
     known = analysis.read(shot)
     footprints = jobs.run(bake_job.bake(shot, write=False)).footprints
     printed = sum(len(footprint.contact_cells) for footprint in footprints)
     assert known.area / shot.softground.cell_size**2 == pytest.approx(printed, rel=0.3)
-    assert panels._estimate(0.4, 0.01) == "About 4,000 cells printed, 4 MB"
-    assert panels._estimate(0.123, 0.002) == "About 31,000 cells printed, 31 MB"
+    assert ground_options_panel.estimate(0.4, 0.01) == "About 4,000 cells printed, 4 MB"
+    assert ground_options_panel.estimate(0.123, 0.002) == "About 31,000 cells printed, 31 MB"
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):

@@ -17,6 +17,8 @@ from tests.blender.grounds import plane
 NO_INPUT = {
     "cells_along_sole": "sets the cell size",
     "characters.sole_length": "sets the cell size",
+    "depth_cm": "sets the stiffness",
+    "grounding.by_button": "what Clear Bake switches off again",
     "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
     "characters.active_sole": "which one the list shows",

@@ -5,7 +5,7 @@ import pytest
 
 from softground_addon.blender import jobs
 from softground_addon.blender.animation_layer import nla_layer
-from softground_addon.blender.baking import bake_report, sink_feet
+from softground_addon.blender.baking import bake_job, bake_report, sink_feet
 from softground_addon.blender.reading import analysis
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -92,3 +92,65 @@ def test_a_shot_with_sunk_feet_stays_known_once_it_was_read_also_in_a_file_that_
     bpy.context.view_layer.update()
     assert analysis.known(scene)
     assert analysis.expected_depth(scene) == depth
+
+
+@pytest.fixture
+def first_walk(scene):
+    """A walker who was just added to a scene in which nothing was set, with coarse cells."""
+    shots.walker(scene, frames=40)
+    scene.softground.property_unset("sink_feet")
+    bpy.ops.softground.add_character()
+    return scene
+
+
+def test_feet_sink_by_themselves(first_walk):
+    options = first_walk.softground
+    assert options.sink_feet
+    result = jobs.run(bake_job.bake(first_walk))
+    assert nla_layer.has_layer(options.characters[0].armature)
+    assert sink_feet.floating_mm(first_walk) < 2.0
+    assert not [found for found in result.report["self_check"] if found["code"] == "feet_not_sunk"]
+    assert bake_report.stale_reasons(first_walk) == ()
+    options.sink_feet = False
+    assert bake_report.stale_reasons(first_walk)
+
+
+def test_a_rig_that_takes_no_layer_is_named_in_a_line_and_prints_all_the_same(first_walk):
+    armature = first_walk.softground.characters[0].armature
+    track = armature.animation_data.nla_tracks.new()
+    track.strips.new("mine", 1, armature.animation_data.action)
+    track.is_solo = True
+    result = jobs.run(bake_job.bake(first_walk))
+    assert result.footprints
+    (said,) = [found for found in result.report["self_check"] if found["code"] == "feet_not_sunk"]
+    assert "'Walker' is solo" in said["message"]
+    assert not nla_layer.has_layer(armature)
+    assert bake_report.stale_reasons(first_walk) == ()
+
+
+def test_a_scene_that_was_set_up_before_keeps_its_feet(baked):
+    assert not baked.softground.sink_feet
+    assert not nla_layer.has_layer(baked.softground.characters[0].armature)
+
+
+def test_the_layer_is_no_animation_of_the_user_s(first_walk):
+    options = first_walk.softground
+    bpy.ops.softground.bake()
+    frames = options.frame_start, options.frame_end
+    options.characters.clear()
+    bpy.context.view_layer.objects.active = bpy.data.objects["Walker"]
+    bpy.ops.softground.add_character()
+    assert (options.frame_start, options.frame_end) == frames
+
+
+def test_clear_bake_switches_off_what_the_button_has_switched_on_and_nothing_else(baked):
+    options = baked.softground
+    bpy.ops.softground.sink_feet()
+    assert options.grounding.use
+    bpy.ops.softground.clear_bake()
+    assert not options.grounding.use
+    options.grounding.use = True
+    bpy.ops.softground.bake()
+    bpy.ops.softground.sink_feet()
+    bpy.ops.softground.clear_bake()
+    assert options.grounding.use

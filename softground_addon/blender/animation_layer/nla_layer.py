@@ -24,7 +24,7 @@ RESPONSE = "SoftGround Response"
 EXTRA = "SoftGround Response +"
 SOURCE = "SoftGround Source"
 STANDING = "SoftGround Standing Pose"
-_OWN_TRACKS = (RESPONSE, EXTRA, SOURCE, STANDING)
+OWN_TRACKS = (RESPONSE, EXTRA, SOURCE, STANDING)
 
 
 def has_layer(obj: bpy.types.Object) -> bool:
@@ -44,7 +44,7 @@ def check_layerable(obj: bpy.types.Object) -> None:
         return
     if animation.use_tweak_mode:
         raise InputError(f"An NLA strip of '{obj.name}' is being tweaked: leave tweak mode (Tab in the NLA editor).")
-    solo = next((track for track in animation.nla_tracks if track.is_solo and track.name not in _OWN_TRACKS), None)
+    solo = next((track for track in animation.nla_tracks if track.is_solo and track.name not in OWN_TRACKS), None)
     if solo is not None:
         raise InputError(f"NLA track '{solo.name}' of '{obj.name}' is solo, which mutes any layer: end its solo.")
 
@@ -127,7 +127,7 @@ def remove_layer(obj: bpy.types.Object) -> None:
     if source is not None and source.action is not None:
         restored = (source.action, slot_of(source), source.blend_type, source.extrapolation, _influence(source))
     left_over = {strip.action for name in (RESPONSE, STANDING) if (strip := _strip(obj, name)) and strip.action}
-    for name in _OWN_TRACKS:
+    for name in OWN_TRACKS:
         track = _track(obj, name)
         if track is not None:
             animation.nla_tracks.remove(track)

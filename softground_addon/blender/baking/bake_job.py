@@ -81,7 +81,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     BakeError
         If the result fails a check.
     """
-    wanted = wanted or settings_of(scene)
+    asked = wanted or settings_of(scene)
+    wanted, refused = response_job.without_sinking(scene, asked)
     started = time.perf_counter()
     moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
@@ -138,10 +139,10 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
             "frames_per_second": frames / (finished - started),
         },
         playback_error_m=written.error if written else None,
-        findings=[*findings, *of_responses],
+        findings=[*findings, *of_responses, *refused],
     )
     if written:
-        stamped = wanted.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
+        stamped = asked.inputs(Acts.WRITING) | {"ground": inputs["ground"]}
         told = {"summary": bake_report.summary(result), "warnings": result["warnings"]}
         sign(written.display_mesh, written.ground, stamped, movers, **told)
     yield Progress("write", 1.0)

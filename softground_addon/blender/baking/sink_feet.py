@@ -40,6 +40,7 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene, wanted)
     result = yield from bake(scene, wanted=wanted)
     options = scene.softground
+    options.grounding.by_button |= not options.grounding.use
     options.grounding.use = True
     if options.output == "PRINTS":
         options.output = "BOTH"

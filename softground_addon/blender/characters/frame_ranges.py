@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ..animation_layer import nla_layer
 from ..compat import action_curves, slot_of
 from ..settings import time_stretch_of
 
@@ -48,13 +49,19 @@ def _of_data(animation: bpy.types.AnimData) -> Iterator[Range]:
         track for track in animation.nla_tracks if not track.mute
     ]
     for track in tracks:
-        yield from ((strip.frame_start, strip.frame_end) for strip in track.strips if not strip.mute)
-    action = animation.action
-    if action is None:
-        return
+        strips = [strip for strip in track.strips if not strip.mute]
+        if track.name == nla_layer.SOURCE:  # the user's action under our layer, held on beyond its keys
+            yield from (one for strip in strips if strip.action for one in _of_action(strip.action, slot_of(strip)))
+        elif track.name not in nla_layer.OWN_TRACKS:
+            yield from ((strip.frame_start, strip.frame_end) for strip in strips)
+    if animation.action is not None:
+        yield from _of_action(animation.action, slot_of(animation))
+
+
+def _of_action(action: bpy.types.Action, slot: Any) -> Iterator[Range]:
     keyed: Any = action.frame_range
     yield float(keyed[0]), float(keyed[1])
-    for curve in action_curves(action, slot_of(animation)):
+    for curve in action_curves(action, slot):
         if curve.is_valid and not (curve.mute or curve.is_empty):
             yield from _beyond(curve)
 

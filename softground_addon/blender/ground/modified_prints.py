@@ -54,7 +54,7 @@ def are_undone(
         if detail == "NEVER":
             raise InputError(
                 f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: set Detail to "
-                "Automatic in the Ground panel, or apply it."
+                "Automatic under Advanced, or apply it."
             )
         return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
@@ -73,7 +73,7 @@ def are_undone(
     if detail == "NEVER":
         raise InputError(
             f"Prints on ground '{ground.name}' would not show, as its modifiers undo them: set Detail to Automatic in "
-            "the Ground panel, or apply the modifiers."
+            "the Advanced panel, or apply the modifiers."
         )
     return True
 

@@ -51,7 +51,7 @@ def _warnings(layout: Any, warnings: Sequence[str]) -> None:
 def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     """How far the feet are above the prints that they made, and a button that lets them down."""
     floating = summary.get(bake_report.FLOATING, 0.0)
-    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use:
+    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
         return
     box = layout.box().column(align=True)
     box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)

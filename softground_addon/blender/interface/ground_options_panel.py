@@ -1,4 +1,4 @@
-"""The sidebar's part on what the ground does beyond the paper, and on what is painted on it."""
+"""The sidebar's part on the ground's physics, its layers, what is painted on it, and its mesh."""
 
 from __future__ import annotations
 
@@ -6,33 +6,56 @@ from typing import Any
 
 import bpy
 
+from ...core.loads.cell_limits import BYTES_PER_CELL
 from .. import settings
 from ..ground import painted_ground
-from .panel_base import SidebarPanel
+from . import prediction
+from .character_editing import active_character
+from .panel_base import ADVANCED, SidebarPanel
 
 
-class SOFTGROUND_PT_behaviour(SidebarPanel, bpy.types.Panel):
-    """Rims that lean, sand that slides, snow that hardens: each is off at 0"""
-
-    bl_label = "Behavior"
-    bl_parent_id = "SOFTGROUND_PT_material"
+class _Closed(SidebarPanel):
+    bl_parent_id = ADVANCED
     bl_options: Any = {"DEFAULT_CLOSED"}
+
+
+class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
+    """How the ground gives way and what it raises"""
+
+    bl_label = "Realism"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options, character = scene.softground, active_character(scene)
+        if character:
+            layout.prop(character, "force_model")
+        column = layout.column()
+        column.prop(options, "pressure")
+        for field in ("stiffness_mpa", "poisson_ratio", "rim_reach_cm", "rim_bias", "repose_angle"):
+            column.prop(options.material, field)
+        for field in ("characteristic_time", "shortest_time"):
+            column.prop(options.material, field)
+        column.prop(options, "tread_mm")
+        layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
+
+
+class SOFTGROUND_PT_layers(_Closed, bpy.types.Panel):
+    """How deep the loose layer is, and what lies on it and below; each is off at 0"""
+
+    bl_label = "Layers"
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.fields().column()
-        options = settings.scene_of(context).softground
-        column.prop(options, "pressure")
-        for field in ("rim_bias", "repose_angle", "shortest_time", "hardening", "crust_stress_kpa", "firm_depth_cm"):
-            column.prop(options.material, field)
-        column.prop(options, "tread_mm")
+        material = settings.scene_of(context).softground.material
+        for field in ("layer_depth_cm", "crust_stress_kpa", "firm_depth_cm", "hardening"):
+            column.prop(material, field)
 
 
-class SOFTGROUND_PT_painted(SidebarPanel, bpy.types.Panel):
+class SOFTGROUND_PT_painted(_Closed, bpy.types.Panel):
     """Vertex groups or float attributes of the ground by which its material is multiplied"""
 
-    bl_label = "Painted"
-    bl_parent_id = "SOFTGROUND_PT_ground"
-    bl_options: Any = {"DEFAULT_CLOSED"}
+    bl_label = "Masks"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -47,4 +70,39 @@ class SOFTGROUND_PT_painted(SidebarPanel, bpy.types.Panel):
             row.prop(options.painted, field, icon="GROUP_VERTEX")
 
 
-CLASSES = (SOFTGROUND_PT_behaviour, SOFTGROUND_PT_painted)
+class SOFTGROUND_PT_mesh(_Closed, bpy.types.Panel):
+    """How fine the ground is, and what it looks like"""
+
+    bl_label = "Mesh and Look"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        scene = settings.scene_of(context)
+        options = scene.softground
+        column = layout.column()
+        column.prop(options.material, "surface")
+        column.operator("softground.apply_look", icon="MATERIAL")
+        column.prop(options, "cell_size_cm")
+        column.prop(options.material, "blur_sigma_cm")
+        column.prop(options, "detail")
+        column.prop(options, "ground_margin")
+        column.prop(options, "shape_keys")
+        predicted = prediction.of(scene)
+        if predicted:
+            row = layout.row()
+            row.active = False
+            row.label(text=estimate(predicted.analysis.area, options.cell_size), icon="INFO", translate=False)
+
+
+def estimate(area: float, cell_size: float) -> str:
+    """Cells that soles cover an area [m²] with, and the memory that a bake takes for them."""
+    cells = area / cell_size**2
+    return f"About {rounded(cells):,.0f} cells printed, {rounded(cells * BYTES_PER_CELL / 1e6):,.0f} MB"
+
+
+def rounded(value: float) -> float:
+    """A positive number to two digits, at least 1, as estimates are told."""
+    return max(1.0, float(f"{value:.2g}"))
+
+
+CLASSES = (SOFTGROUND_PT_material, SOFTGROUND_PT_layers, SOFTGROUND_PT_painted, SOFTGROUND_PT_mesh)

@@ -17,10 +17,12 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("softground.add_character", icon="ARMATURE_DATA")
         layout.operator("softground.add_contact", icon="PLUS")
-        layout.operator("softground.create_ground", icon="MESH_GRID")
+        layout.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
+        layout.operator("softground.use_as_ground", icon="EYEDROPPER")
         layout.separator()
         layout.operator("softground.bake", icon="MOD_DYNAMICPAINT")
         layout.operator("softground.live", icon="PLAY")
+        layout.operator("softground.go_to_last_step", icon="NEXT_KEYFRAME")
         layout.operator("softground.clear_bake", icon="TRASH")
         layout.operator("softground.apply_look", icon="MATERIAL")
         layout.separator()
@@ -43,14 +45,21 @@ def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
     menu.layout.menu("SOFTGROUND_MT_object")
 
 
+def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the ground to what can be added as a mesh."""
+    menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
+
+
 def register() -> None:
     """Add the entries."""
     bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
+    bpy.types.VIEW3D_MT_mesh_add.append(draw_in_add_menu)
 
 
 def unregister() -> None:
     """Take the entries away."""
     bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
+    bpy.types.VIEW3D_MT_mesh_add.remove(draw_in_add_menu)
 
 
 CLASSES = (SOFTGROUND_MT_object,)

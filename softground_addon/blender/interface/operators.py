@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import bpy
+from bpy.props import BoolProperty
 
 from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
@@ -91,27 +92,47 @@ def _add(
     return reports
 
 
+class SOFTGROUND_OT_use_as_ground(bpy.types.Operator):
+    """Take the selected mesh as the ground, as it is: flat, sculpted or sloped"""
+
+    bl_idname = "softground.use_as_ground"
+    bl_label = "Use Selected as Ground"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a mesh is selected that may be the ground."""
+        cls.poll_message_set("Select the mesh that is walked on, and no character")
+        return _selected_ground(context) is not None or _selected_instance(context) is not None
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _check_no_instance(context)
+        chosen = _selected_ground(context)
+        assert chosen is not None
+        ground_checks.check_usable(chosen)
+        settings.scene_of(context).softground.ground = chosen
+        self.report({"INFO"}, f"'{chosen.name}' is the ground")
+        return {"FINISHED"}
+
+
 class SOFTGROUND_OT_create_ground(bpy.types.Operator):
-    """Take the selected mesh as the ground as it is; with none selected, create one that fits the walk"""
+    """Create a ground that fits the walk: fine where feet come down, coarse elsewhere"""
 
     bl_idname = "softground.create_ground"
     bl_label = "Create Ground"
     bl_options = {"REGISTER", "UNDO"}
 
+    use_selected: BoolProperty(
+        name="Use Selected", description="Take the selected mesh as it is, where one is selected", default=True
+    )
+
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        thing = context.active_object
-        if thing is not None and thing.select_get() and instances_mesh(thing):
-            raise InputError(
-                f"'{thing.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
-                "Apply > Make Instances Real), select the mesh that is walked on, and press Create Ground again."
-            )
-        chosen = _selected_ground(context)
-        if chosen is not None:
-            ground_checks.check_usable(chosen)
-            settings.scene_of(context).softground.ground = chosen
-            self.report({"INFO"}, f"'{chosen.name}' is the ground")
-            return {"FINISHED"}
+        if self.use_selected:
+            _check_no_instance(context)
+            if _selected_ground(context) is not None:
+                return set(bpy.ops.softground.use_as_ground())
         scene = settings.scene_of(context)
         wanted = shots.settings_of(scene)
         plan = jobs.run(shots.fit_ground(scene, wanted))
@@ -121,6 +142,20 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
         for warning in plan.warnings:
             self.report({"WARNING"}, warning)
         return {"FINISHED"}
+
+
+def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a selected instance of a collection with meshes."""
+    thing = context.active_object
+    return thing if thing is not None and thing.select_get() and instances_mesh(thing) else None
+
+
+def _check_no_instance(context: bpy.types.Context) -> None:
+    if thing := _selected_instance(context):
+        raise InputError(
+            f"'{thing.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
+            "Apply > Make Instances Real), select the mesh that is walked on, and press Create Ground again."
+        )
 
 
 def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -163,6 +198,8 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
                     baked_ground.clear(ground)
                 look.take_off(ground)
             response_job.remove_layers(scene)
+        if scene.softground.grounding.by_button:  # nothing stays switched on that no one has switched on
+            scene.softground.grounding.use = scene.softground.grounding.by_button = False
         return {"FINISHED"}
 
 
@@ -237,6 +274,7 @@ def bake_command(scene: bpy.types.Scene) -> str:
 
 CLASSES = (
     SOFTGROUND_OT_add_character,
+    SOFTGROUND_OT_use_as_ground,
     SOFTGROUND_OT_create_ground,
     SOFTGROUND_OT_clear_bake,
     SOFTGROUND_OT_apply_look,

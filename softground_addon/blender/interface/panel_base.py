@@ -10,6 +10,10 @@ CATEGORY = "SoftGround"
 """The sidebar's tab."""
 
 
+ADVANCED = "SOFTGROUND_PT_advanced"
+"""The panel that holds all that is not on the first screen."""
+
+
 class SidebarPanel:
     """A panel in the add-on's tab, in Blender's property style."""
 

@@ -6,14 +6,13 @@ from typing import Any
 
 import bpy
 
-from ...core.loads.cell_limits import BYTES_PER_CELL
 from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
 from . import bake_result, outdated, prediction, preset_menu
 from .character_editing import active_character, active_sole, suggested_mass
-from .panel_base import SidebarPanel
+from .panel_base import ADVANCED, SidebarPanel
 
 
 class SOFTGROUND_UL_characters(bpy.types.UIList):
@@ -62,6 +61,8 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         options = settings.scene_of(context).softground
         if not options.characters:
+            if not context.selected_objects:
+                layout.label(text="Select an animated character", icon="INFO")
             column = layout.column()
             column.scale_y = 1.4
             column.operator("softground.add_character", icon="ARMATURE_DATA")
@@ -75,17 +76,14 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         buttons.operator("softground.remove_character", text="", icon="REMOVE")
         character = active_character(settings.scene_of(context))
         if character:
-            if not is_thing(character):
-                layout.prop(character, "armature")
             if not is_set_up(character):
-                _note(layout, "Was deleted: undo that, or take it out with -", "ERROR")
+                layout.label(text="Was deleted: undo that, or take it out with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             layout.prop(character, "mass")
             if suggested_mass(character):
                 text = f"{suggested_mass(character):g} kg by Volume"
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
-            layout.prop(character, "force_model")
 
 
 def _no_contacts(layout: Any, character: Any) -> None:
@@ -100,8 +98,18 @@ def _no_contacts(layout: Any, character: Any) -> None:
         box.prop(character.soles[0], "object")
 
 
+class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
+    """All that has a default which mostly fits"""
+
+    bl_label = "Advanced"
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        pass
+
+
 class _OfCharacter(SidebarPanel):
-    bl_parent_id = "SOFTGROUND_PT_character"
+    bl_parent_id = ADVANCED
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod
@@ -114,7 +122,7 @@ class _OfCharacter(SidebarPanel):
 class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
     """What prints"""
 
-    bl_label = "Soles"
+    bl_label = "Contacts"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
@@ -144,7 +152,7 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
 class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
     """Where the body's mass is"""
 
-    bl_label = "Hips and Limbs"
+    bl_label = "Body Bones"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -155,6 +163,7 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         character = active_character(settings.scene_of(context))
+        layout.prop(character, "armature")
         layout.operator("softground.detect_bones", icon="FILE_REFRESH")
         column = layout.column(align=True)
         order = {joint: place for place, joint in enumerate(JOINTS)}
@@ -188,69 +197,27 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
-        options = settings.scene_of(context).softground
-        column = layout.column()
-        column.prop(options, "ground")
-        if options.ground is None:
-            row = column.row()
-            row.operator("softground.create_ground", icon="MESH_GRID")
-        else:
-            _changing_ground(column, options)
-        column.prop(options, "cell_size_cm")
-        column.prop(options, "detail")
-        column.prop(options, "shape_keys")
-        predicted = prediction.of(settings.scene_of(context))
-        if predicted:
-            _note(layout, _estimate(predicted.analysis.area, settings.scene_of(context).softground.cell_size))
-
-
-class SOFTGROUND_PT_material(SidebarPanel, bpy.types.Panel):
-    """How it gives way"""
-
-    bl_label = "Material"
-    bl_parent_id = "SOFTGROUND_PT_ground"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.fields()
         scene = settings.scene_of(context)
-        material = scene.softground.material
+        options = scene.softground
+        layout.prop(options, "ground", text="")
+        row = layout.row(align=True)
+        row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
+        row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")
         row = layout.row(align=True)
         row.menu("SOFTGROUND_MT_presets", text=preset_menu.title_of_ground(scene) or "Presets", translate=False)
         row.operator("softground.save_preset", text="", icon="ADD")
         row.operator("softground.remove_preset", text="", icon="REMOVE")
-        column = layout.column()
-        column.prop(material, "stiffness_mpa")
-        column.prop(material, "poisson_ratio")
-        column.prop(material, "characteristic_time")
         predicted = prediction.of(scene)
         row = layout.row(align=True)
         if predicted is None:
             row.operator("softground.predict_depth", icon="DRIVER_DISTANCE")
-            return
-        depth = "…" if predicted.depth is None else f"{predicted.depth * 100:.1f} cm"
-        split = row.split(factor=0.4)
-        split.alignment = "RIGHT"
-        split.label(text="Deepest Print")
-        row = split.row(align=True)
-        row.active = predicted.is_current
-        row.operator("softground.match_depth", text=depth, icon="DRIVER_DISTANCE", translate=False)
-        row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
-
-
-class SOFTGROUND_PT_material_details(SidebarPanel, bpy.types.Panel):
-    """The layer, its rim and its look"""
-
-    bl_label = "Details"
-    bl_parent_id = "SOFTGROUND_PT_material"
-    bl_options: Any = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column = self.fields().column()
-        material = settings.scene_of(context).softground.material
-        for field in ("layer_depth_cm", "rim_reach_cm", "blur_sigma_cm"):
-            column.prop(material, field)
-        column.prop(material, "surface")
-        column.operator("softground.apply_look", icon="MATERIAL")
+        else:
+            field = row.row(align=True)
+            field.active = predicted.is_current
+            field.prop(options, "depth_cm")
+            row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
+        if options.ground is not None:
+            _changing_ground(layout, options)
 
 
 class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
@@ -262,33 +229,43 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         state = session.current()
         options = settings.scene_of(context).softground
-        column = layout.column(align=True)
-        column.prop(options, "frame_start")
-        column.prop(options, "frame_end")
-        if apart := _apart_from_scene(settings.scene_of(context)):
-            _note(layout, apart)
-        if state.is_baking:
-            layout.enabled = True
-            column.enabled = False
-            layout.progress(factor=state.progress, text=state.status)
-            layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
-            return
         summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
         if summary:
             outdated.watch(settings.scene_of(context))
-        is_outdated = bool(summary and state.stale)
-        column = layout.column()
-        column.scale_y = 1.4
-        column.alert = is_outdated
-        column.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
-        _live_buttons(layout, state)
+        if state.is_baking:
+            layout.enabled = True
+            layout.progress(factor=state.progress, text=state.status)
+            layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
+        else:
+            _bake_buttons(layout, options, state, is_outdated=bool(summary and state.stale))
         row = layout.row(align=True)
-        row.operator("softground.go_to_last_step", icon="NEXT_KEYFRAME")
+        row.enabled = not state.is_baking
+        row.prop(options, "frame_start")
+        row.prop(options, "frame_end")
+        if state.is_baking:
+            return
+        row = layout.row(align=True)
+        row.operator("softground.go_to_last_step", text="Last Step", icon="NEXT_KEYFRAME")
         row.operator("softground.clear_bake", icon="TRASH")
         if summary:
+            bake_result.draw(layout, options, summary)
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
-            bake_result.draw(layout, options, summary)
+        if apart := _apart_from_scene(settings.scene_of(context)):
+            row = layout.row()
+            row.active = False
+            row.label(text=apart, icon="INFO", translate=False)
+
+
+def _bake_buttons(layout: Any, options: Any, state: Any, *, is_outdated: bool) -> None:
+    """The large button, with the feet beside it, and live mode below."""
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    button = row.row(align=True)
+    button.alert = is_outdated
+    button.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
+    row.prop(options, "sink_feet", toggle=True)
+    _live_buttons(layout, state)
 
 
 def _apart_from_scene(scene: Any) -> str:
@@ -317,6 +294,7 @@ class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):
     """What to see in the viewport"""
 
     bl_label = "Overlay"
+    bl_parent_id = ADVANCED
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw_header(self, _context: bpy.types.Context) -> None:
@@ -337,6 +315,7 @@ class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
     """What to take out of a bake"""
 
     bl_label = "Output"
+    bl_parent_id = ADVANCED
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -360,34 +339,15 @@ def _changing_ground(layout: Any, options: Any) -> None:
         box.label(text=taken, icon="BLANK1", translate=False)
 
 
-def _note(layout: bpy.types.UILayout, text: str, icon: Any = "INFO") -> None:
-    """A line of small information under the fields."""
-    row = layout.row()
-    row.active = False
-    row.label(text=text, icon=icon, translate=False)
-
-
-def _estimate(area: float, cell_size: float) -> str:
-    """Cells that soles cover an area [m²] with, and the memory that a bake takes for them."""
-    cells = area / cell_size**2
-    return f"About {rounded(cells):,.0f} cells printed, {rounded(cells * BYTES_PER_CELL / 1e6):,.0f} MB"
-
-
-def rounded(value: float) -> float:
-    """A positive number to two digits, at least 1, as estimates are told."""
-    return max(1.0, float(f"{value:.2g}"))
-
-
 CLASSES = (
     SOFTGROUND_UL_characters,
     SOFTGROUND_UL_soles,
     SOFTGROUND_PT_character,
+    SOFTGROUND_PT_ground,
+    SOFTGROUND_PT_bake,
+    SOFTGROUND_PT_advanced,
     SOFTGROUND_PT_soles,
     SOFTGROUND_PT_joints,
-    SOFTGROUND_PT_ground,
-    SOFTGROUND_PT_material,
-    SOFTGROUND_PT_material_details,
-    SOFTGROUND_PT_bake,
     SOFTGROUND_PT_overlay,
     SOFTGROUND_PT_output,
 )

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...core.errors import InputError
+from ...core.prediction import matching_modulus
 from .. import session, settings
 from ..live import live
 from ..reading import analysis
@@ -54,6 +56,27 @@ def of(scene: bpy.types.Scene) -> DepthPrediction | None:
         return DepthPrediction(known, _told.get(scene.session_uid), is_current=False)
     _told[scene.session_uid] = depth
     return DepthPrediction(known, depth, is_current=True)
+
+
+def shown_cm(scene: bpy.types.Scene) -> float:
+    """The depth that the scene was told last [cm]; 0 before."""
+    return (_told.get(scene.session_uid) or 0.0) * 100
+
+
+def type_cm(scene: bpy.types.Scene, depth: float) -> None:
+    """Set the stiffness so that the deepest print gets a depth [cm]; says why where none gives it."""
+    known = analysis.current(scene)
+    if known is None or not depth > 0:
+        return
+    wanted = settings.snapshot(scene)
+    try:
+        modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
+    except InputError as error:
+        message = str(error)
+        if not bpy.app.background:
+            bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
+        return
+    scene.softground.material.youngs_modulus = modulus
 
 
 def _work_out() -> None:

@@ -12,7 +12,7 @@ from .. import settings
 from ..animation_layer import nla_layer
 from ..response import response_job
 from .character_editing import active_character
-from .panel_base import SidebarPanel
+from .panel_base import ADVANCED, SidebarPanel
 
 _SHOWN = 5
 """Frames with gaps that the panel lists."""
@@ -94,7 +94,7 @@ class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
     """How the character responds to the ground that gives way"""
 
     bl_label = "Response"
-    bl_parent_id = "SOFTGROUND_PT_character"
+    bl_parent_id = ADVANCED
     bl_options: Any = {"DEFAULT_CLOSED"}
 
     @classmethod

@@ -196,7 +196,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
     )  # fmt: skip
     uv_map: StringProperty(name="UV Map", description="UV map of the images; the one that is rendered if empty")
     outdated: BoolProperty(
-        name="Even If Outdated", description="Export the bake also where it no longer fits what it was made from"
+        name="Allow Outdated", description="Export the bake also where it no longer fits what it was made from"
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:

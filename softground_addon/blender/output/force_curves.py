@@ -147,6 +147,13 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         empties = write_curves(settings.scene_of(context), *_baked(context))
+        for other in context.selected_objects:
+            other.select_set(False)
+        for empty in empties:  # the Graph Editor shows the curves of what is selected
+            if empty.name in context.view_layer.objects:
+                empty.select_set(True)
+                if context.mode == "OBJECT":
+                    context.view_layer.objects.active = empty
         names = ", ".join(f"'{empty.name}'" for empty in empties)
         self.report({"INFO"}, f"The forces are on {names}")
         return {"FINISHED"}

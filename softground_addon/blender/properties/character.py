@@ -92,14 +92,14 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         name="Mass of the Skin", description="What its skin weighs by volume, 0 where unknown", options={"HIDDEN"}
     )
     force_model: EnumProperty(
-        name="Forces",
+        name="Force Model",
         description="How the force under each foot is estimated from the animation",
         items=[
-            ("WHOLE_BODY", "Whole Body", "From the acceleration of the body's centre of mass: best for baking"),
+            ("WHOLE_BODY", "Accurate", "From the acceleration of the body's centre of mass"),
             (
                 "IMPULSE",
-                "Impulse",
-                "Weight plus the momentum of the landing foot, as in the paper; needs no look-ahead",
+                "Fast",
+                "Weight plus the momentum of the landing foot; needs no look-ahead",
             ),
         ],
         default="WHOLE_BODY",

@@ -52,10 +52,11 @@ class SoftGroundGrounding(bpy.types.PropertyGroup):
         "match, as a layer of keys above the animation",
         default=False,
     )
+    by_button: BoolProperty(name="By a Button", description="Sink Feet has switched it on", options={"HIDDEN"})
     align: share(
         "Align Feet", "How much of the ground's slope the feet take on, within what an ankle can bend", default=1.0
     )
-    lock: share("Lock Slides", "How much of the animation's sliding is taken out of feet that stand")
+    lock: share("Reduce Foot Sliding", "How much of the animation's sliding is taken out of feet that stand")
     knee_lift: share("Lift Knees", "Lift swinging feet higher, at 1 by as much as they had sunk", most=2.0)
     hold: share("Hold Feet", "Let feet stay longer in deep ground and catch up in their swing")
     crouch: share("Bend Knees", "Bring the hips down in deep ground, at 1 by half the sinkage", most=2.0)

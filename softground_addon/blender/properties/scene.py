@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -38,6 +39,19 @@ def _of_the_users_own(options: Any, _context: bpy.types.Context) -> None:
     options.cells_along_sole = 0.0
 
 
+depth_field: dict[str, Callable[..., Any]] = {}
+"""What `depth_cm` shows of a scene ("get"), and what typing it does ("set"): by what knows the prints to come."""
+
+
+def _shown_depth(options: Any) -> float:
+    return float(depth_field["get"](options.id_data)) if "get" in depth_field else 0.0
+
+
+def _type_depth(options: Any, value: float) -> None:
+    if "set" in depth_field:
+        depth_field["set"](options.id_data, value)
+
+
 class SoftGroundSettings(bpy.types.PropertyGroup):
     """Everything that a bake reads."""
 
@@ -68,7 +82,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
     shape_keys: BoolProperty(
-        name="Shape Keys",
+        name="Keep Shape Keys",
         description=(
             "Keep the raw and the smoothed heights as shape keys, to blend or sculpt. "
             "Without them a dense ground plays faster, since Blender evaluates them on the whole mesh at each frame"
@@ -104,15 +118,25 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         ],
         default="BOTH",
     )
-    painted: PointerProperty(name="Painted", type=SoftGroundPainted)
+    depth_cm: FloatProperty(
+        name="Depth (cm)",
+        description="Depth of the deepest print to expect. Type another, and the stiffness of the ground follows",
+        get=_shown_depth,
+        set=_type_depth,
+        min=0.0,
+        soft_max=30.0,
+        precision=1,
+        options={"SKIP_SAVE"},
+    )
+    painted: PointerProperty(name="Masks", type=SoftGroundPainted)
     pressure: EnumProperty(
         name="Pressure",
         description="How the force on a foot spreads over its contact",
         items=[
-            ("UNIFORM", "Even", "The same pressure under all of the foot that touches, as in the paper"),
+            ("UNIFORM", "Flat", "The same pressure under all of the foot that touches"),
             (
                 "CENTRE_OF_PRESSURE",
-                "Rolling",
+                "Heel-to-Toe",
                 "Most pressure where the force acts, from the heel to the toes: steps have deep heels and toes",
             ),
         ],
@@ -140,6 +164,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     slowed_time: IntVectorProperty(
         name="Slowed Time Stretching", description="As Slow Down has set it; (0, 0) before", size=2, options={"HIDDEN"}
+    )
+    sink_feet: BoolProperty(
+        name="Sink Feet",
+        description="Let the feet down into their prints, hips and knees with them, as a layer of keys above the "
+        "animation. Where a rig cannot take the layer, the bake says so and goes on without",
+        default=False,
     )
     has_layers: BoolProperty(
         name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}

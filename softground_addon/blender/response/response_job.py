@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
 from ...core.findings import Finding
 from ...core.ground.heightfield import Terrain
 from ...core.loads.estimate import CharacterLoads
@@ -29,8 +30,9 @@ from ...core.response.response import (
 from ...core.settings import BakeSettings, CharacterSettings, ResponseOptions
 from .. import settings
 from ..animation_layer import nla_layer
+from ..characters.rig_mapping import RigMapping
 from ..jobs import Job, Progress, counted, meanwhile
-from .character_keys import ReadRig, response_curves
+from .character_keys import ReadRig, controls_of, response_curves
 
 NOTICEABLE_LEAN = np.radians(0.25)
 """A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
@@ -80,6 +82,30 @@ def check_characters(characters: Iterable[CharacterSettings]) -> None:
     """Raise InputError, naming the remedy, where a character can take no layer."""
     for _, armature in rigged(characters):
         nla_layer.check_layerable(armature)
+
+
+def _refusal(scene: bpy.types.Scene, characters: Sequence[CharacterSettings]) -> str:
+    """Why feet cannot be let down by a layer, and what to do; empty where they can."""
+    try:
+        check_characters(characters)
+        for one, armature in rigged(characters):
+            controls_of(scene, armature, RigMapping(one.joints, one.soles, "settings"))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeSettings, list[Finding]]:
+    """The settings without the layer that lets feet down, where a rig cannot take it; the finding that says so."""
+    if not wanted.sink_feet or wanted.output != "BOTH" or wanted.response is None or wanted.response.tilt:
+        return wanted, []
+    why = _refusal(scene, wanted.characters)
+    if not why:
+        return wanted, []
+    said = Finding(
+        "feet_not_sunk", "note", f"Feet were not let down into their prints. {why}", "Or leave Sink Feet off."
+    )
+    return replace(wanted, response=None), [said]
 
 
 def standing_on(
@@ -321,7 +347,7 @@ def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             "no_legs",
             "warning",
             f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
-            "Complete its joints in the Character panel.",
+            "Complete its joints in Body Bones, under Advanced.",
         )
         for character in responses
         if not character.response.legs

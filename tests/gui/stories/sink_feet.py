@@ -12,6 +12,7 @@ from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 def tell(hand: Hand, facts: dict) -> Steps:
     armature = open_walk(60)
     yield from hand.open_sidebar()
+    scene().softground.sink_feet = False
     with_viewport(hand, bpy.ops.softground.add_character)
     yield from hand.press_button("softground.bake")
     yield from hand.wait_for(lambda: session().is_baking, 10)
