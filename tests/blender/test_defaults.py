@@ -13,6 +13,7 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
+from softground_addon.blender.characters import character_setup
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.interface import operators
 from softground_addon.core.ground import presets
@@ -119,7 +120,7 @@ def test_cells_fit_the_shortest_sole_and_things_have_a_centimetre_at_most(scene,
     assert options.cell_size == pytest.approx(0.55 / 55 / settings.COARSER, rel=0.02)
     options.characters.clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=4.0)
-    bpy.ops.softground.add_character()
+    character_setup.add_things(scene, [bpy.context.active_object])
     assert options.cell_size == pytest.approx(0.01)
 
 
