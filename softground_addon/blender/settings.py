@@ -266,8 +266,10 @@ def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
 
 
 def holds(scene: bpy.types.Scene, preset: Preset) -> bool:
-    """Whether the scene's ground is as a preset says."""
+    """Whether the scene's ground is as a preset says, or will be with its first character."""
     for group, field, value in _of_preset(scene, preset):
+        if not scene.softground.characters and not group.is_property_set(field):
+            continue
         now = getattr(group, field)
         if not (abs(now - value) <= 1e-6 * abs(value) if isinstance(value, float) else now == value):
             return False

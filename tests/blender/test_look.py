@@ -88,6 +88,7 @@ def test_no_look_without_a_ground(scene):
 def test_the_menu_says_that_a_preset_was_modified(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(preset_menu, "user_folder", lambda: tmp_path)
     material = scene.softground.material
+    assert preset_menu.title_of_ground(scene) == "Snow"
     for path in sorted(presets.FOLDER.glob("*.json")):
         bpy.ops.softground.load_preset(filepath=str(path))
         assert preset_menu.title_of_ground(scene) == material.preset

@@ -238,10 +238,10 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
             layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
         else:
             _bake_buttons(layout, options, state, is_outdated=bool(summary and state.stale))
-        row = layout.row(align=True)
+        row = layout.row(align=True, heading="Frames")
         row.enabled = not state.is_baking
-        row.prop(options, "frame_start")
-        row.prop(options, "frame_end")
+        row.prop(options, "frame_start", text="")
+        row.prop(options, "frame_end", text="")
         if state.is_baking:
             return
         row = layout.row(align=True)
@@ -259,7 +259,8 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
 
 def _bake_buttons(layout: Any, options: Any, state: Any, *, is_outdated: bool) -> None:
     """The large button, with the feet beside it, and live mode below."""
-    row = layout.row(align=True)
+    row = layout.split(factor=0.66, align=True)
+    row.use_property_split = False
     row.scale_y = 1.4
     button = row.row(align=True)
     button.alert = is_outdated
