@@ -60,9 +60,9 @@ COARSE = 4.0
 
 
 def coarse(scene: bpy.types.Scene) -> None:
-    """Settings with which tests bake quickly: prints alone, flat pressure in cells of a centimetre, no tread."""
+    """Settings with which tests bake quickly: prints alone, flat pressure, cells of a centimetre, a narrow ground."""
     options = scene.softground
-    options.sink_feet = False
+    options.sink_feet, options.ground_margin = False, 0.0
     options.cell_size, options.pressure, options.tread = 0.01, "UNIFORM", 0.0
 
 
