@@ -266,10 +266,6 @@ def _material(
     tree.nodes.clear()
     graph = Graph(tree)
     shader, height = build(graph)
-    ragged = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.5, 4.0, 0.6) * 0.5
-    fading = graph.ramp(graph.attribute(EDGE) + ragged, 0.55, 1.05)  # noise is 0.5 on average: nothing fades at 0
-    clear = graph.out(graph.node("ShaderNodeBsdfTransparent"))
-    shader = graph.out(graph.node("ShaderNodeMixShader", {0: fading, 1: shader, 2: clear}))
     material.use_transparent_shadow = False  # a ground throws no shadow by its edge, and they take time
     # Shown as bump; the material's own setting turns it into true displacement of a subdivided ground.
     relief = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
@@ -302,8 +298,10 @@ def _tread(graph: Graph, pressed: Socket) -> Socket:
 
 def _shaded(graph: Graph, look: Look) -> tuple[Socket, Socket]:
     """Shader and relief [m] of a look."""
+    ragged = graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.5, 4.0, 0.6) * 0.5
+    shown = graph.ramp(graph.attribute(EDGE) + ragged, 0.55, 1.05, 1.0, 0.0)  # noise is around 0.5: all is shown at 0
     # Christensen-Burley is as good as a random walk over a centimetre of snow, at half the time.
-    shader = graph.node("ShaderNodeBsdfPrincipled", look.inputs, subsurface_method="BURLEY")
+    shader = graph.node("ShaderNodeBsdfPrincipled", {**look.inputs, "Alpha": shown}, subsurface_method="BURLEY")
     return graph.out(shader), look.relief
 
 

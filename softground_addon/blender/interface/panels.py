@@ -238,10 +238,11 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
             layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
         else:
             _bake_buttons(layout, options, state, is_outdated=bool(summary and state.stale))
-        row = layout.row(align=True, heading="Frames")
+        row = layout.row(align=True)
+        row.use_property_split = False
         row.enabled = not state.is_baking
-        row.prop(options, "frame_start", text="")
-        row.prop(options, "frame_end", text="")
+        row.prop(options, "frame_start")
+        row.prop(options, "frame_end")
         if state.is_baking:
             return
         row = layout.row(align=True)
