@@ -58,7 +58,6 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
         "steps": len(footprints),
         "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
         "peak_force_n": max((float(footprint.peak_force_n) for footprint in footprints), default=0.0),
-        LAST_FRAME: max((float(footprint.end_frame) for footprint in footprints), default=0.0),
     }
 
 
