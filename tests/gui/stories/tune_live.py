@@ -8,6 +8,7 @@ import numpy as np
 from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
+from tests.gui.stories.interrupted_bake import with_viewport
 
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
@@ -16,7 +17,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.press_button("softground.add_character")
     yield 0.2
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
-    yield from hand.press_button("softground.create_ground")
+    yield from hand.press_button("softground.create_ground", offset=0.25)
     yield 0.3
     facts["ground"] = scene().softground.ground.name
 
@@ -58,7 +59,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.2
     facts["forth again: as before"] = bool((heights() == here).all())
 
-    yield from hand.press_button("softground.overlay", offset=0.12)
+    with_viewport(hand, bpy.ops.softground.overlay)
     facts["overlay"] = bpy.context.window_manager.softground.show_overlay
     scene().frame_set(58)
     yield from hand.look_at_walk()
