@@ -25,8 +25,8 @@ motion itself does not tell better."""
 PASSES = 1.07
 """Trunk, head and arms pass the low-pass twice, for the flesh on them follows the bones slowly; the legs, which bring
 the impacts, once. Two passes together cut lower than one: this raises the cut-off of each."""
-SLOW_CUTOFF = 5.0
-"""Cut-off that shows how a body leans while it stands, in the same unit (2.5 Hz)."""
+SLOW_CUTOFF = 4.0
+"""Cut-off that shows how a body leans while it stands, in the same unit (2 Hz)."""
 CUTOFF_RANGE = 2.0
 """How far the motion may move the cut-off from there, down or up [octaves]."""
 CUTOFF_STEP = 0.25
