@@ -58,7 +58,10 @@ WALK_RATIO = 0.384 / (PERSON_LEG * np.sqrt(PERSON_LEG / 9.81))
 """Step length over step frequency, in leg·sqrt(leg/gravity): 0.0064 m/(steps/min) at any free speed (Sekiya et al.
 1997, doi:10.2519/jospt.1997.26.5.266). Played k times slower, it is k times as large."""
 SLOW_MOTION = 3.0
-"""That factor from which a motion is in slow motion; a creeping walk comes to 2."""
+"""That factor from which a motion is in slow motion, whatever its swings; a creeping walk comes to 2."""
+SLOW_STRIDES, SLOW_SWINGS = 1.6, 2.4
+"""That factor, and the time of a swing in sqrt(leg/gravity), that only slow motion passes together: a leg swings in 1.4
+at free speed, and in 2 in a creeping walk, as the leg's own pendulum sets it."""
 LEAST_STRIDE = 0.8
 """Shorter strides are shuffles, which have no pace, in leg lengths."""
 
@@ -152,7 +155,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "unit_scale",
             "error",
             f"'{motion.name}' is {tall} tall: its file is in {units}.",
-            f"Scale it by {scale}, its meshes with it, or leave it if it is meant so.",
+            f"Press Scale by {scale} in the Character panel, or leave it if it is meant so.",
         )
         return  # with its size, the mass that suits it changes
     likely, by = motion.skin.mass if motion.skin else 0.0, "what has the volume of its skin"
@@ -191,7 +194,7 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
     if motion.centre is not None or motion.four_legged:
         return
     belt = treadmill_speed(motion, character.contacts)
-    slower = []
+    slower, swings = [], []
     for sole in motion.soles:
         of_sole = [step for step in steps if step.sole == sole.sole.name]
         for step, after in itertools.pairwise(of_sole):
@@ -199,7 +202,9 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
             stride = float(np.linalg.norm((after.position - step.position)[:2])) + belt * seconds
             if stride > LEAST_STRIDE * motion.leg_length:
                 slower.append(stride * seconds / (4 * motion.leg_length * motion.pendulum_time) / WALK_RATIO)
-    if slower and (factor := float(np.median(slower))) > SLOW_MOTION:
+                swings.append((after.start_frame - step.end_frame) / motion.frame_rate / motion.pendulum_time)
+    factor = float(np.median(slower)) if slower else 0.0
+    if factor > SLOW_MOTION or (factor > SLOW_STRIDES and np.median(swings) > SLOW_SWINGS):
         yield Finding(
             "slow_motion",
             "note",

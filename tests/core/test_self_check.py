@@ -116,9 +116,21 @@ def test_a_sole_on_the_edge_of_the_ground_says_how_much_of_it_prints(share):
         assert "2 steps of 'walker'" in findings["edge_of_ground"].message
 
 
-@pytest.mark.parametrize(("slower", "told"), [(1.0, False), (2.0, False), (4.8, True)])
-def test_data_of_120_frames_a_second_in_a_scene_of_25_is_slow_motion(slower, told):
-    loads = walk(speed=1.3, period=1.1)
+@pytest.mark.parametrize(
+    ("slower", "speed", "period", "told"),
+    [
+        (1.0, 1.3, 1.1, False),
+        (1.2, 1.3, 1.1, False),  # data of 30 frames a second in a scene of 25
+        (2.0, 1.3, 1.1, True),
+        (2.4, 1.3, 1.1, True),
+        (4.8, 1.3, 1.1, True),
+        (2.0, 1.8, 0.95, True),
+        (1.0, 0.4, 2.1, False),  # a creeping walk
+        (1.0, 0.7, 1.7, False),
+    ],
+)
+def test_data_of_more_frames_a_second_than_the_scene_is_slow_motion_and_a_slow_walk_is_not(slower, speed, period, told):
+    loads = walk(speed=speed, period=period)
     slow = replace(loads, motion=replace(loads.motion, frame_rate=loads.motion.frame_rate / slower))
     _, footprints = pressed(loads, SNOW, 0.02)
     codes = {finding.code for finding in self_check([slow], footprints, FlatTerrain(), 0.02, "Field")}

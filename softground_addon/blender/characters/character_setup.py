@@ -15,6 +15,7 @@ from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .frame_ranges import ancestors, animated_frames
+from .import_fixes import put_under, scale_to_metres, size_of
 from .prop_extraction import surface_of
 from .recognition import SHARE, recognise
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, require_armature
@@ -60,7 +61,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
         character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
     _take_frames(scene, animated_frames(scene, armature))
-    character.sole_length = length
+    character.sole_length, character.size = length, size_of(scene, armature)
     _fit_ground(scene)
     return character
 
@@ -202,6 +203,28 @@ def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None
         start, end = min(settings.frame_start, start), max(settings.frame_end, end)
     settings.frame_start, settings.frame_end = start, end
     settings.animated_frames = start, end
+
+
+def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
+    """Scale a character whose file is in other units to metres, by an empty above it; the factor.
+
+    Raises
+    ------
+    InputError
+        If its size needs no change, or it is linked.
+    """
+    armature = character.armature
+    factor = scale_to_metres(character.size)
+    if armature is None or factor == 1.0:
+        raise InputError(f"'{title_of(character)}' is {character.size:.2g} m in size: its scale is as it should be.")
+    put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3
+    by_volume = character.mass == character.skin_mass
+    character.size, character.sole_length = character.size * factor, character.sole_length * factor
+    character.skin_mass = float(f"{character.skin_mass * factor**3:.2g}")
+    if by_volume:
+        character.mass = character.skin_mass
+    fit_cells(scene)
+    return factor
 
 
 def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:

@@ -82,6 +82,23 @@ class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
+    """Scale the character, whose file was made in other units, by an empty that it then hangs on. Its animation stays
+    as it is"""
+
+    bl_idname = "softground.fix_scale"
+    bl_label = "Fix Import Scale"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        character = active_character(scene)
+        factor = character_setup.fix_scale(scene, character)
+        self.report({"INFO"}, f"'{character_setup.title_of(character)}' is scaled by {factor:g}")
+        return {"FINISHED"}
+
+
 class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
     """Find the feet and joints of the character again, by its skin, the names of its bones or its rest pose. Esc
     cancels"""
@@ -179,6 +196,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
 CLASSES = (
     SOFTGROUND_OT_remove_character,
     SOFTGROUND_OT_mass_by_volume,
+    SOFTGROUND_OT_fix_scale,
     SOFTGROUND_OT_detect_bones,
     SOFTGROUND_OT_add_contact,
     SOFTGROUND_OT_add_sole,

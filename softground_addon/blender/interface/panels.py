@@ -8,6 +8,7 @@ import bpy
 
 from ...core.motion.motion import JOINTS
 from .. import session, settings
+from ..characters.import_fixes import scale_to_metres
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..settings import is_set_up, is_thing
 from . import bake_result, outdated, prediction, preset_menu
@@ -80,10 +81,24 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
                 layout.label(text="Was deleted: undo that, or take it out with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
+            _scale(layout, character)
             layout.prop(character, "mass")
             if suggested_mass(character):
                 text = f"{suggested_mass(character):g} kg by Volume"
                 layout.operator("softground.mass_by_volume", text=text, icon="INFO", translate=False)
+
+
+def _scale(layout: Any, character: Any) -> None:
+    """What size a character has whose file is in other units, and a button that puts it right."""
+    factor = scale_to_metres(character.size)
+    if factor == 1.0 or character.armature is None:
+        return
+    box = layout.box().column(align=True)
+    size = f"{character.size:.0f} m" if factor < 1 else f"{character.size * 100:.2g} cm"
+    box.label(
+        text=f"{size} in size: made in {'centimetres' if factor < 1 else 'metres'}", icon="ERROR", translate=False
+    )
+    box.operator("softground.fix_scale", text=f"Scale by {factor:g}", translate=False)
 
 
 def _no_contacts(layout: Any, character: Any) -> None:

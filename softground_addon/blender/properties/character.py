@@ -88,6 +88,7 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
         soft_max=500.0,
         precision=1,
     )
+    size: FloatProperty(name="Size", description="Of its rig, by which a wrong scale is seen", options={"HIDDEN"})
     skin_mass: FloatProperty(
         name="Mass of the Skin", description="What its skin weighs by volume, 0 where unknown", options={"HIDDEN"}
     )

@@ -1,0 +1,46 @@
+"""What an import got wrong is put right above the character, by an empty that it hangs on; its own data stays."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.self_check import SMALLEST, TALLEST
+from .frame_ranges import ancestors
+from .sole_extraction import meshes_on
+
+
+def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
+    """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog."""
+    heads = np.array([bone.head_local for bone in armature.data.bones]).reshape(-1, 3)
+    in_world = heads @ np.array(armature.matrix_world)[:3, :3].T * scene.unit_settings.scale_length
+    return float(np.ptp(in_world, axis=0).max()) if len(heads) else 0.0
+
+
+def scale_to_metres(size: float) -> float:
+    """Factor that a body of such a size [m] lacks: 0.01 where its file is in centimetres, 100 the reverse, or 1."""
+    return 0.01 if size > TALLEST else 100.0 if 0 < size < SMALLEST else 1.0
+
+
+def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> bpy.types.Object:
+    """Hang a character, with the meshes that it deforms, on a new empty at the origin; whatever animates it stays.
+
+    Raises
+    ------
+    InputError
+        If it is linked from another file.
+    """
+    tops = dict.fromkeys([thing, *ancestors(thing)][-1] for thing in (armature, *meshes_on(scene, armature)))
+    linked = next((thing for thing in tops if thing.library), None)
+    if linked is not None:
+        raise InputError(
+            f"'{linked.name}' is linked from another file: make a library override of it (Object > Library Override > "
+            "Make), or put it right in its own file."
+        )
+    empty = bpy.data.objects.new(name, None)
+    (armature.users_collection or (scene.collection,))[0].objects.link(empty)
+    for thing in tops:
+        thing.parent = empty
+        thing.matrix_parent_inverse.identity()
+    return empty
