@@ -131,7 +131,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "warning",
             f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while they stand, and print over "
             "each other.",
-            "Let the armature move ahead by as much, or use the animation with its root motion.",
+            "Press Walk Ahead in the Character panel, or use the animation with its root motion.",
         )
 
 

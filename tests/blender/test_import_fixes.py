@@ -69,3 +69,36 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     with pytest.raises(RuntimeError, match="its scale is as it should be"):
         bpy.ops.softground.fix_scale()
     bpy.data.objects.remove(armature.parent)
+
+
+def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
+    armature = shots.walker(scene, frames=72)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    steps = bake(scene).report["steps"]
+    bpy.ops.softground.clear_bake()
+    with pytest.raises(RuntimeError, match="'Walker' does not walk on the spot"):
+        bpy.ops.softground.walk_ahead()
+    belt = bpy.data.objects.new("Belt", None)
+    scene.collection.objects.link(belt)
+    same_side = [step for step in steps if step["contact"] == steps[1]["contact"]]
+    first, last = same_side[0], same_side[-1]
+    frames = last["frame_start"] - first["frame_start"]
+    speed = np.subtract(last["position"], first["position"]) / frames  # of the whole walk, per frame
+    for frame in (1, 72):
+        belt.location = -speed * (frame - 1)
+        belt.keyframe_insert("location", frame=frame)
+    for curve in belt.animation_data.action.fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    armature.parent = belt
+    bpy.context.view_layer.update()
+    assert "walks_in_place" in codes(bake(scene).report)
+    bpy.ops.softground.clear_bake()
+    bpy.ops.softground.walk_ahead()
+    report = bake(scene).report
+    assert "walks_in_place" not in codes(report)
+    assert len(report["steps"]) == len(steps)
+    for one, other in zip(report["steps"], steps, strict=True):
+        assert one["position"][:2] == pytest.approx(other["position"][:2], abs=0.12)
+    assert belt.parent.name == "Walker Travel"

@@ -61,6 +61,16 @@ def test_a_walk_of_120_frames_a_second_in_a_scene_of_25_is_slow_motion(scene):
     assert codes(bake(scene).report) == {"slow_motion"}
 
 
+def test_a_capture_of_120_frames_a_second_that_says_25_is_slow_motion(scene):
+    path = shots.SHARED / "rigs" / "cmu_05_01.bvh"
+    if not path.is_file():
+        pytest.skip(f"the reference data is not here: {path}")
+    bpy.ops.import_anim.bvh(filepath=str(path), global_scale=0.0564, update_scene_fps=True, update_scene_duration=True)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.04
+    assert "slow_motion" in codes(bake(scene).report)
+
+
 def test_a_character_in_centimetres_is_told_its_scale(short_walk):
     short_walk.softground.characters[0].armature.scale = (100.0, 100.0, 100.0)
     short_walk.softground.cell_size = 1.0

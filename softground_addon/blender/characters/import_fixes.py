@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.self_check import SMALLEST, TALLEST
+from ..compat import action_curves
+from ..settings import frame_rate_of, time_stretch_of
 from .frame_ranges import ancestors
 from .sole_extraction import meshes_on
 
@@ -44,3 +47,24 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
         thing.parent = empty
         thing.matrix_parent_inverse.identity()
     return empty
+
+
+def walk_ahead(scene: bpy.types.Scene, armature: bpy.types.Object, velocity: NDArray[np.float64]) -> None:
+    """Let a character that walks on the spot travel at a velocity (2,) [m/s] over the frames of the bake.
+
+    Raises
+    ------
+    InputError
+        If it is linked from another file.
+    """
+    empty = put_under(scene, armature, f"{armature.name} Travel")
+    start, end = scene.softground.frame_start, scene.softground.frame_end
+    seconds = (end - start) / frame_rate_of(scene)
+    for frame, travel in ((start, np.zeros(2)), (end, velocity * seconds / scene.unit_settings.scale_length)):
+        empty.location[:2] = travel
+        empty.keyframe_insert("location", frame=frame * time_stretch_of(scene))
+    assert empty.animation_data is not None
+    assert empty.animation_data.action is not None
+    for curve in action_curves(empty.animation_data.action):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"

@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import Any, cast
 
 import bpy
+import numpy as np
 
 from ...core.errors import InputError
 from .. import jobs, settings
 from ..characters import character_setup
 from ..characters.frame_ranges import ancestors
+from ..characters.import_fixes import walk_ahead
 from ..operator_base import reports_errors
+from ..reading import analysis
 from .modal_bake import Reading
 
 
@@ -97,6 +100,37 @@ class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
         factor = character_setup.fix_scale(scene, character)
         self.report({"INFO"}, f"'{character_setup.title_of(character)}' is scaled by {factor:g}")
         return {"FINISHED"}
+
+
+class SOFTGROUND_OT_walk_ahead(_OnCharacter, Reading):
+    """Let a character that walks on the spot travel as fast as its feet slide, by an empty that it then hangs on. Its
+    animation stays as it is. Esc cancels"""
+
+    bl_idname = "softground.walk_ahead"
+    bl_label = "Walk Ahead"
+    cancelled = "Walk Ahead cancelled: nothing was changed"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen, and no other job runs."""
+        return super().poll(context) and Reading.poll.__func__(cls, context)
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[str]:
+        return _walking_ahead(scene)
+
+    def _show(self, result: str) -> None:
+        self.report({"INFO"}, result)
+
+
+def _walking_ahead(scene: bpy.types.Scene) -> jobs.Job[str]:
+    known = yield from analysis.reading(scene)
+    character = active_character(scene)
+    name = character_setup.title_of(character)
+    belt = known.belts.get(name)
+    if belt is None or character.armature is None:
+        raise InputError(f"'{name}' does not walk on the spot: its feet stand still, or slide along with its body.")
+    walk_ahead(scene, character.armature, -belt)
+    return f"'{name}' travels at {np.linalg.norm(belt):.1f} m/s"
 
 
 class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
@@ -197,6 +231,7 @@ CLASSES = (
     SOFTGROUND_OT_remove_character,
     SOFTGROUND_OT_mass_by_volume,
     SOFTGROUND_OT_fix_scale,
+    SOFTGROUND_OT_walk_ahead,
     SOFTGROUND_OT_detect_bones,
     SOFTGROUND_OT_add_contact,
     SOFTGROUND_OT_add_sole,

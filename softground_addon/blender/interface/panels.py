@@ -82,6 +82,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             _scale(layout, character)
+            _on_the_spot(layout, settings.scene_of(context), character)
             layout.prop(character, "mass")
             if suggested_mass(character):
                 text = f"{suggested_mass(character):g} kg by Volume"
@@ -99,6 +100,16 @@ def _scale(layout: Any, character: Any) -> None:
         text=f"{size} in size: made in {'centimetres' if factor < 1 else 'metres'}", icon="ERROR", translate=False
     )
     box.operator("softground.fix_scale", text=f"Scale by {factor:g}", translate=False)
+
+
+def _on_the_spot(layout: Any, scene: Any, character: Any) -> None:
+    """That a character walks in place, and a button that lets it travel."""
+    predicted = prediction.of(scene)
+    if character.armature is None or predicted is None or character.armature.name not in predicted.analysis.belts:
+        return
+    box = layout.box().column(align=True)
+    box.label(text="Walks on the spot", icon="INFO")
+    box.operator("softground.walk_ahead", icon="FORWARD")
 
 
 def _no_contacts(layout: Any, character: Any) -> None:

@@ -9,15 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import pressed_area
 from ...core.loads.estimate import CharacterLoads
+from ...core.loads.sliding import treadmill_velocity
 from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
@@ -25,6 +29,8 @@ from .. import jobs, settings
 from ..ground import ground_mesh
 from . import staleness
 from .shots import Shot, estimate_shot, ground_of, read_shot, settings_of
+
+Array = NDArray[np.float64]
 
 TRIALS = 4
 """Bakes that a match may compute: two are enough unless feet slide."""
@@ -62,6 +68,12 @@ class Analysis:
     loads: list[CharacterLoads]
     contacts: ContactLoads
     area: float
+
+    @cached_property
+    def belts(self) -> dict[str, Array]:
+        """Velocity of the belt on which each character walks on the spot, by its name, (2,) [m/s]."""
+        known = {one.motion.name: treadmill_velocity(one.motion, one.contacts) for one in self.loads}
+        return {name: velocity for name, velocity in known.items() if velocity.any()}
 
 
 _known: dict[int, Analysis] = {}
