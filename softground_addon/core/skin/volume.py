@@ -75,8 +75,8 @@ def pieces(points: Array, triangles: Indices) -> Pieces:
     triangles : (T, 3) int array
         Those at one place are one where `welded` says so.
     """
-    edges = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-    _, piece = np.unique(components(len(points), *edges.T)[triangles[:, 0]], return_inverse=True)
+    ends = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]).T
+    piece = components(len(points), *ends)[triangles[:, 0]]
     count = int(piece.max(initial=-1)) + 1
 
     def total(values: Array) -> Array:
@@ -86,11 +86,14 @@ def pieces(points: Array, triangles: Indices) -> Pieces:
     normal = np.cross(b - a, c - a) / 2
     area = total(np.linalg.norm(normal, axis=1))
     opening = np.linalg.norm([total(along) for along in normal.T], axis=0)
-    middle = np.stack([total(along) for along in a.T], axis=-1) / np.bincount(piece, minlength=count)[:, None]
+    middle = np.stack([total(along) for along in a.T], axis=-1) / np.maximum(total(np.ones(len(a))), 1.0)[:, None]
     volume = np.abs(total(np.einsum("ti,ti->t", a - middle[piece], normal) / 3))
-    _, first, number = np.unique(edges @ (len(points), 1), return_index=True, return_counts=True)
-    rim = first[number == 1]
-    length = np.linalg.norm(np.subtract(*points[edges[rim].T]), axis=1)
+    edge = np.minimum(*ends) * len(points) + np.maximum(*ends)
+    ordered = np.sort(edge)
+    twice = ordered[1:] == ordered[:-1]
+    lone = np.append(ordered[~(np.append(twice, False) | np.append(False, twice))], -1)  # few, of most skins
+    rim = np.flatnonzero(lone[np.searchsorted(lone[:-1], edge)] == edge)
+    length = np.linalg.norm(np.subtract(*points[ends[:, rim]]), axis=1)
     around = np.bincount(piece[rim % len(triangles)], length, count)
     sheet = (opening > SHEET * area) | (volume < THIN * area**1.5)
     return Pieces(sheet[piece], (sheet | (around**2 > OPEN * area))[piece])
