@@ -11,7 +11,7 @@ from ...core.self_check import SMALLEST, TALLEST
 from ..compat import action_curves
 from ..settings import frame_rate_of, time_stretch_of
 from .frame_ranges import ancestors
-from .sole_extraction import meshes_on
+from .skin_sampling import meshes_on
 
 
 def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
