@@ -1,10 +1,12 @@
 """Soles come from the character's own feet."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.characters.rig_mapping import map_rig
+from softground_addon.blender.characters.rig_mapping import SoleSource, map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.jobs import run
 
@@ -241,6 +243,22 @@ def test_feet_that_rest_on_tiptoe_are_laid_flat_as_they_stand(scene):
         marks = sole.landmark_positions()[0]
         assert marks[0, 1] > 0.03 > -0.1 > marks[2, 1]
         assert np.ptp(marks[:, 2]) < 0.005
+
+
+@pytest.mark.parametrize("length", [1.0, 0.001])
+def test_a_limb_prints_its_skin_however_short_an_importer_made_its_bone(scene, length):
+    armature = standing()
+    dress(armature, LEFT_BOOT)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:
+        bone.use_connect = False
+    for bone in armature.data.edit_bones:
+        bone.tail = bone.head + (bone.tail - bone.head) * length
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mapping = replace(map_rig(armature), soles=(SoleSource("shin", "L", "shin.L", limb=True),))
+    motion = run(sample_character(scene, armature, mapping, mass=70.0, frames=range(1, 11)))
+    assert motion.soles[0].sole.prop.extent == pytest.approx((0.6, 0.6, 0.7), rel=0.05)
 
 
 def test_a_mesh_hidden_from_the_render_does_not_print(scene):
