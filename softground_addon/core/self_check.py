@@ -52,6 +52,8 @@ APART = 0.02
 one, it grows with the legs."""
 FEW_CELLS, ENOUGH_CELLS = 8, 27
 """Cells along a sole below which its outline is lost, and those that an adult's has at the default cell size."""
+BEARS = 0.25
+"""A sole that bears more than this bears the body, in body weights."""
 ON_GROUND = 0.9
 """A sole with less of it over the ground stands on the edge: its print is cut off there."""
 WALK_RATIO = 0.384 / (PERSON_LEG * np.sqrt(PERSON_LEG / 9.81))
@@ -121,6 +123,17 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "look in Contacts, under Advanced, whether its soles are what touches the ground, and in the viewport "
             "whether they face down.",
         )
+    else:
+        load = character.forces.forces[..., 2].max(axis=0) / (motion.mass * motion.gravity)
+        bearing = {sole.sole.name for sole, most in zip(motion.soles, load, strict=True) if most > BEARS}
+        mute = sorted(bearing - {step.sole for step in steps})
+        if mute:
+            yield Finding(
+                "sole_without_print",
+                "warning",
+                f"{', '.join(map(repr, mute))} of '{motion.name}' bears load and leaves no print",
+                "look whether its sole faces down, and in Contacts whether its bone is right.",
+            )
     missed = missed_steps(motion, character.contacts)
     if missed:
         yield advice(motion.name, missed, f"'{ground}'")

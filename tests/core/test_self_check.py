@@ -11,7 +11,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.self_check import WALK_RATIO, self_check
 from tests.core.character import Slope
-from tests.core.walkers import GRAVITY, MASS, box_sole, pressed, standing, walk
+from tests.core.walkers import GRAVITY, MASS, box_sole, pose, pressed, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 STATURE = 1.78
@@ -72,6 +72,13 @@ def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_
     alone.rise[len(frames) // 2 :, :2] = 1.0  # from there on it stands on the other, which does not print
     other = replace(loads, motion=replace(loads.motion, skin=alone))
     assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
+
+
+def test_a_foot_that_bears_on_the_edge_of_its_sole_leaves_no_print_and_says_so():
+    loads = stands()
+    loads.motion.soles[0].transforms[:] = pose(PLACES[0], 0.0, np.pi / 2)
+    told = found(loads)["sole_without_print"]
+    assert told.message == "'left' of 'walker' bears load and leaves no print"
 
 
 def test_skin_off_the_ground_and_bodies_without_skin_say_nothing():
