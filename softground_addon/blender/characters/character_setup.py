@@ -78,7 +78,7 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: 
     """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
     first, last = _frames_of_scene(scene, animated_frames(scene, armature))
     frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
-    reading = sample_character(scene, armature, mapping, mass=1.0, frames=frames)
+    reading = sample_character(scene, armature, mapping, mass=1.0, frames=frames, weighs=False)
     try:
         motion = yield from jobs.counted(reading, "sample", len(frames), share=SHARE)
     except InputError:  # it says so when the user bakes

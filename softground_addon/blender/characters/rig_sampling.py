@@ -61,6 +61,7 @@ def sample_character(
     frames: range,
     recorder: PoseRecorder | None = None,
     units: SceneUnits | None = None,
+    weighs: bool = True,
 ) -> Sampling:
     """Read a character frame by frame.
 
@@ -80,6 +81,8 @@ def sample_character(
         Takes down how its bones stand.
     units : SceneUnits, optional
         Those of the bake that it is read for; as they are now in the scene where it is read for itself.
+    weighs : bool
+        Whether to tell the mass of its skin, against which a bake is checked.
 
     Yields
     ------
@@ -119,7 +122,9 @@ def sample_character(
     rate = units.frame_rate / frames.step
     stances = None
     if followed:
-        stances = yield from meanwhile(len(frames), skin_stances(followed, armature, mapping, recording, rate))
+        stances = yield from meanwhile(
+            len(frames), skin_stances(followed, armature, mapping, recording, rate, weighs=weighs)
+        )
         armature = found(rig)
     assembling = assemble_motion(armature, mapping, recording, skin, mass=mass, carried=carried, stances=stances)
     return (yield from assembling)

@@ -60,6 +60,8 @@ def skin_stances(
     mapping: RigMapping,
     recording: Recording,
     rate: float,
+    *,
+    weighs: bool = True,
 ) -> Slices[SkinStances | None]:
     """When some contacts of a character bear and how its feet lie, or None where their skin never comes down.
 
@@ -73,6 +75,8 @@ def skin_stances(
         Of all `skin.bones` and those of the soles.
     rate : float
         Samples per second [Hz].
+    weighs : bool
+        Whether to tell the mass of the skin.
     """
     rig = name_of(armature)
     followed = yield from followed_skin.slices(skin, armature, recording, rate)
@@ -110,7 +114,7 @@ def skin_stances(
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
-    mass = yield from skin_mass.slices(skin, armature, recording.of(np.array([0])))
+    mass = (yield from skin_mass.slices(skin, armature, recording.of(np.array([0])))) if weighs else 0.0
     skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, skin_there)
 
