@@ -172,10 +172,11 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
         fall *= LOWER_BOB
     centre[:, 2] += (acted / fall - 1) * (centre[:, 2] - centre[:, 2].mean())
     # A force that steps at the edges of a flight is between its values there: that impulse is the stance's.
-    for first, last in zip(*runs(~flying), strict=True):
-        impulse = force[first:last, 2].sum()
-        if impulse > 0:
-            force[first:last] *= force[max(first - 1, 0) : last + 1, 2].sum() / impulse
+    first, last = runs(~flying)
+    impulse = _sums(force[:, 2], first, last)
+    whole = _sums(force[:, 2], np.maximum(first - 1, 0), np.minimum(last + 1, len(force)))
+    gain = np.divide(whole, impulse, out=np.ones(len(first)), where=impulse > 0)
+    force[~flying] *= np.repeat(gain, last - first)[:, None]
     force[flying | pulled] = 0.0
     return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 
@@ -263,13 +264,21 @@ def flights(airborne: Mask, body: BodyDynamics, step: float) -> Mask:
     does neither.
     """
     flying = airborne.copy()
-    edge = _leak(body, step)
-    for first, last in zip(*runs(airborne), strict=True):
-        fall = 1 - body.force[first:last, 2]
-        inner = fall[edge:-edge] if last - first > 3 * edge else fall[:0]
-        even = len(inner) > 0 and inner.mean() > RATES_OF_FALL[0] and inner.std() < EVEN_FALL * inner.mean()
-        flying[first:last] = fall.mean() > 1 - FREE_FALL or even
+    edge, fall = _leak(body, step), 1 - body.force[:, 2]
+    first, last = runs(airborne)
+    free = _sums(fall, first, last) > (1 - FREE_FALL) * (last - first)
+    long = last - first > 3 * edge
+    begin, end = np.where(long, first + edge, first), np.where(long, last - edge, last)
+    mean, square = (_sums(values, begin, end) / (end - begin) for values in (fall, fall**2))
+    even = long & (mean > RATES_OF_FALL[0]) & (square - mean**2 < (EVEN_FALL * mean) ** 2)
+    flying[airborne] = np.repeat(free | even, last - first)
     return flying
+
+
+def _sums(values: Array, first: NDArray[np.intp], last: NDArray[np.intp]) -> Array:
+    """Sums of values (N,) over the intervals (I,) from `first` to before `last`, (I,)."""
+    total: Array = np.append(0.0, np.cumsum(values))
+    return total[last] - total[first]
 
 
 def _leak(body: BodyDynamics, step: float) -> int:
