@@ -14,7 +14,7 @@ import bpy
 
 from ...core.errors import InputError
 from ..animation_layer.nla_layer import animated_paths
-from ..characters.rig_mapping import RigMapping
+from ..characters.rig_mapping import CHOOSE_CONTACTS, RigMapping
 
 _FOLLOWED = 0.5
 """Influence from which on a constraint counts."""
@@ -89,6 +89,8 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     carried = [joints[joint][0] for joint in ("hips", "hip_l", "hip_r", "head", "neck", "spine") if joint in joints]
     if not carried:
         carried = [source.bone for source in mapping.soles if source.bone]
+    if not carried:
+        raise InputError(f"'{rig.name}' has nothing to print with: {CHOOSE_CONTACTS}.")
     behind = [list(rig.behind(bone)) for bone in carried]
     common = [bone for bone in behind[0] if all(bone in chain for chain in behind)]
     free = [bone for bone in common if rig.is_free(bone) and rig.can_move(bone)]
