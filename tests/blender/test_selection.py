@@ -140,7 +140,7 @@ def test_a_rig_without_feet_is_added_with_an_empty_list_that_bones_fill(scene, c
     with pytest.raises(RuntimeError, match="No feet are found in 'Block': select the bones"):
         bpy.ops.softground.detect_bones()
     rigs.key(armature, "location", {1: (0, 0, 0), 20: (0, 0.2, 0)}, bone="Thing")
-    with pytest.raises(InputError, match=r"'Block' has nothing to print with: .* press Add Contact"):
+    with pytest.raises(InputError, match=r"'Block' has no feet, and nothing else to print with: .* press Add Contact"):
         bake(scene)
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.select_all(action="SELECT")

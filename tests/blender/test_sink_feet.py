@@ -6,6 +6,7 @@ import pytest
 from softground_addon.blender import jobs
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking import bake_job, bake_report, sink_feet
+from softground_addon.blender.characters.selection import set_up_automatically
 from softground_addon.blender.reading import analysis
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -131,6 +132,17 @@ def test_a_rig_that_takes_no_layer_is_named_in_a_line_and_prints_all_the_same(fi
 def test_a_scene_that_was_set_up_before_keeps_its_feet(baked):
     assert not baked.softground.sink_feet
     assert not nla_layer.has_layer(baked.softground.characters[0].armature)
+
+
+def test_a_shot_that_sets_itself_up_keeps_its_animation(first_walk):
+    options = first_walk.softground
+    assert options.sink_feet
+    options.characters.clear()
+    options.property_unset("sink_feet")
+    set_up_automatically(first_walk)
+    assert not options.sink_feet
+    bpy.ops.softground.bake()
+    assert not nla_layer.has_layer(options.characters[0].armature)
 
 
 def test_the_layer_is_no_animation_of_the_user_s(first_walk):

@@ -390,7 +390,7 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
     name = armature.name
     _check_mass(name, mass)
     if not mapping.soles:
-        raise InputError(f"'{name}' has nothing to print with: {CHOOSE_CONTACTS}.")
+        raise InputError(f"'{name}' has no feet, and nothing else to print with: {CHOOSE_CONTACTS}.")
     bones = armature.data.bones
     for source in mapping.soles:
         if not source.bone and not source.object:

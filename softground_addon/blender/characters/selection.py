@@ -119,6 +119,9 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
             f"Scene '{scene.name}' has several armatures ({_names(rigs)}): add those that walk with Add Character in "
             "the SoftGround panel and save the file."
         )
+    options = scene.softground
+    if not options.is_property_set("sink_feet"):
+        options.sink_feet = False  # nobody looks on here: an animation is changed where that was asked for
     add_character(scene, rigs[0])
 
 

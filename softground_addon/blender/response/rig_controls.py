@@ -90,7 +90,7 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     if not carried:
         carried = [source.bone for source in mapping.soles if source.bone]
     if not carried:
-        raise InputError(f"'{rig.name}' has nothing to print with: {CHOOSE_CONTACTS}.")
+        raise InputError(f"'{rig.name}' has no feet, and nothing else to print with: {CHOOSE_CONTACTS}.")
     behind = [list(rig.behind(bone)) for bone in carried]
     common = [bone for bone in behind[0] if all(bone in chain for chain in behind)]
     free = [bone for bone in common if rig.is_free(bone) and rig.can_move(bone)]
