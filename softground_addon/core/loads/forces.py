@@ -26,6 +26,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 FOOT_FRACTION = 0.08
 """Mass that stops with a landing foot, of the body mass (Clark, Ryan and Weyand 2017)."""
+RESTING_FRACTION = 0.014
+"""Least share of a sole that touches: a foot's own mass, of the body mass (de Leva 1996)."""
 LOWEST_MEETING = 0.5
 """Least height above the ground at which forces meet, in leg lengths: a body that lies presses straight down."""
 IMPACT_TIME = 0.16
@@ -84,6 +86,8 @@ def impulse_forces(motion: CharacterMotion, contacts: Contacts, characteristic_t
     """
     pressure = lowest_points(motion)
     share = share_by_moment(pressure[..., :2], centre_of_mass(motion)[:, :2], contacts.touching)
+    share = np.where(contacts.touching, np.maximum(share, RESTING_FRACTION), 0.0)
+    share /= np.maximum(share.sum(axis=1, keepdims=True), RESTING_FRACTION)
     weight = share * motion.mass * motion.gravity
     momentum = share * motion.mass * _landing_deceleration(motion, contacts, characteristic_time)
     forces = (weight + momentum)[..., None] * UP

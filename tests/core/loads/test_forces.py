@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softground_addon.core.loads.contacts import Contacts
-from softground_addon.core.loads.forces import impulse_forces, whole_body_forces
+from softground_addon.core.loads.forces import RESTING_FRACTION, impulse_forces, whole_body_forces
 from tests.core.character import character, flat_sole, standing
 
 MASS, GRAVITY = 77.5, 9.81
@@ -40,6 +40,16 @@ def test_the_weight_moves_to_the_foot_under_the_centre_of_mass():
     motion = standing(3, hips=(0.0, -0.05, 0.9), mass=MASS)
     forces = impulse_forces(motion, contacts(np.ones((3, 2))), 0.2)
     assert forces.forces[0, :, 2] == pytest.approx([0.25 * WEIGHT, 0.75 * WEIGHT], rel=1e-4)
+
+
+def test_a_foot_that_rests_bears_its_own_mass_though_the_body_stands_on_the_others():
+    places = ((0.0, 0.1, 0.0), (0.0, -0.1, 0.0), (0.6, 0.0, 0.0))
+    motion = standing(2, at=places, hips=(-0.1, 0.0, 0.9), mass=MASS)
+    on_all = impulse_forces(motion, contacts(np.ones((2, 3))), 0.2)
+    assert on_all.forces[0, :, 2].min() == pytest.approx(RESTING_FRACTION * WEIGHT, rel=0.02)
+    assert on_all.forces[0, :, 2].sum() == pytest.approx(WEIGHT)
+    lifted = impulse_forces(motion, contacts(np.array([[1, 1, 0]] * 2)), 0.2)
+    assert lifted.forces[0, :, 2] == pytest.approx([WEIGHT / 2, WEIGHT / 2, 0.0])
 
 
 def test_an_anatomical_sole_presses_a_standing_body_centimetres_into_snow_and_not_the_paper_s_91():
