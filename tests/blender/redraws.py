@@ -1,6 +1,6 @@
 """What a redraw asks, without a window: `poll` and `draw` of all panels, `poll` of all operators, and the handlers."""
 
-from time import perf_counter
+from time import thread_time
 from types import SimpleNamespace
 
 import bpy
@@ -30,15 +30,15 @@ def redraw(context):
     handlers.follow_frame(context.scene, context.view_layer.depsgraph)
 
 
-def least_seconds(action, *arguments, count=20):
-    """The least time of several runs [s]: what the machine does beside them comes and goes."""
+def least_seconds(action, *arguments, count=100):
+    """The least processor time of several runs [s]: what the machine does beside them comes and goes."""
     return min(_seconds(action, *arguments) for _ in range(count))
 
 
 def _seconds(action, *arguments):
-    begun = perf_counter()
+    begun = thread_time()
     action(*arguments)
-    return perf_counter() - begun
+    return thread_time() - begun
 
 
 def fill(scene, count):

@@ -34,6 +34,7 @@ def copy_deleted(scene):
     bpy.ops.object.delete()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("set_up", [nothing_baked, baked_on_a_copy, baked_with_a_response, live, copy_deleted])
 def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, set_up):
     set_up(short_walk)

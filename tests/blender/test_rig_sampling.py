@@ -382,7 +382,7 @@ def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, mes
         ({"mass": float("nan")}, "positive mass"),
         ({"frames": range(1, 1)}, "frame range 1 to 0"),
         ({"frames": range(9, 1, -1)}, "start before the end"),
-        ({"mapping": RigMapping()}, "has no soles"),
+        ({"mapping": RigMapping()}, "nothing else to print with"),
         ({"mapping": RigMapping(soles=(SoleSource("foot"),))}, "neither a bone nor an object"),
         ({"mapping": RigMapping(soles=(SoleSource("foot", object="Gone"),))}, "'Gone' is gone"),
     ],
