@@ -12,8 +12,10 @@ ROOT = Path(__file__).parents[2]
 MAKE_SHOT = """
 import sys
 import bpy
+import softground_addon
 from tests.blender import shots
 bpy.ops.wm.read_factory_settings(use_empty=True)
+softground_addon.register()
 scene = bpy.context.scene
 shots.walker(scene, frames=24)
 scene.collection.objects.link(camera := bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera")))
@@ -24,6 +26,7 @@ scene.cycles.samples = 1
 scene.render.resolution_x = scene.render.resolution_y = 16
 scene.render.image_settings.file_format = "PNG"
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+softground_addon.unregister()
 """
 
 
