@@ -32,7 +32,7 @@ from softground_addon.core.record.footprints import Footprint
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 
 WALK_FRAMES = 84  # 3.5 s: six or seven steps
-_GAP = 0.10  # m between neighbouring grounds
+_GAP = 0.6  # m between neighbouring grounds at most: each ends on its own coarse grid, up to 0.3 m further out
 _CLOSE_UP = (640, 480)
 _OVERVIEW = (1024, 576)
 
