@@ -5,9 +5,14 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.characters.import_fixes import scale_to_metres, size_of
+from softground_addon.blender.compat import action_curves
 from tests.blender import shots
 from tests.blender.grounds import bake
 from tests.blender.test_self_check import codes
+
+
+def keys_of(armature):
+    return [tuple(key.co) for curve in action_curves(armature.animation_data.action) for key in curve.keyframe_points]
 
 
 def imported(scene, factor, *, loose=False):
@@ -18,7 +23,7 @@ def imported(scene, factor, *, loose=False):
         figure.parent = None
     armature.data.transform(np.diag([factor, factor, factor, 1.0]).tolist())
     figure.data.transform(np.diag([factor, factor, factor, 1.0]).tolist())
-    for curve in armature.animation_data.action.fcurves:
+    for curve in action_curves(armature.animation_data.action):
         if curve.data_path.endswith("location"):
             for key in curve.keyframe_points:
                 key.co.y *= factor
@@ -50,12 +55,14 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     bpy.ops.softground.add_character()
     character = scene.softground.characters[0]
     assert scale_to_metres(character.size) == pytest.approx(1 / factor)
-    keys = [tuple(key.co) for curve in armature.animation_data.action.fcurves for key in curve.keyframe_points]
+    keys = keys_of(armature)
     bpy.ops.softground.fix_scale()
     bpy.context.view_layer.update()
     assert armature.parent.name == "Walker Scale"
     assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
-    assert keys == [tuple(key.co) for curve in armature.animation_data.action.fcurves for key in curve.keyframe_points]
+    assert keys == [
+        tuple(key.co) for curve in action_curves(armature.animation_data.action) for key in curve.keyframe_points
+    ]
     assert size_of(scene, armature) == pytest.approx(character.size, rel=1e-4)
     assert 1.0 < character.size < 2.0
     assert character.mass == pytest.approx(mass, rel=0.05)
@@ -88,7 +95,7 @@ def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
     for frame in (1, 72):
         belt.location = -speed * (frame - 1)
         belt.keyframe_insert("location", frame=frame)
-    for curve in belt.animation_data.action.fcurves:
+    for curve in action_curves(belt.animation_data.action):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     armature.parent = belt

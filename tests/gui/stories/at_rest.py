@@ -77,10 +77,12 @@ def add(hand: Hand) -> Steps:
 
 def key_again() -> None:
     """Move a key of the walk by a hair."""
-    curve = bpy.data.objects["Walker"].animation_data.action.fcurves[0]
+    action = bpy.data.objects["Walker"].animation_data.action
+    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
+    curve = curves[0]
     curve.keyframe_points[0].co.y += 1e-4
     curve.update()
-    bpy.data.objects["Walker"].animation_data.action.update_tag()
+    action.update_tag()
 
 
 def watched() -> Steps:
