@@ -102,6 +102,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     # no bake begins while a render runs
     yield from reopen(hand, shot)
     keep_render_busy()
+    yield 0.5  # drawn with another engine, Blender's own panels give the active object properties of that engine
     before = fingerprints.of_file()
     with_viewport(hand, bpy.ops.render.render, "INVOKE_DEFAULT")
     yield 0.5
