@@ -41,10 +41,19 @@ def _seconds(action, *arguments):
     return thread_time() - begun
 
 
+PROP = "A Prop"
+
+
 def fill(scene, count):
     """Put objects that have nothing to do with the add-on into a scene; names are looked up past theirs."""
     for number in range(count):
-        scene.collection.objects.link(bpy.data.objects.new(f"A Prop {number}", None))
+        scene.collection.objects.link(bpy.data.objects.new(f"{PROP} {number}", None))
+    bpy.context.view_layer.update()
+
+
+def empty():
+    """Take away what `fill` has put there."""
+    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.name.startswith(PROP)])
     bpy.context.view_layer.update()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from softground_addon.blender.settings import exists
 from tests.blender import grounds, responders
-from tests.blender.redraws import fill, least_seconds, redraw, walk_over_all_objects
+from tests.blender.redraws import empty, fill, least_seconds, redraw, walk_over_all_objects
 
 OBJECTS = 10_000
 
@@ -40,11 +40,15 @@ def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, se
     set_up(short_walk)
     bpy.ops.softground.predict_depth()
     redraw(bpy.context)
-    before = least_seconds(redraw, bpy.context)
-    fill(short_walk, OBJECTS)
-    redraw(bpy.context)
-    longer = least_seconds(redraw, bpy.context) - before
-    assert longer < least_seconds(walk_over_all_objects) / 5
+    longer = []  # in parts of such a walk; a machine that slows down between two looks would seem to depend on them
+    while len(longer) < 4 and min(longer, default=1.0) > 1 / 5:
+        before = least_seconds(redraw, bpy.context)
+        fill(short_walk, OBJECTS)
+        redraw(bpy.context)
+        longer.append((least_seconds(redraw, bpy.context) - before) / least_seconds(walk_over_all_objects))
+        empty()
+        redraw(bpy.context)
+    assert min(longer) < 1 / 5
 
 
 def test_who_is_deleted_in_the_viewport_and_comes_back_is_there_again(scene):
