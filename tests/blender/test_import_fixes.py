@@ -60,9 +60,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     bpy.context.view_layer.update()
     assert armature.parent.name == "Walker Scale"
     assert tuple(armature.parent.scale) == pytest.approx([1 / factor] * 3)
-    assert keys == [
-        tuple(key.co) for curve in action_curves(armature.animation_data.action) for key in curve.keyframe_points
-    ]
+    assert keys == keys_of(armature)
     assert size_of(scene, armature) == pytest.approx(character.size, rel=1e-4)
     assert 1.0 < character.size < 2.0
     assert character.mass == pytest.approx(mass, rel=0.05)

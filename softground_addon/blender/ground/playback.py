@@ -119,9 +119,8 @@ def playing(ground: bpy.types.Object) -> list[tuple[bpy.types.Object, Any]]:
 
 def remove(ground: bpy.types.Object) -> None:
     """Take the playback off a ground and copies of it with the same mesh; nothing happens where there is none."""
-    while shown := playing(ground):
-        for obj, modifier in shown:
-            obj.modifiers.remove(modifier)
+    for shown, _ in playing(ground):
+        _stop(shown)
     remove_unused()
     own_data.remove(cast("bpy.types.Mesh", ground.data), own_data.OF_PLAYBACK)
 
@@ -130,13 +129,17 @@ def hand_over(source: bpy.types.Object, target: bpy.types.Object) -> None:
     """Have an object play what another one plays, under the name of what it played; its mesh is left alone."""
     new, old = modifier_of(source), modifier_of(target)
     name = old.node_group.name if old else ""
-    while old:
-        target.modifiers.remove(old)
-        old = modifier_of(target)
+    _stop(target)
     remove_unused()
     if new is not None:
         play(target, new.node_group)
         new.node_group.name = name or new.node_group.name
+
+
+def _stop(obj: bpy.types.Object) -> None:
+    """Take the playback off one object."""
+    while modifier := modifier_of(obj):
+        obj.modifiers.remove(modifier)
 
 
 def remove_unused() -> None:

@@ -102,18 +102,22 @@ class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SOFTGROUND_OT_walk_ahead(_OnCharacter, Reading):
+class _ReadingCharacter(_OnCharacter, Reading):
+    """What operators on a character that read its animation have in common."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether a character is chosen, and no other job runs."""
+        return super().poll(context) and Reading.poll.__func__(cls, context)
+
+
+class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
     """Let a character that walks on the spot travel as fast as its feet slide, by an empty that it then hangs on. Its
     animation stays as it is. Esc cancels"""
 
     bl_idname = "softground.walk_ahead"
     bl_label = "Walk Ahead"
     cancelled = "Walk Ahead cancelled: nothing was changed"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen, and no other job runs."""
-        return super().poll(context) and Reading.poll.__func__(cls, context)
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[str]:
         return _walking_ahead(scene)
@@ -133,18 +137,13 @@ def _walking_ahead(scene: bpy.types.Scene) -> jobs.Job[str]:
     return f"'{name}' travels at {np.linalg.norm(belt):.1f} m/s"
 
 
-class SOFTGROUND_OT_detect_bones(_OnCharacter, Reading):
+class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
     """Find the feet and joints of the character again, by its skin, the names of its bones or its rest pose. Esc
     cancels"""
 
     bl_idname = "softground.detect_bones"
     bl_label = "Detect Bones"
     cancelled = "Detect Bones cancelled: nothing was changed"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether a character is chosen, and no other job runs."""
-        return super().poll(context) and Reading.poll.__func__(cls, context)
 
     def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[list[str]]:
         return character_setup.detecting_bones(scene, scene.softground.active_character)
