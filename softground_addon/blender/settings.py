@@ -187,6 +187,8 @@ def character_of(character: Any) -> CharacterSettings:
         armature=name_of(armature) if armature else None,
         name=armature.name if armature else character.name,
         mass_kg=typed(character.mass),
+        skin_mass_kg=typed(character.skin_mass),
+        size_m=typed(character.size),
         force_model=character.force_model,
         joints={entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone},
         soles=soles,

@@ -88,6 +88,8 @@ class CharacterSettings:
     name : str
         What the user calls it.
     mass_kg : float
+    skin_mass_kg, size_m : float
+        Mass by the volume of its skin and the size of its rig, both when it was added; 0 where unknown.
     force_model : 'WHOLE_BODY' or 'IMPULSE'
     joints : mapping of str to (str, str)
         Canonical joint to a bone and its end, "head" or "tail".
@@ -97,6 +99,8 @@ class CharacterSettings:
     armature: ObjectName | None
     name: str
     mass_kg: float = field(metadata=_on(Acts.LOADS))
+    skin_mass_kg: float
+    size_m: float
     force_model: ForceModel = field(metadata=_on(Acts.LOADS))
     joints: Mapping[str, tuple[str, str]]
     soles: tuple[SoleSource, ...]

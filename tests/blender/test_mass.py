@@ -106,3 +106,12 @@ def test_a_mass_that_does_not_suit_the_body_is_pointed_out(short_walk):
     (finding,) = bake(short_walk).report["self_check"]
     assert finding["code"] == "mass_of_size"
     assert f"what has the volume of its skin about {character.skin_mass:g} kg" in finding["message"]
+
+
+def test_a_body_scaled_after_it_was_added_is_weighed_at_its_new_size(short_walk):
+    character = short_walk.softground.characters[0]
+    character.armature.scale = (0.1, 0.1, 0.1)
+    bpy.context.view_layer.update()
+    short_walk.softground.cell_size = 0.002
+    (finding,) = [one for one in bake(short_walk).report["self_check"] if one["code"] == "mass_of_size"]
+    assert f"about {character.skin_mass / 1000:.2g} kg" in finding["message"]

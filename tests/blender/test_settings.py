@@ -23,8 +23,6 @@ NO_INPUT = {
     "active_character": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.response_strength": "how much of a baked layer shows; moves the layer itself",
-    "characters.size": "whether the panel offers another scale",
-    "characters.skin_mass": "what the panel suggests for the mass",
     "animated_frames": "why the panel says that Start and End are what they are",
     "own_time": "what Slow Down gives back",
     "slowed_time": "what Slow Down has set",

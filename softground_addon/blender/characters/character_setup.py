@@ -17,9 +17,9 @@ from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_
 from .frame_ranges import ancestors, animated_frames
 from .import_fixes import put_under, scale_to_metres, size_of
 from .prop_extraction import surface_of
-from .recognition import SHARE, recognise
+from .recognition import SHARE, Recognised, recognise
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, require_armature
-from .rig_sampling import is_simulated, sample_character
+from .rig_sampling import is_simulated, recorded_motion, sample_character
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}
 
@@ -50,18 +50,18 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
             f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
         )
     rig = name_of(armature)
-    mapping = yield from recognise(scene, armature, animated_frames(scene, armature))
-    length = yield from _shortest_sole(scene, found(rig), mapping)
-    armature = found(rig)
+    recognised = yield from recognise(scene, armature, animated_frames(scene, armature))
+    length = yield from _shortest_sole(scene, found(rig), recognised)
+    armature, mapping = found(rig), recognised.mapping
     character = settings.characters.add()
     character.name = armature.name
     character.armature = armature
-    _fill(character, mapping)
+    _fill(scene, character, mapping)
     if mapping.mass:
         character.mass = mapping.mass
     settings.active_character = len(settings.characters) - 1
     _take_frames(scene, animated_frames(scene, armature))
-    character.sole_length, character.size = length, size_of(scene, armature)
+    character.sole_length = length
     _fit_ground(scene)
     return character
 
@@ -74,13 +74,21 @@ _POSES = 16
 """Poses of an animation from which soles are measured."""
 
 
-def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping) -> jobs.Job[float]:
+def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognised: Recognised) -> jobs.Job[float]:
     """Length of a rig's shortest sole [m]; 0 where it cannot be told."""
-    first, last = _frames_of_scene(scene, animated_frames(scene, armature))
-    frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
-    reading = sample_character(scene, armature, mapping, mass=1.0, frames=frames, weighs=False)
+    mapping, recording = recognised.mapping, recognised.recording
+    if not mapping.soles:
+        return 0.0
+    if recording is not None:
+        poses = recording.of(np.arange(0, len(recording.frames), max(1, len(recording.frames) // _POSES)))
+        count = len(poses.frames)
+        reading = recorded_motion(scene, armature, mapping, poses, recognised.skin, mass=1.0)
+    else:
+        first, last = _frames_of_scene(scene, animated_frames(scene, armature))
+        frames = range(first, max(last, first + 1) + 1, max(1, (last - first) // _POSES))
+        reading, count = sample_character(scene, armature, mapping, mass=1.0, frames=frames), len(frames)
     try:
-        motion = yield from jobs.counted(reading, "sample", len(frames), share=SHARE)
+        motion = yield from jobs.counted(reading, "sample", count, share=SHARE)
     except InputError:  # it says so when the user bakes
         return 0.0
     limbs = {sole.name for sole in mapping.soles if sole.limb}
@@ -239,15 +247,15 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     """
     armature = scene.softground.characters[number].armature
     require_armature(armature)
-    mapping = yield from recognise(scene, armature, animated_frames(scene, armature))
+    mapping = (yield from recognise(scene, armature, animated_frames(scene, armature))).mapping
     if not mapping.soles:
         raise InputError(f"No feet are found in '{armature.name}': {CHOOSE_CONTACTS}.")
-    _fill(scene.softground.characters[number], mapping)
+    _fill(scene, scene.softground.characters[number], mapping)
     return [source.name for source in mapping.soles]
 
 
-def _fill(character: SoftGroundCharacter, mapping: RigMapping) -> None:
-    character.skin_mass = mapping.mass
+def _fill(scene: bpy.types.Scene, character: SoftGroundCharacter, mapping: RigMapping) -> None:
+    character.skin_mass, character.size = mapping.mass, size_of(scene, character.armature)
     character.joints.clear()
     for number in reversed(range(len(character.soles))):
         if character.soles[number].kind == "FOOT" and not character.soles[number].object:

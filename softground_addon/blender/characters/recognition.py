@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.numerics.rigid import unit
+from ...core.numerics.slices import Slices
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..settings import found, name_of, units_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
-from .rig_sampling import is_animated, record
+from .rig_sampling import bones_of, is_animated, record
 from .skin_mass import skin_mass
-from .skin_sampling import FollowedSkin, followed_skin, read_skin
+from .skin_sampling import FollowedSkin, RigSkin, followed_skin, read_skin
 from .skin_stances import UNDERSIDE
 from .sole_extraction import bone_families
 
@@ -34,9 +35,28 @@ TURNED_SHARE = 0.2
 """Share of the bearing time for which it does."""
 
 
+@dataclass(frozen=True)
+class Recognised:
+    """A character as it was recognised.
+
+    Attributes
+    ----------
+    mapping : RigMapping
+        Without soles where neither the skin, nor the names, nor the rest pose show any.
+    skin : RigSkin or None
+        If it has one.
+    recording : Recording or None
+        Of the bones of skin and mapping, where a skin moves.
+    """
+
+    mapping: RigMapping
+    skin: RigSkin | None = None
+    recording: Recording | None = None
+
+
 def recognise(
     scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None = None
-) -> jobs.Job[RigMapping]:
+) -> jobs.Job[Recognised]:
     """Joints and contacts of a character.
 
     Parameters
@@ -48,22 +68,41 @@ def recognise(
 
     Returns
     -------
-    Job of RigMapping
-        Without soles where neither the skin, nor the names, nor the rest pose show any. Leaving it changes nothing.
+    Job of Recognised
+        Leaving it changes nothing.
 
     Raises
     ------
     InputError
         If the armature or its meshes cannot be read.
     """
-    rig = name_of(armature)
-    seen, mass = yield from _shown_by_skin(scene, armature, frames)
-    armature = found(rig)
+    require_armature(armature)
     try:
         mapping = map_rig(armature)
     except InputError:
         mapping = RigMapping(method="skin")
-    return RigMapping(mapping.joints, _joined(armature, mapping.soles, seen), mapping.method, mass)
+    if armature.mode == "EDIT":
+        return Recognised(mapping)
+    rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
+    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
+    armature = found(rig)
+    if skin is None or armature.mode == "EDIT":
+        return Recognised(mapping)
+    units = units_of(scene)
+    samples = range(scene.frame_current, scene.frame_current + 1)
+    moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
+    if frames and moves:
+        first, last = (round(frame / units.time_stretch) for frame in frames)
+        samples = range(first, min(last, first + MOST_FRAMES) + 1)
+    reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units)
+    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
+    weighing = skin_mass.slices(skin, found(rig), recording.of(np.array([0])))
+    mass = yield from jobs.meanwhile(read, weighing)
+    if not moves:
+        return Recognised(replace(mapping, mass=mass), skin)
+    seen = yield from jobs.meanwhile(read, _shown_by_skin(found(rig), skin, recording))
+    soles = _joined(found(rig), mapping.soles, seen)
+    return Recognised(replace(mapping, soles=soles, mass=mass), skin, recording)
 
 
 def _joined(
@@ -80,38 +119,15 @@ def _joined(
     return (*soles, *(replace(contact, limb=contact.limb or bool(soles)) for contact in left))
 
 
-def _shown_by_skin(
-    scene: bpy.types.Scene, armature: bpy.types.Object, frames: tuple[int, int] | None
-) -> jobs.Job[tuple[tuple[SoleSource, ...], float]]:
-    """The contacts and the mass [kg] that the skin shows."""
-    require_armature(armature)
-    if armature.mode == "EDIT":
-        return (), 0.0
-    rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
-    skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
-    armature = found(rig)
-    if skin is None or armature.mode == "EDIT":
-        return (), 0.0
-    units = units_of(scene)
-    samples = range(scene.frame_current, scene.frame_current + 1)
-    moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
-    if frames and moves:
-        first, last = (round(frame / units.time_stretch) for frame in frames)
-        samples = range(first, min(last, first + MOST_FRAMES) + 1)
-    reading = record(scene, armature, samples, skin.bones, units)
-    recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    weighing = skin_mass.slices(skin, found(rig), recording.of(np.array([0])))
-    mass = yield from jobs.meanwhile(read, weighing)
-    if not moves:
-        return (), mass
-    following = followed_skin.slices(skin, found(rig), recording, units.frame_rate, linked=True)
-    followed = yield from jobs.meanwhile(read, following)
+def _shown_by_skin(armature: bpy.types.Object, skin: RigSkin, recording: Recording) -> Slices[tuple[SoleSource, ...]]:
+    """The contacts that the skin shows."""
+    followed = yield from followed_skin.slices(skin, armature, recording, recording.units.frame_rate, linked=True)
     if followed is None:
-        return (), mass
-    contacts = yield from jobs.meanwhile(read, find_contacts.slices(followed.motion))
+        return ()
+    contacts = yield from find_contacts.slices(followed.motion)
     bearing = np.flatnonzero(contacts.bears.any(axis=0))
     sources = (_source(number, contacts, followed, recording) for number in bearing)
-    return tuple(source for source in sources if source), mass
+    return tuple(source for source in sources if source)
 
 
 def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recording: Recording) -> SoleSource | None:

@@ -27,7 +27,7 @@ from .motion_assembly import assemble_motion
 from .prop_extraction import check_things, prop_motion
 from .recording import Recording
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, SoleSource, require_armature
-from .skin_sampling import meshes_on, read_skin
+from .skin_sampling import RigSkin, meshes_on, read_skin
 from .skin_stances import LONGEST, skin_stances
 
 Sampling = Generator[int, None, CharacterMotion]
@@ -61,7 +61,7 @@ def sample_character(
     frames: range,
     recorder: PoseRecorder | None = None,
     units: SceneUnits | None = None,
-    weighs: bool = True,
+    skin_mass: float = 0.0,
 ) -> Sampling:
     """Read a character frame by frame.
 
@@ -81,8 +81,8 @@ def sample_character(
         Takes down how its bones stand.
     units : SceneUnits, optional
         Those of the bake that it is read for; as they are now in the scene where it is read for itself.
-    weighs : bool
-        Whether to tell the mass of its skin, against which a bake is checked.
+    skin_mass : float
+        That the volume of its skin suggests [kg], against which a bake is checked; 0 where unknown.
 
     Yields
     ------
@@ -100,31 +100,50 @@ def sample_character(
     """
     _check_input(scene, armature, mapping, mass)
     _check_frames(frames)
-    bones = [bone for bone, _ in mapping.joints.values()] + [b for s in mapping.soles for b in _bones(s)]
-    bones += recorder.bones if recorder else ()
+    bones = [*bones_of(mapping), *(recorder.bones if recorder else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
     things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
     if on_bones and meshes_on(scene, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene, armature))
         armature = found(rig)
-    followed = skin if len(frames) <= LONGEST else None
     units = units or units_of(scene)
-    bones += followed.bones if followed else ()
+    bones += skin.bones if skin and len(frames) <= LONGEST else ()
     recording = yield from record(scene, armature, frames, bones, units, things, recorder)
-    armature = found(rig)
+    return (yield from recorded_motion(scene, found(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
+
+
+def recorded_motion(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    mapping: RigMapping,
+    recording: Recording,
+    skin: RigSkin | None,
+    *,
+    mass: float,
+    skin_mass: float = 0.0,
+) -> Sampling:
+    """The motion of a character that was recorded.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the `bones_of` its mapping and of its objects; also of `skin.bones` if it has at most `LONGEST` samples.
+    skin : RigSkin or None
+    scene, armature, mapping, mass, skin_mass
+        As for `sample_character`; and so is what it yields, returns and raises.
+    """
     _check_recording(armature.name, recording)
     carried = {
         source.name: prop_motion(scene, source, recording.things[source.object])[0]
         for source in mapping.soles
         if source.object
     }
-    rate = units.frame_rate / frames.step
-    stances = None
-    if followed:
-        stances = yield from meanwhile(
-            len(frames), skin_stances(followed, armature, mapping, recording, rate, weighs=weighs)
-        )
+    count, stances = len(recording.frames), None
+    if skin and count <= LONGEST:
+        rig, step = name_of(armature), float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
+        looking = skin_stances(skin, armature, mapping, recording, recording.units.frame_rate / step, mass=skin_mass)
+        stances = yield from meanwhile(count, looking)
         armature = found(rig)
     assembling = assemble_motion(armature, mapping, recording, skin, mass=mass, carried=carried, stances=stances)
     return (yield from assembling)
@@ -189,6 +208,11 @@ def sample_thing(
         gravity=units.gravity_m_s2,
         centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
     )
+
+
+def bones_of(mapping: RigMapping) -> list[str]:
+    """The bones of a mapping's soles and joints."""
+    return [*(bone for sole in mapping.soles for bone in _bones(sole)), *(bone for bone, _ in mapping.joints.values())]
 
 
 def _bones(source: SoleSource) -> list[str]:
@@ -396,11 +420,7 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
         if not source.bone and not source.object:
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
     check_things(scene, name, mapping.soles)
-    missing = [
-        b
-        for b in [*(b for s in mapping.soles for b in _bones(s)), *(b for b, _ in mapping.joints.values())]
-        if b not in bones
-    ]
+    missing = [bone for bone in bones_of(mapping) if bone not in bones]
     if missing:
         raise InputError(f"Armature '{name}' has no bone '{missing[0]}': choose the bones of the character again.")
     if armature.mode == "EDIT":

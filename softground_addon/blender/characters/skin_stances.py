@@ -15,7 +15,6 @@ from ...core.skin.contacts import find_contacts
 from ..settings import found, name_of
 from .recording import Recording
 from .rig_mapping import RigMapping, SoleSource
-from .skin_mass import skin_mass
 from .skin_sampling import FollowedSkin, RigSkin, followed_skin, skinned
 from .sole_extraction import FootMesh, bone_families, limb_family
 
@@ -61,7 +60,7 @@ def skin_stances(
     recording: Recording,
     rate: float,
     *,
-    weighs: bool = True,
+    mass: float,
 ) -> Slices[SkinStances | None]:
     """When some contacts of a character bear and how its feet lie, or None where their skin never comes down.
 
@@ -75,8 +74,8 @@ def skin_stances(
         Of all `skin.bones` and those of the soles.
     rate : float
         Samples per second [Hz].
-    weighs : bool
-        Whether to tell the mass of the skin.
+    mass : float
+        That its volume suggests [kg], 0 where unknown.
     """
     rig = name_of(armature)
     followed = yield from followed_skin.slices(skin, armature, recording, rate)
@@ -114,7 +113,6 @@ def skin_stances(
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
-    mass = (yield from skin_mass.slices(skin, armature, recording.of(np.array([0])))) if weighs else 0.0
     skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, skin_there)
 

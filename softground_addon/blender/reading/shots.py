@@ -21,6 +21,7 @@ from ...core.motion.motion import CharacterMotion
 from ...core.settings import BakeSettings
 from .. import settings
 from ..characters.control_poses import PoseRecorder
+from ..characters.import_fixes import size_of
 from ..characters.prop_extraction import check_things
 from ..characters.rig_mapping import RigMapping
 from ..characters.rig_sampling import sample_character, sample_thing
@@ -215,8 +216,16 @@ def sample_characters(
             if wanted.response:
                 controls = controls_of(scene, armature, mapping)
                 recorder = PoseRecorder([control.bone for control in controls], len(frames))
+            grown = size_of(scene, armature) / one.size_m if one.size_m else 1.0
             job = sample_character(
-                scene, armature, mapping, mass=one.mass_kg, frames=frames, recorder=recorder, units=wanted
+                scene,
+                armature,
+                mapping,
+                mass=one.mass_kg,
+                skin_mass=one.skin_mass_kg * grown**3,
+                frames=frames,
+                recorder=recorder,
+                units=wanted,
             )
         else:
             job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted)

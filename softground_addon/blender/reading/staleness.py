@@ -133,9 +133,9 @@ def _of_settings(inputs: Mapping[str, Any]) -> dict[str, str]:
 def _as_in_0_1(inputs: Mapping[str, Any]) -> dict[str, str]:
     known = {name: inputs[name] for name in _OF_0_1}
     known["characters"] = [
-        one
+        {key: value for key, value in one.items() if key not in ("skin_mass_kg", "size_m")}
         | {"soles": [{key: value for key, value in sole.items() if key != "parts" or value} for sole in one["soles"]]}
-        for one in known["characters"]  # whose soles had no parts yet
+        for one in known["characters"]  # which were not weighed, and whose soles had no parts yet
     ]
     return {
         SETTINGS: report.hash_inputs(known),
