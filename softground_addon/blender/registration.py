@@ -25,7 +25,7 @@ from .interface import (
     response_panel,
 )
 from .live import live
-from .output import export_formats, force_curves
+from .output import event_points, export_formats, force_curves
 from .properties.material import look_followers
 from .properties.scene import depth_field
 
@@ -45,6 +45,7 @@ CLASSES = (
     *overlay.CLASSES,
     *preset_menu.CLASSES,
     *force_curves.CLASSES,
+    *event_points.CLASSES,
     *export_formats.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.events import events
 from ...core.files import report
 from ...core.findings import Finding
 from ...core.ground_plan import GroundPlan
@@ -33,6 +34,7 @@ from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import settings
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground.baked_ground import EVENTS
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
@@ -107,6 +109,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
     findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving]
     of_responses = response_job.findings(responses)
+    happened = events(loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -117,6 +120,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         gaps_mm=gaps,
         worst_gaps=response_job.worst_gaps(responses),
         suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
+        events=happened,
     )
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
@@ -124,7 +128,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     del loads, responses
     written: _Written | None = None
     if write and wanted.output != "RESPONSE":
-        about = {"inputs": inputs, "input_hash": input_hash}
+        about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         written = yield from _write(scene, wanted, shot, footprints, about, sole_length)
         findings += written.findings
     if write and wanted.output != "PRINTS":

@@ -81,7 +81,7 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
         export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
     export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
     export.add_argument(
-        "--format", required=True, type=str.upper, choices=tuple(export_formats.FORMATS), help="kind of file"
+        "--format", required=True, type=_format, choices=tuple(export_formats.FORMATS), help="kind of file"
     )
     export.add_argument(
         "--output", type=Path, metavar="FILE",
@@ -92,6 +92,11 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
     export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
     export.set_defaults(blend=None)
+
+
+def _format(text: str) -> str:
+    """`events-midi` as the format is called among the others."""
+    return text.upper().replace("-", "_")
 
 
 def _frame_range(text: str) -> tuple[int, int]:

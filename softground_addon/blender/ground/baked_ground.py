@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.events import Event, as_edited
 from ...core.errors import InputError
 from ...core.ground.material import MATERIAL_RANGES
 from ...core.playback.playback_curves import Spans
@@ -26,6 +27,10 @@ from .created_ground import Layout
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+
+EVENTS = "events"
+"""What is known about footprints: the table of their events."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +232,21 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     """
     stored = record.load(bytes(stored_record(ground)))
     return stored.edited, dict(stored.about)
+
+
+def events_of(ground: bpy.types.Object) -> list[Event]:
+    """The events of a ground's bake as the artist left its steps, in the order of time.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or it was made before there were events.
+    """
+    stored = record.load(bytes(stored_record(ground)))
+    table = stored.about.get(EVENTS)
+    if not isinstance(table, list):
+        raise InputError(f"The bake on ground '{ground.name}' has no events: bake again, and it has them.")
+    return as_edited(table, stored.footprints, stored.edited)
 
 
 def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:

@@ -32,6 +32,8 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator("softground.force_curves", icon="GRAPH")
         layout.operator("softground.export_forces", icon="EXPORT")
+        layout.operator("softground.event_markers", icon="MARKER_HLT")
+        layout.operator("softground.event_points", icon="POINTCLOUD_DATA")
         layout.separator()
         layout.operator("softground.export", icon="EXPORT")
         layout.operator("softground.final_mesh", icon="MESH_DATA")

@@ -354,6 +354,9 @@ class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("softground.force_curves", icon="GRAPH")
         column.operator("softground.export_forces", icon="EXPORT")
+        column = layout.column(align=True)
+        column.operator("softground.event_markers", icon="MARKER_HLT")
+        column.operator("softground.event_points", icon="POINTCLOUD_DATA")
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
 from ..operator_base import OnBake, beside_file, reports_errors
-from . import exports, image_exports
+from . import event_exports, exports, image_exports
 
 LARGEST_IMAGE = 16384
 """Most pixels along the sides of an image."""
@@ -82,6 +82,11 @@ def _still(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -
     return [options.path]
 
 
+def _events(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+    event_exports.write(scene, ground, options.format, options.path, options.start, options.end)
+    return [options.path]
+
+
 @dataclass(frozen=True)
 class Format:
     """A kind of file that a bake can be written to.
@@ -115,6 +120,10 @@ FORMATS = {
         ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map", _images
     ),
     "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step", _still),
+    **{
+        kind: Format(suffix, label, description, _events)
+        for kind, (suffix, label, description, _) in event_exports.KINDS.items()
+    },
 }
 """All formats: a further one is a row here."""
 

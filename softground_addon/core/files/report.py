@@ -31,6 +31,7 @@ def build(
     gaps_mm: Mapping[str, object] | None = None,
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
+    events: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -58,6 +59,8 @@ def build(
         The frames and soles where it is largest after grounding.
     suggested_speed : mapping, optional
         Speed that people would choose on this ground, over that on hard ground, by character.
+    events : sequence of mapping
+        From `core.after.events`.
     """
     steps: list[dict[str, Any]] = [
         {
@@ -87,6 +90,7 @@ def build(
             "compressed_m3": sum(step["compressed_m3"] for step in steps),
             "rim_m3": sum(step["rim_m3"] for step in steps),
         },
+        "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
         "timings": dict(timings),
         "self_check": [finding.as_dict() for finding in worst_first(findings)],

@@ -1,0 +1,65 @@
+"""The events of a bake as files for editors, samplers and game engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import bpy
+
+from ...core.after import event_edl, event_json, event_midi, event_otio, event_reaper
+from ...core.after.events import Event, between
+from ...core.files import files
+from .. import settings
+from ..ground import baked_ground
+
+Dump = Callable[[Sequence[Event], float], str | bytes]
+"""From events and frame rate [Hz]."""
+
+KINDS: dict[str, tuple[str, str, str, Dump]] = {
+    "EVENTS_JSON": (
+        ".jsonl",
+        "Events (JSON Lines)",
+        "Heel strikes, toe-offs and slides, for game engines",
+        lambda table, rate: event_json.dump(table, frame_rate=rate),
+    ),
+    "EVENTS_MIDI": (
+        ".mid",
+        "Events (MIDI)",
+        "Each step as a note, for samplers and drum machines",
+        lambda table, _rate: event_midi.dump(table),
+    ),
+    "EVENTS_REAPER": (
+        ".csv",
+        "Events (Reaper)",
+        "Regions and markers for Reaper",
+        lambda table, _rate: event_reaper.dump(table),
+    ),
+    "EVENTS_EDL": (
+        ".edl",
+        "Events (Resolve)",
+        "Timeline markers for DaVinci Resolve",
+        lambda table, rate: event_edl.dump(table, frame_rate=rate),
+    ),
+    "EVENTS_OTIO": (
+        ".otio",
+        "Events (OpenTimelineIO)",
+        "Timeline markers for editors",
+        lambda table, rate: event_otio.dump(table, frame_rate=rate),
+    ),
+}
+"""Formats: suffix, label and description for the user, and what writes one."""
+
+
+def write(scene: bpy.types.Scene, ground: bpy.types.Object, kind: str, path: Path, start: int, end: int) -> None:
+    """Write the events of some frames, times counted from the first.
+
+    Raises
+    ------
+    InputError
+        If there is no bake or it has no events, or the file cannot be written.
+    """
+    rate = settings.frame_rate_of(scene)
+    content = KINDS[kind][3](between(baked_ground.events_of(ground), start, end, rate), rate)
+    with files.replacing(path) as partial:
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)

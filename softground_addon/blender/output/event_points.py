@@ -1,0 +1,127 @@
+"""The events of a bake in the scene: as points with attributes, and as markers of the timeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...core.after.events import Event, label
+from ...core.after.phases import KINDS
+from .. import settings
+from ..ground import baked_ground
+from ..operator_base import OnBake, reports_errors
+
+NAME = "SoftGround Events"
+
+_NUMBERS = (
+    *("time_s", "frame", "peak_force_n", "peak_bw", "impulse_ns", "landing_speed", "slide_speed", "depth_m"),
+    *("area_m2", "thrown_kg", "duration_s"),
+)
+"""Columns that become attributes as they are."""
+
+MARKED = {"heel_strike", "land", "toe_off"}
+"""Phases that get a marker unless the user chooses others."""
+
+
+def add_points(scene: bpy.types.Scene, table: Sequence[Event]) -> bpy.types.Object:
+    """An object whose points are the events, in place of the one that there may be.
+
+    Texts become numbers: `phase` in the order of `core.after.phases.KINDS`, `character` and `contact` in the order
+    of the lists that the object has as custom properties.
+    """
+    points = bpy.data.meshes.new(NAME)
+    points.vertices.add(len(table))
+    place = np.array([row["position"] for row in table], np.float32).reshape(-1, 3)
+    points.vertices.foreach_set("co", (place / scene.unit_settings.scale_length).ravel())
+    for name in _NUMBERS:
+        _store(points, name, "FLOAT", "value", np.array([row[name] for row in table], np.float32))
+    normals = np.array([row["normal"] for row in table], np.float32)
+    _store(points, "normal_of_ground", "FLOAT_VECTOR", "vector", normals.ravel())
+    shown = _fresh(scene, points)
+    texts = {name: list(dict.fromkeys(row[name] for row in table)) for name in ("character", "contact")}
+    for name, known in ({"phase": list(KINDS)} | texts).items():
+        numbers = np.array([known.index(row[name]) for row in table], np.int32)
+        _store(points, name, "INT", "value", numbers)
+        shown[f"{name}s"] = ", ".join(known)
+    return shown
+
+
+def add_markers(scene: bpy.types.Scene, table: Sequence[Event], kinds: set[str]) -> int:
+    """Put the events of some phases into the timeline, in place of those of an earlier bake; returns how many."""
+    ours = {f"{row['character']} {row['contact']} " for row in table}
+    endings = tuple(kind.replace("_", " ") for kind in KINDS)
+    markers: Any = scene.timeline_markers
+    for marker in list(markers):
+        if marker.name.endswith(endings) and any(marker.name.startswith(one) for one in ours):
+            markers.remove(marker)
+    wanted = [row for row in table if row["phase"] in kinds]
+    for row in wanted:
+        markers.new(label(row), frame=round(row["frame"]))
+    return len(wanted)
+
+
+def _fresh(scene: bpy.types.Scene, points: bpy.types.Mesh) -> bpy.types.Object:
+    """The scene's object of events with other points; what the user did to it stays."""
+    shown = scene.objects.get(NAME)
+    if shown is None or shown.type != "MESH":
+        shown = bpy.data.objects.new(NAME, points)
+        scene.collection.objects.link(shown)
+        return shown
+    older: Any = shown.data
+    shown.data = points
+    if not older.users:
+        bpy.data.meshes.remove(older)
+    return shown
+
+
+def _store(points: bpy.types.Mesh, name: str, kind: Any, field: str, values: Any) -> None:
+    attribute: Any = points.attributes.new(name, kind, "POINT")
+    attribute.data.foreach_set(field, values)
+
+
+def _events(context: bpy.types.Context) -> list[Event]:
+    return baked_ground.events_of(settings.scene_of(context).softground.ground)
+
+
+class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
+    """Add an object whose points are the events of the bake: where and when each foot strikes, slides and leaves"""
+
+    bl_idname = "softground.event_points"
+    bl_label = "Add Event Points"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        table = _events(context)
+        shown = add_points(settings.scene_of(context), table)
+        self.report({"INFO"}, f"{len(table)} events are the points of '{shown.name}'")
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
+    """Mark in the timeline when each foot strikes the ground and leaves it"""
+
+    bl_idname = "softground.event_markers"
+    bl_label = "Mark Events in Timeline"
+    bl_options = {"REGISTER", "UNDO"}
+
+    phases: EnumProperty(
+        name="Phases",
+        description="What is marked",
+        items=[(kind, kind.replace("_", " ").title(), "") for kind in KINDS],
+        options={"ENUM_FLAG"},
+        default=MARKED,
+    )
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        count = add_markers(settings.scene_of(context), _events(context), set(self.phases))
+        self.report({"INFO"}, f"Marked {count} events")
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_event_points, SOFTGROUND_OT_event_markers)
