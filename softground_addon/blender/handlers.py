@@ -39,8 +39,6 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         return
     if any(depsgraph.id_type_updated(kind) for kind in EDITED):
         analysis.forget()
-        if live.is_on() and not bpy.app.timers.is_registered(live.after_edit):
-            bpy.app.timers.register(live.after_edit, first_interval=0.0)
         if session.current().show_overlay:
             _later(overlay.read_again)
     elif bpy.app.background:  # where a timer that waits would keep the bpy module from ending
@@ -141,6 +139,6 @@ def unregister() -> None:
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:
             handlers.remove(handler)
-    for job in (live.after_edit, compare_bake, compare_prediction):
+    for job in (compare_bake, compare_prediction):
         if bpy.app.timers.is_registered(job):
             bpy.app.timers.unregister(job)

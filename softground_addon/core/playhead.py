@@ -1,22 +1,25 @@
-"""A simulation that follows a playhead: forward by pressing, backward by taking back, with materials that change."""
+"""A simulation that follows a playhead: forward by pressing, backward by taking back."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import count as numbers
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .ground.heightfield import HeightField, SparseGrid, Window
-from .ground.material import GroundMaterial
 from .ground.soft_ground import SoftGround
 from .loads.estimate import CharacterLoads
+from .numerics.intervals import runs
+from .pressing.ground_cells import UndisturbedCells
 from .record.footprints import Footprint
 from .simulation import FrameResult, Simulation
 
 Array = NDArray[np.float64]
+
+NEWEST = 48
+"""Frames at the end of what is shown that are pressed anew first: two steps of a walk at least."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,6 @@ class _Change:
     ----------
     frame : float
         Scene frame.
-    material : GroundMaterial
-        What it was pressed with.
     windows : tuple of Window
     before, after : tuple of (2, rows, columns) float arrays
         State of each window [m], with the windows taken one after the other.
@@ -39,7 +40,6 @@ class _Change:
     """
 
     frame: float
-    material: GroundMaterial
     windows: tuple[Window, ...] = ()
     before: tuple[Array, ...] = ()
     after: tuple[Array, ...] = ()
@@ -50,41 +50,53 @@ class _Change:
 class Playhead:
     """The ground at the frame that a timeline shows.
 
-    Each frame is pressed once, with the material of the moment, and remembered: going back and forth over it gives
-    the same ground, bit for bit. When the material changes, what lies ahead is pressed anew when it is reached.
+    Each frame is pressed once and remembered: going back and forth over it gives the same ground, bit for bit.
 
     Parameters
     ----------
     loads : sequence of CharacterLoads
     ground : SoftGround
-        With the material that the first frames are pressed with.
     cell_size : float
         Side of a cell [m].
+    pressed : HeightField, optional
+        What was pressed of it before the loads begin.
+    undisturbed : UndisturbedCells, optional
+        The cells of its terrain, where another playhead has looked some of them up.
 
     Attributes
     ----------
-    material : GroundMaterial
-        What frames are pressed with from now on.
+    undisturbed : UndisturbedCells
     ground : HeightField
         At the frame that is shown; only to be read.
     contact : SparseGrid
         Scene frame at which each cell was last in contact by then, -inf where it never was; only to be read.
     """
 
-    def __init__(self, loads: Sequence[CharacterLoads], ground: SoftGround, cell_size: float) -> None:
-        self.material = ground.material
-        self.ground = HeightField(cell_size)
+    def __init__(
+        self,
+        loads: Sequence[CharacterLoads],
+        ground: SoftGround,
+        cell_size: float,
+        pressed: HeightField | None = None,
+        undisturbed: UndisturbedCells | None = None,
+    ) -> None:
+        self.undisturbed = undisturbed or UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self.ground = pressed.copy() if pressed else HeightField(cell_size)
         self.contact = SparseGrid(cell_size, channels=1, fill=-np.inf)
-        self._loads, self._pressed = tuple(loads), ground
-        self._changes: list[_Change] = []
+        self._loads, self._soft_ground, self._before = tuple(loads), ground, self.ground.copy()
         self._results = self._press(self._loads)
-        self._changes.append(_Change(next(self._results).frame, ground.material))
+        self._changes = [_Change(next(self._results).frame)]
         self._shown = 0
 
     @property
     def frame(self) -> float:
         """Scene frame that the ground shows."""
         return self._changes[self._shown].frame
+
+    @property
+    def first_frame(self) -> float:
+        """Scene frame at which the ground is still as it was before."""
+        return self._changes[0].frame
 
     def go_to(self, frame: float) -> list[Window]:
         """Show the ground at a scene frame, or at the shot's nearest one; returns where it may have changed."""
@@ -97,38 +109,19 @@ class Playhead:
                 self.contact.write(window, state)
             self._shown -= 1
             windows += change.windows
-        while self.frame + 1.0 <= frame and self._advance():
+        while self.advance(frame):
             windows += self._changes[self._shown].windows
         return windows
 
-    def in_contact(self) -> tuple[tuple[Window, NDArray[np.bool_]], ...]:
-        """The cells (rows, columns) of some windows that were in contact since the frame before the shown one."""
-        return self._changes[self._shown].contact
-
-    def materials(self) -> list[GroundMaterial]:
-        """What the ground that is shown was pressed with, in order."""
-        pressed = dict.fromkeys(change.material for change in self._changes[1 : self._shown + 1])
-        return list(pressed) or [self.material]
-
-    def footprints(self) -> list[Footprint]:
-        """The record of the ground that is shown, with the contacts that are under way as they are by now."""
-        until_now = [_until(self.frame, character) for character in self._loads]
-        footprints = [footprint for result in self._press(until_now) for footprint in result.footprints]
-        return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
-
-    def _advance(self) -> bool:
-        """Go on to the shot's next frame; False if there is none."""
-        ahead = self._changes[self._shown + 1 :]
-        if any(not change.material.presses_like(self.material) for change in ahead):
-            del self._changes[self._shown + 1 :]
-            self._results = self._press(self._loads)
-            for _ in self._changes:
-                next(self._results)
-            ahead = []
-        if ahead:
-            for window, state in zip(ahead[0].windows, ahead[0].after, strict=True):
+    def advance(self, frame: float) -> bool:
+        """Go on to the shot's next frame, if it has one by a scene frame; whether it has."""
+        if self.frame + 1.0 > frame:
+            return False
+        if self._shown + 1 < len(self._changes):
+            change = self._changes[self._shown + 1]
+            for window, state in zip(change.windows, change.after, strict=True):
                 self.ground.write(window, state)
-            self._touch(ahead[0].contact, ahead[0].frame)
+            self._touch(change.contact, change.frame)
         else:
             result = next(self._results, None)
             if result is None:
@@ -136,6 +129,39 @@ class Playhead:
             self._changes.append(self._taken_over(result))
         self._shown += 1
         return True
+
+    def before_newest(self) -> float:
+        """Scene frame before the contacts that are going on, or ended last: at most `NEWEST` frames back."""
+        first = self.first_frame
+        began = [_began_last(self.frame, character) for character in self._loads]
+        return max(first, self.frame - NEWEST, np.floor(min(began, default=first)) - 1.0)
+
+    def pressed_anew(self, frame: float, loads: Sequence[CharacterLoads], ground: SoftGround) -> Playhead:
+        """A playhead that goes on from this one's ground at an earlier scene frame, under other loads or with another
+        material: what is under way at that frame, and what follows, is pressed anew, what came before stays."""
+        shown = self.frame
+        self.go_to(frame)
+        since = [_since(self.frame, character) for character in loads]
+        later = Playhead(
+            [character for character in since if len(character.motion.frames)],
+            ground,
+            self.ground.cell_size,
+            self.ground,
+            self.undisturbed,
+        )
+        later.contact = self.contact.copy()
+        self.go_to(shown)
+        return later
+
+    def in_contact(self) -> tuple[tuple[Window, NDArray[np.bool_]], ...]:
+        """The cells (rows, columns) of some windows that were in contact since the frame before the shown one."""
+        return self._changes[self._shown].contact
+
+    def footprints(self) -> list[Footprint]:
+        """The record of the ground that is shown, with the contacts that are under way as they are by now."""
+        until_now = [_until(self.frame, character) for character in self._loads]
+        footprints = [footprint for result in self._press(until_now) for footprint in result.footprints]
+        return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
 
     def _taken_over(self, result: FrameResult) -> _Change:
         """Bring the ground that is shown to the frame that was just pressed."""
@@ -145,9 +171,7 @@ class Playhead:
             after.append(result.ground.read(window))
             self.ground.write(window, after[-1])
         earlier = self._touch(result.contact, result.frame)
-        return _Change(
-            result.frame, self.material, result.changed, tuple(before), tuple(after), result.contact, earlier
-        )
+        return _Change(result.frame, result.changed, tuple(before), tuple(after), result.contact, earlier)
 
     def _touch(self, contact: Sequence[tuple[Window, NDArray[np.bool_]]], frame: float) -> tuple[Array, ...]:
         """Note a contact of cells at a frame; when they were in contact before."""
@@ -158,22 +182,26 @@ class Playhead:
         return tuple(earlier)
 
     def _press(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
-        """Press from the first frame on: frames that are known with the material they had, new ones with the newest."""
-        ground = replace(self._pressed, material=self.material)
-        simulation = Simulation(ground, HeightField(self.ground.cell_size))
-        results = simulation.run(loads)
-        for number in numbers():
-            known = number < len(self._changes)
-            simulation.material = self._changes[number].material if known else self.material
-            result = next(results, None)
-            if result is None:
-                return
-            yield result
+        return Simulation(self._soft_ground, self._before.copy(), self.undisturbed).run(loads)
 
 
 def _until(frame: float, character: CharacterLoads) -> CharacterLoads:
     """The loads up to a scene frame."""
-    motion = character.motion
-    count = int(np.searchsorted(motion.frames, frame, side="right"))
-    steps = slice(count)
-    return CharacterLoads(motion.first(count), character.contacts.during(steps), character.forces.during(steps))
+    return _of(character, slice(int(np.searchsorted(character.motion.frames, frame, side="right"))))
+
+
+def _since(frame: float, character: CharacterLoads) -> CharacterLoads:
+    """The loads from a scene frame on."""
+    return _of(character, slice(int(np.searchsorted(character.motion.frames, frame, side="left")), None))
+
+
+def _of(character: CharacterLoads, steps: slice) -> CharacterLoads:
+    return CharacterLoads(character.motion.of(steps), character.contacts.during(steps), character.forces.during(steps))
+
+
+def _began_last(frame: float, character: CharacterLoads) -> float:
+    """Scene frame at which the earlier of a character's two newest contacts began by some frame."""
+    until = _until(frame, character)
+    firsts = [runs(touching)[0] for touching in until.contacts.touching.T]
+    newest = sorted(float(until.motion.frames[first[-1]]) for first in firsts if len(first))[-2:]
+    return newest[0] if newest else frame

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .ground.heightfield import HeightField, Window
-from .ground.material import GroundMaterial
 from .ground.soft_ground import SoftGround
 from .loads.estimate import CharacterLoads
 from .motion.motion import SoleMotion
 from .numerics.intervals import runs
 from .pressing.contact_layout import ContactLayout, Steps
-from .pressing.ground_cells import Timing
+from .pressing.ground_cells import Timing, UndisturbedCells
 from .pressing.open_contact import OpenContact
 from .pressing.prop_layout import PropLayout
 from .pressing.sole_layout import SoleLayout
@@ -102,30 +101,20 @@ class Simulation:
     ground : SoftGround
     state : HeightField
         What was pressed of it so far, empty or from `footprints.recompose`; it is worked on.
+    undisturbed : UndisturbedCells, optional
+        The cells of its terrain, where another simulation has looked some of them up.
     """
 
-    def __init__(self, ground: SoftGround, state: HeightField) -> None:
-        self._solver = GroundSolver(ground, state)
-        self._open: list[OpenContact] = []
-        self._step = 1
-
-    @property
-    def material(self) -> GroundMaterial:
-        """What the ground is made of; a new one acts on all that is pressed from then on."""
-        return self._solver.material
-
-    @material.setter
-    def material(self, material: GroundMaterial) -> None:
-        if not material.presses_like(self._solver.material):
-            for contact in self._open:
-                contact.lay_out_anew(self._step)
-        self._solver.material = material
+    def __init__(self, ground: SoftGround, state: HeightField, undisturbed: UndisturbedCells | None = None) -> None:
+        if undisturbed is None:
+            undisturbed = UndisturbedCells(ground.terrain, ground.variation, state.cell_size)
+        self._solver = GroundSolver(ground, state, undisturbed)
 
     def run(self, loads: Sequence[CharacterLoads]) -> Iterator[FrameResult]:
         """Press a motion; see `simulate`."""
         grid = _time_grid(loads)
         waiting = _Waiting(loads, grid)
-        contacts = self._open = []
+        contacts: list[OpenContact] = []
         start = 1
         for end in grid.shown + 1:
             contacts += waiting.due(int(end))
@@ -136,7 +125,7 @@ class Simulation:
             for contact in ended:
                 contacts.remove(contact)
                 changed += self._solver.settle(contact, frame)
-            self._step = start = int(end)
+            start = int(end)
             yield FrameResult(
                 frame,
                 self._solver.state,

@@ -129,30 +129,21 @@ def test_kept_prints_say_which_frames_they_are_of(live_shot):
     assert bake_report.stale_reasons(live_shot) == ()
 
 
-def test_kept_prints_are_stamped_with_the_material_that_pressed_them(live_shot):
+def test_kept_prints_are_pressed_with_the_settings_that_they_are_stamped_with(live_shot):
+    """Also those that were changed a moment before, and had not shown yet."""
     material, options = live_shot.softground.material, live_shot.softground
     live_shot.frame_set(30)
-    pressed_with = material.youngs_modulus
+    stiff = material.youngs_modulus
     material.youngs_modulus /= 4
+    options.pressure = "CENTRE_OF_PRESSURE"
     options.frame_end = 30
     bpy.ops.softground.live(keep=True)
-    _, about = baked_ground.load(options.ground)
-    assert about["inputs"]["material"]["youngs_modulus"] == pressed_with
-    assert bake_report.stale_reasons(live_shot) == ("The settings have changed",)
-    material.youngs_modulus = pressed_with
+    kept, about = baked_ground.load(options.ground)
+    assert about["inputs"]["material"]["youngs_modulus"] == stiff / 4
     assert bake_report.stale_reasons(live_shot) == ()
-
-
-def test_prints_of_several_materials_are_those_of_no_settings(live_shot):
-    material, options = live_shot.softground.material, live_shot.softground
-    stiff = material.youngs_modulus
-    live_shot.frame_set(30)
-    material.youngs_modulus = stiff / 4
-    live_shot.frame_set(options.frame_end)
-    bpy.ops.softground.live(keep=True)
-    for modulus in (stiff, stiff / 4):
-        material.youngs_modulus = modulus
-        assert bake_report.stale_reasons(live_shot) == ("The settings have changed",)
+    bpy.ops.softground.bake()
+    baked, _ = baked_ground.load(options.ground)
+    assert [f.max_depth_m for f in kept] == [f.max_depth_m for f in baked]
 
 
 def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
@@ -177,28 +168,85 @@ def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     assert kept == {key: pytest.approx(baked[key]) for key in ("steps", "max_depth_m", "peak_force_n")}
 
 
-def test_a_softer_ground_acts_on_what_follows_only(live_shot):
-    live_shot.frame_set(30)
-    before = heights(live_shot)
+def lowest(scene):
+    return display_heights(scene).min()
+
+
+def answered(scene, *, part=0.0):
+    """Let the timer's function do its work; the deepest point after each part of it, as somebody would see it."""
+    seen = [lowest(scene)]
+    while live.is_answering():
+        assert live.answer(part) is not None
+        seen.append(lowest(scene))
+    return seen
+
+
+def baked_heights(scene):
+    """What a bake shows at the last frame, with the settings of the moment."""
+    bpy.ops.softground.live()
+    bpy.ops.softground.bake()
+    return display_heights(scene)
+
+
+CHANGES = {
+    "softer": lambda options: setattr(options.material, "youngs_modulus", options.material.youngs_modulus / 4),
+    "heel to toe": lambda options: setattr(options, "pressure", "CENTRE_OF_PRESSURE"),
+    "heavier": lambda options: setattr(options.characters[0], "mass", 2 * options.characters[0].mass),
+    "another preset": lambda _: bpy.ops.softground.load_preset(name="Mud"),
+    "smoother": lambda options: setattr(options.material, "blur_sigma", 0.02),
+    "coarser": lambda options: setattr(options, "cell_size", 0.015),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_shot, change):
     live_shot.frame_set(48)
-    stiff = heights(live_shot)
+    before = display_heights(live_shot)
+    change(live_shot.softground)
+    assert live.is_answering()
+    answered(live_shot)
+    shown = display_heights(live_shot)
+    assert np.abs(shown - before).max() > 1e-3
+    live_shot.frame_set(20)
+    live_shot.frame_set(48)
+    assert (display_heights(live_shot) == shown).all()
+    assert baked_heights(live_shot) == pytest.approx(shown, abs=1e-6)
+
+
+def test_newest_steps_follow_a_slider_first_and_while_it_is_dragged(scene):
+    """Each move of a drag shows at the feet; what lies further back follows when it rests."""
+    walker(scene, frames=150)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.create_ground()
+    scene.frame_set(1)
+    bpy.ops.softground.live()
+    scene.frame_set(150)
+    before = display_heights(scene)
+    newest, oldest = (ages(scene) >= 0) & (ages(scene) < 0.3), ages(scene) > 2.5
+    depths = []
+    for _ in range(3):
+        scene.softground.material.youngs_modulus /= 1.3
+        shown = display_heights(scene)
+        while np.array_equal(shown, display_heights(scene)):
+            live.answer(0.0)
+        depths.append(display_heights(scene))
+    assert before[newest].min() > depths[0][newest].min() > depths[1][newest].min() > depths[2][newest].min()
+    assert {one[oldest].min() for one in depths} == {before[oldest].min()}
+    answered(scene)
+    assert display_heights(scene)[oldest].min() < 1.5 * before[oldest].min()
+    live.discard()
+
+
+def test_a_new_setting_presses_nothing_while_a_render_runs(live_shot):
     live_shot.frame_set(30)
+    before = display_heights(live_shot)
+    handlers.begin_render()
     live_shot.softground.material.youngs_modulus /= 4
-    live_shot.frame_set(30)
-    assert (heights(live_shot) == before).all()
-    live_shot.frame_set(48)
-    assert heights(live_shot).min() < 1.5 * stiff.min()
-    live_shot.frame_set(30)
-    assert (heights(live_shot) == before).all()
-
-
-def test_a_heavier_character_presses_deeper_once_it_was_read_again(live_shot):
-    live_shot.frame_set(48)
-    before = heights(live_shot).min()
-    live_shot.softground.characters[0].mass *= 2
-    live.after_edit()
-    bpy.context.view_layer.update()
-    assert heights(live_shot).min() < 1.5 * before
+    live.answer()
+    assert (display_heights(live_shot) == before).all()
+    handlers.end_render()
+    answered(live_shot)
+    assert lowest(live_shot) < 1.5 * before.min()
 
 
 @pytest.mark.parametrize("gone", ["ground", "armature"])

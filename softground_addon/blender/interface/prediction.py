@@ -79,15 +79,17 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
     scene.softground.material.youngs_modulus = modulus
 
 
-def _work_out() -> None:
-    """Bring the predictions that are shown up to date, and live mode with them."""
+def _work_out() -> float | None:
+    """Bring the predictions that are shown up to date, after live mode's prints."""
+    if live.is_answering():
+        return SOON
     for scene in {window.scene for window in bpy.context.window_manager.windows}:
         if analysis.known(scene):
             analysis.expected_depth(scene)
-    live.after_edit()
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
+    return None
 
 
 def unregister() -> None:

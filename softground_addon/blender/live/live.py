@@ -1,191 +1,30 @@
-"""Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed.
+"""Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed, and as sliders are moved.
 
-No modal operator is needed for it: a handler follows the frame, so that autosave, undo and every other tool go on
-working. While live mode is on, the ground carries what a bake would leave on it.
+No modal operator is needed for it: a handler follows the frame and a timer the settings, so that autosave, undo and
+every other tool go on working. While live mode is on, the ground carries what a bake would leave on it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, replace
 from typing import Any
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.ground.heightfield import Window
-from ...core.ground_plan import plan_ground
-from ...core.meshing.refinement import refine
-from ...core.numerics.cell_keys import cells_at, keys_at
-from ...core.playhead import Playhead
-from ...core.record import record
-from ...core.record.pressed_ground import PressedGround
-from ...core.settings import Acts, BakeSettings
-from .. import jobs, session, settings
-from ..baking import bake_report
-from ..baking.bake_checks import coverage, shortest_sole, wants_detail
-from ..baking.publish import at_the_end, publish, sign
+from .. import session, settings
 from ..characters.character_setup import characters_of
-from ..ground import baked_ground, ground_mesh, trail_detail
-from ..ground.created_ground import create_ground, reach_of
-from ..ground.modified_prints import are_undone
+from ..ground import baked_ground
 from ..operator_base import reports_errors
-from ..reading import analysis, staleness
-from ..reading.shots import ground_of, settings_of
-from .live_ground import LiveGround
+from ..reading import analysis
+from .live_mode import Contact, LiveMode
 
-Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
-"""Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
-around them [m]."""
-
-
-class LiveMode:
-    """A scene whose ground follows its timeline.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-
-    Raises
-    ------
-    InputError
-        If the scene could not be baked either.
-    """
-
-    def __init__(self, scene: bpy.types.Scene) -> None:
-        wanted = settings_of(scene)
-        known = analysis.read(scene)
-        if wanted.ground is None:
-            assert known.shot.plan is not None
-            with analysis.own_changes(scene):
-                ground = create_ground(scene, wanted, known.shot.plan)
-            wanted = replace(wanted, ground=settings.name_of(ground))
-            known = analysis.read(scene)
-        assert wanted.ground is not None
-        self.scene = scene.session_uid
-        self.rendering = False
-        self._owner = wanted.ground
-        self._ground = _display_mesh(wanted, known)
-        self._begin(wanted, known)
-
-    def _begin(self, wanted: BakeSettings, known: analysis.Analysis) -> None:
-        self._analysis, self._wanted = known, wanted
-        self._playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
-
-    def follow(self, scene: bpy.types.Scene) -> bool:
-        """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
-        ground = self._object(scene)
-        if ground is None:
-            return False
-        self._playhead.material = settings.material_of(scene)
-        before = self._playhead.frame
-        windows = self._playhead.go_to(float(scene.frame_current))
-        if self._playhead.frame != before:
-            self._show(ground, windows)
-        return True
-
-    def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
-        self._ground.show(ground, self._playhead, windows, self._playhead.material.blur_sigma, self._wanted.frame_rate)
-
-    def _object(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
-        ground = scene.softground.ground
-        return self._ground.object(ground and baked_ground.display_mesh_of(ground))
-
-    def show_anew(self, scene: bpy.types.Scene) -> bool:
-        """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
-        ground = self._object(scene)
-        if ground is None:
-            return False
-        self._ground.take_from(ground)
-        self._playhead.go_to(float(scene.frame_current))
-        self._show(ground, self._playhead.ground.tile_windows())
-        return True
-
-    def read_anew(self, scene: bpy.types.Scene) -> bool:
-        """Start from the animation, mass and forces as they are now; False if that is not possible."""
-        try:
-            self._begin(settings.snapshot(scene), analysis.read(scene))
-        except InputError:
-            return False
-        return self.show_anew(scene)
-
-    def is_outdated(self, scene: bpy.types.Scene) -> bool:
-        """Whether the character has changed since it was read."""
-        return analysis.current(scene) is not self._analysis
-
-    def in_contact(self) -> Contact:
-        """See `in_contact` of this module."""
-        return self._playhead.in_contact(), self._playhead.ground.cell_size, self._playhead.material.rim_reach
-
-    def keep(self, scene: bpy.types.Scene) -> None:
-        """Leave the ground as it is shown, as the bake of the frames up to now with what they were pressed with."""
-        ground = self._object(scene)
-        if ground is None:
-            return
-        pressed, now = self._playhead.materials(), settings.snapshot(scene)
-        made_with = replace(
-            self._wanted,
-            material=pressed[-1],
-            frames=(self._wanted.frames[0], int(self._playhead.frame)),
-            shape_keys=now.shape_keys,
-            tread_m=now.tread_m,
-        )
-        footprints = self._playhead.footprints()
-        vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
-        shown = PressedGround.at(footprints, **at_the_end(made_with))
-        place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
-        left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
-        published = jobs.run(publish(left, place, made_with))
-        inputs = made_with.inputs(Acts.WRITING)
-        if len(pressed) > 1:  # no setting gives this ground again
-            inputs["material"] = [asdict(material) for material in pressed]
-        sign(
-            published.display_mesh,
-            settings.found(self._owner),
-            inputs,
-            staleness.of_movers(scene, made_with),
-            summary=bake_report.summary_of_prints(footprints),
-        )
-
-    def discard(self) -> None:
-        """Leave the ground as it was before."""
-        owner = next((obj for obj in bpy.data.objects if obj.session_uid == self._owner.uid), None)
-        ground = owner or self._ground.object(None)
-        if ground is not None:
-            baked_ground.clear(ground)
-
-
-def _display_mesh(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
-    """What takes the prints: the ground, or a copy that is fine where its characters will step.
-
-    Raises
-    ------
-    InputError
-        If the ground is too coarse and is to stay so.
-    """
-    assert wanted.ground is not None
-    ground, shot = settings.found(wanted.ground), known.shot
-    unit_scale, cell_size, detail = wanted.unit_scale_m, wanted.cell_size_m, wanted.detail
-    vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
-    plan = shot.plan or plan_ground(shot.motions)
-    if plan.footfalls is not None:
-        footfalls = cells_at(plan.footfalls, cell_size)
-        cover = coverage(vertices, slice(None), footfalls, cell_size)
-        under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
-        if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
-            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
-        ):
-            surface = trail_detail.surface_of(ground, unit_scale)
-            region = trail_detail.region_around(footfalls, cell_size, reach_of(wanted.material))
-            refinement = refine(surface, region, cell_size)
-            with trail_detail.draft(ground, surface, refinement) as draft:
-                ground = trail_detail.publish(ground, draft)
-            vertices = refinement.at_vertices(surface, surface.vertices)
-    return LiveGround(ground, vertices, shot, unit_scale)
-
+LOOK = 0.1
+"""Time after which it is looked again whether the settings are others [s]."""
+PAUSE = 0.005
+"""Time that is left to everything else between two parts of an answer [s]."""
+PART = 0.025
+"""What a part of an answer may take, beside the frame that is being pressed when it is over [s]."""
 
 _mode: LiveMode | None = None
 """Live mode if it is on: Blender's handlers are functions, so that what they follow lives here."""
@@ -226,18 +65,32 @@ def after_undo() -> None:
         forget()
 
 
-def after_edit() -> float | None:
-    """Read the character anew where it was edited; for a timer, as nothing may be evaluated in a handler."""
+def answer(seconds: float = PART) -> float | None:
+    """Press again what the settings of the moment ask for, for a little while; for a timer."""
     scene = _scene()
-    if _mode is not None and scene is not None and _mode.is_outdated(scene) and not _mode.read_anew(scene):
+    if _mode is None or scene is None:
+        return None
+    if _mode.rendering or session.current().is_baking:
+        return LOOK
+    try:
+        return PAUSE if _mode.answer(scene, seconds) else LOOK
+    except InputError:
         forget()
     return None
+
+
+def is_answering() -> bool:
+    """Whether live mode is on and has not shown yet what the settings of the moment ask for."""
+    scene = _scene()
+    return _mode is not None and scene is not None and _mode.has_more(scene)
 
 
 def forget() -> None:
     """End live mode as it stands, because its scene or its ground went away."""
     global _mode  # noqa: PLW0603
     _mode = None
+    if bpy.app.timers.is_registered(answer):
+        bpy.app.timers.unregister(answer)
     session.current().is_live = False
     session.redraw()
 
@@ -250,8 +103,7 @@ def discard() -> None:
 
 
 def _scene() -> bpy.types.Scene | None:
-    uid = _mode.scene if _mode else None
-    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+    return _mode.current_scene() if _mode else None
 
 
 class SOFTGROUND_OT_live(bpy.types.Operator):
@@ -282,7 +134,7 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """What the button does at the moment."""
         if not is_on():
-            return "Press prints while the timeline plays; sliders act at once on what follows"
+            return "Press prints while the timeline plays. Move a slider, and the prints follow"
         if properties.keep:
             return "End live mode and leave the prints on the ground, as a bake up to the frame that is shown"
         return "End live mode and leave the ground as it was before"
@@ -295,6 +147,8 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
             _mode = LiveMode(scene)
             session.current().is_live = True
             _mode.follow(scene)
+            if not bpy.app.background:  # where a timer that waits would keep the bpy module from ending
+                bpy.app.timers.register(answer, first_interval=LOOK)
         elif self.keep:
             with analysis.own_changes(scene):
                 _mode.keep(scene)

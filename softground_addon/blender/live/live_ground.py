@@ -105,6 +105,11 @@ class LiveGround:
         self._age = np.full(len(self._rest), NEVER, dtype=np.float32)
         self._is_written = False
 
+    def forget_cells(self) -> None:
+        """Look up anew which vertices lie in which cells, as their size is another."""
+        self._by_tile, self._known = None, {}
+        self._reached = np.empty(0, np.intp)
+
     def object(self, likely: bpy.types.Object | None) -> bpy.types.Object | None:
         """The ground, which mostly is a likely one; None if it is gone or no longer what live mode made of it."""
         found = likely

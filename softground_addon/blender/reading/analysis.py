@@ -114,14 +114,19 @@ def known(scene: bpy.types.Scene, wanted: BakeSettings | None = None) -> Analysi
 
 def current(scene: bpy.types.Scene) -> Analysis | None:
     """The scene's analysis if it was read and still holds, with the masses and force models of the moment."""
-    wanted = settings.snapshot(scene)
+    return jobs.run(refreshing(scene))
+
+
+def refreshing(scene: bpy.types.Scene) -> jobs.Job[Analysis | None]:
+    """What `current` does, in steps. The scene is asked for nothing after the first."""
+    wanted, uid = settings.snapshot(scene), scene.session_uid
     analysis = known(scene, wanted)
     if analysis is None or analysis.terms == _terms(wanted):
         return analysis
     try:
-        return jobs.run(_keep(scene, wanted, analysis.shot, analysis.sources, analysis.hashes))
+        return (yield from _keep(uid, wanted, analysis.shot, analysis.sources, analysis.hashes))
     except InputError:
-        del _known[scene.session_uid]
+        _known.pop(uid, None)
         return None
 
 
@@ -143,7 +148,7 @@ def reading(scene: bpy.types.Scene) -> jobs.Job[Analysis]:
         wanted = settings_of(scene)
         shot = yield from read_shot(scene, replace(wanted, response=None))
         source, hashes = _source(scene, wanted), frozenset([_hash_of(scene)])
-        analysis = yield from _keep(scene, wanted, shot, (source,), hashes)
+        analysis = yield from _keep(scene.session_uid, wanted, shot, (source,), hashes)
         _tell_of_changes(scene)  # response layers were switched off and on again, which is no edit
         _known[scene.session_uid] = analysis
     return analysis
@@ -223,14 +228,14 @@ def _simulated_depth(wanted: BakeSettings, analysis: Analysis) -> float:
 
 
 def _keep(
-    scene: bpy.types.Scene, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
+    scene: int, wanted: BakeSettings, shot: Shot, sources: tuple[_Source, ...], hashes: frozenset[str]
 ) -> jobs.Job[Analysis]:
-    """Work the loads of a shot out and know it from now on."""
+    """Work the loads of a shot out and know it from now on, by the session uid of its scene."""
     loads = yield from estimate_shot(wanted, shot)
     gathering = contact_loads.slices(loads, shot.terrain, wanted.cell_size_m, shot.variation)
     contacts = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), gathering)
     analysis = Analysis(sources, hashes, _terms(wanted), shot, loads, contacts, pressed_area(loads))
-    _known[scene.session_uid] = analysis
+    _known[scene] = analysis
     _depths.clear()
     return analysis
 

@@ -8,9 +8,10 @@ the touched ground and not its extent.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,6 +161,12 @@ class SparseGrid:
         self.channels = channels
         self.fill = fill
         self.tiles: dict[tuple[int, int], Array] = {}
+
+    def copy(self) -> Self:
+        """The same values, to be worked on apart."""
+        twin = copy(self)
+        twin.tiles = {key: tile.copy() for key, tile in self.tiles.items()}
+        return twin
 
     def tile_windows(self) -> list[Window]:
         """The windows of all tiles, in the order of their place."""

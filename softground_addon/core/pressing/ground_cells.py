@@ -62,19 +62,26 @@ class UndisturbedCells:
         return self._variation.factors(window) if self._variation else None
 
 
-class GroundCells(UndisturbedCells):
+class GroundCells:
     """The ground that soles are laid on, in cells, and how they press on it.
 
     Parameters
     ----------
     ground : SoftGround
+    undisturbed : UndisturbedCells
+        Its cells as they are before anything presses them.
+
+    Attributes
+    ----------
     cell_size : float
         Side of a cell [m].
+    surface, factors
+        See `UndisturbedCells`.
     """
 
-    def __init__(self, ground: SoftGround, cell_size: float) -> None:
-        super().__init__(ground.terrain, ground.variation, cell_size)
-        self.ground = ground
+    def __init__(self, ground: SoftGround, undisturbed: UndisturbedCells) -> None:
+        self.ground, self.cell_size = ground, undisturbed.cell_size
+        self.surface, self.factors = undisturbed.surface, undisturbed.factors
 
     @property
     def material(self) -> GroundMaterial:
@@ -133,10 +140,8 @@ class Imprints:
         Where an unbroken crust carries the stress.
     factors : Factors or None
         How the ground varies over the window.
-    sinkage : (number of steps,) float array
-        How far the ground had given way under the sole's lowest point when each step began [m].
     reached : float
-        The same after the last step [m].
+        How far the ground has given way under the sole's lowest point after the last step [m].
     loads : Loads
     """
 
@@ -151,7 +156,6 @@ class Imprints:
     rate: Array
     holds: NDArray[np.bool_] | None
     factors: Factors | None
-    sinkage: Array
     reached: float
     loads: Loads
 

@@ -50,14 +50,6 @@ class OpenContact:
             imprints = self._imprints = self.layout.lay_out(start, end, cells, timing, self._sinkage)
         return imprints
 
-    def lay_out_anew(self, start: int) -> None:
-        """Forget the imprints from a step on, as they were laid out on other terms."""
-        if self._imprints is not None and self._imprints.first <= start < self._imprints.end:
-            self._sinkage = float(self._imprints.sinkage[start - self._imprints.first])
-        elif self._imprints is not None:
-            self._sinkage = self._imprints.reached
-        self._imprints = None
-
     def add_loads(self, imprints: Imprints, first: int, last: int) -> None:
         """Add the loads of some of the imprints, which were pressed."""
         force = imprints.loads.force[first:last]

@@ -113,7 +113,6 @@ class PropLayout(ContactLayout):
             rate,
             holds,
             factors,
-            reached[:-1:parts],
             float(reached[-1]),
             Loads(np.where(pressing, force, 0.0), area, middle),
         )

@@ -98,7 +98,6 @@ class SoleLayout(ContactLayout):
             np.broadcast_to(rate, sinking.target.shape),
             stress < material.crust_stress if material.crust_stress else None,
             factors,
-            sinking.sinkage,
             sinking.reached,
             Loads(
                 np.where(pressing, self.force[steps], 0.0),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..record.footprints import FootprintRecorder, quantised
 from .deformation import compress
-from .ground_cells import GroundCells, Imprints, Timing
+from .ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
 from .open_contact import OpenContact
 from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
 from .rim import displaced_volume
@@ -31,22 +30,20 @@ class GroundSolver:
     ground : SoftGround
     state : HeightField
         What was pressed of it so far; it is worked on.
+    undisturbed : UndisturbedCells
+        Its cells as they are before anything presses them.
     """
 
-    def __init__(self, ground: SoftGround, state: HeightField) -> None:
+    def __init__(self, ground: SoftGround, state: HeightField, undisturbed: UndisturbedCells) -> None:
         self.state = state
         self.contact: list[tuple[Window, Mask]] = []
         """Cells that were in contact in the steps pressed last."""
-        self.cells = GroundCells(ground, state.cell_size)
+        self.cells = GroundCells(ground, undisturbed)
 
     @property
     def material(self) -> GroundMaterial:
         """What the ground is made of."""
         return self.cells.material
-
-    @material.setter
-    def material(self, material: GroundMaterial) -> None:
-        self.cells.ground = replace(self.cells.ground, material=material)
 
     @property
     def cell_size(self) -> float:

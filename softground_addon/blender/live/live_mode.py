@@ -1,0 +1,296 @@
+"""A ground that follows the timeline and the settings of its scene.
+
+Nobody tells of settings that change: they are compared. For others the shot is pressed again, a little at a time and
+the newest steps first.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.ground.heightfield import Window
+from ...core.ground_plan import plan_ground
+from ...core.meshing.refinement import refine
+from ...core.numerics.cell_keys import cells_at, keys_at
+from ...core.playhead import Playhead
+from ...core.record import record
+from ...core.record.pressed_ground import PressedGround
+from ...core.settings import Acts, BakeSettings
+from .. import jobs, settings
+from ..baking import bake_report
+from ..baking.bake_checks import coverage, shortest_sole, wants_detail
+from ..baking.publish import at_the_end, publish, sign
+from ..ground import baked_ground, ground_mesh, trail_detail
+from ..ground.created_ground import create_ground, reach_of
+from ..ground.modified_prints import are_undone
+from ..reading import analysis, staleness
+from ..reading.shots import ground_of, settings_of
+from .live_ground import LiveGround
+
+Contact = tuple[Sequence[tuple[Window, NDArray[np.bool_]]], float, float]
+"""Windows, each with those of its cells (rows, columns) that are in contact; size of the cells and reach of the rim
+around them [m]."""
+
+
+class LiveMode:
+    """A scene whose ground follows its timeline.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+
+    Raises
+    ------
+    InputError
+        If the scene could not be baked either.
+    """
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        wanted = settings_of(scene)
+        known = analysis.read(scene)
+        if wanted.ground is None:
+            assert known.shot.plan is not None
+            with analysis.own_changes(scene):
+                ground = create_ground(scene, wanted, known.shot.plan)
+            wanted = replace(wanted, ground=settings.name_of(ground))
+            known = analysis.read(scene)
+        assert wanted.ground is not None
+        self.scene = scene.session_uid
+        self.rendering = False
+        self._answering: Generator[None] | None = None
+        self._asked: BakeSettings | None = None
+        self._can_start_over = True
+        self._drawn_over: list[Window] = []
+        self._owner = wanted.ground
+        self._ground = _display_mesh(wanted, known)
+        self._begin(wanted, known)
+
+    def _begin(self, wanted: BakeSettings, known: analysis.Analysis) -> None:
+        self._analysis, self._wanted = known, wanted
+        self._playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
+
+    def follow(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame; False if the ground is gone or was changed by somebody else."""
+        ground = self._object(scene)
+        if ground is None:
+            return False
+        if bpy.app.background:  # where there are no timers, and nobody waits
+            with suppress(InputError):  # what was read last is shown on
+                self.answer(scene)
+        before = self._playhead.frame
+        windows = self._playhead.go_to(float(scene.frame_current))
+        if self._playhead.frame != before:
+            self._show(ground, windows)
+        return True
+
+    def _show(self, ground: bpy.types.Object, windows: Sequence[Window]) -> None:
+        """Show what has changed, in some windows and where something else was shown in the meantime."""
+        wanted, windows = self._wanted, [*windows, *self._drawn_over]
+        self._ground.show(ground, self._playhead, windows, wanted.material.blur_sigma, wanted.frame_rate)
+        self._drawn_over = []
+
+    def _object(self, scene: bpy.types.Scene | None) -> bpy.types.Object | None:
+        ground = scene.softground.ground if scene else None
+        return self._ground.object(ground and baked_ground.display_mesh_of(ground))
+
+    def show_anew(self, scene: bpy.types.Scene) -> bool:
+        """Show the ground at the scene's frame whatever the mesh shows at the moment, as after an undo."""
+        ground = self._object(scene)
+        if ground is None:
+            return False
+        self._ground.take_from(ground)
+        self._answering, self._can_start_over = None, True
+        self._playhead.go_to(float(scene.frame_current))
+        self._show(ground, self._playhead.ground.tile_windows())
+        return True
+
+    def answer(self, scene: bpy.types.Scene, seconds: float = np.inf) -> bool:
+        """Press again what the settings and the animation of the moment ask for, for a while; whether there is more.
+
+        Who drags a slider sees the newest steps follow: only what comes after these is begun anew with each setting.
+
+        Raises
+        ------
+        InputError
+            If the shot cannot be read any more.
+        """
+        until, asked = time.perf_counter() + seconds, settings.snapshot(scene)
+        if self._can_start_over and self._is_another(scene, asked):
+            if analysis.known(scene, asked) is None:
+                if self._asked != asked and np.isfinite(seconds):  # to be read as a whole, but not while it is dragged
+                    self._asked = asked
+                    return False
+                analysis.read(scene)
+            self._answering, self._asked, self._can_start_over = self._pressing_again(asked), asked, False
+        while self._answering is not None:
+            if next(self._answering, _ENDED) is _ENDED:
+                self._answering, self._can_start_over = None, True
+            elif time.perf_counter() > until:
+                return True
+        return False
+
+    def has_more(self, scene: bpy.types.Scene) -> bool:
+        """Whether what is shown is not yet what the settings of the moment ask for."""
+        return self._answering is not None or self._is_another(scene, settings.snapshot(scene))
+
+    def _is_another(self, scene: bpy.types.Scene, asked: BakeSettings) -> bool:
+        """Whether settings or animation are others than those that are being pressed, or were last."""
+        if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
+            return False  # another ground wants another live mode
+        if self._answering is None and analysis.known(scene, asked) is not self._analysis:
+            return True
+        last = self._wanted if self._answering is None else self._asked
+        return last is None or (asked != last and _pressed_by(asked) != _pressed_by(last))
+
+    def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
+        """Press the shot up to the frame that is shown: the newest steps onto what lies there, then all of them."""
+        scene = self.current_scene()
+        assert scene is not None
+        known = yield from _in_steps(analysis.refreshing(scene))
+        if known is None:
+            raise InputError("The shot cannot be read any more.")
+        whole = self._playhead
+        if not self._presses_like(known, asked):
+            if self._playhead.ground.cell_size == asked.cell_size_m:
+                yield from self._pressing_newest(known, asked)
+            self._can_start_over = True
+            undisturbed = self._playhead.undisturbed
+            looked_up = known.shot is self._analysis.shot and undisturbed.cell_size == asked.cell_size_m
+            whole = Playhead(
+                known.loads,
+                ground_of(asked, known.shot),
+                asked.cell_size_m,
+                undisturbed=undisturbed if looked_up else None,
+            )
+            while whole.advance(self._frame()):
+                yield
+            whole.go_to(self._frame())
+        windows = [*self._playhead.ground.tile_windows(), *whole.ground.tile_windows()]
+        if whole.ground.cell_size != self._playhead.ground.cell_size:
+            self._ground.forget_cells()
+        self._playhead, self._analysis, self._wanted = whole, known, asked
+        if shown_on := self._object(self.current_scene()):
+            self._show(shown_on, windows)
+
+    def _pressing_newest(self, known: analysis.Analysis, asked: BakeSettings) -> Generator[None]:
+        """Show the newest steps as they will be; nothing where they are most of the shot."""
+        since, shown = self._playhead.before_newest(), self._playhead.frame
+        if since - self._playhead.first_frame < shown - since:
+            return
+        newest = self._playhead.pressed_anew(since, known.loads, ground_of(asked, known.shot))
+        while newest.advance(shown):
+            yield
+        if ground := self._object(self.current_scene()):
+            windows = [*self._playhead.ground.tile_windows(), *newest.ground.tile_windows(), *self._drawn_over]
+            self._ground.show(ground, newest, windows, asked.material.blur_sigma, asked.frame_rate)
+            self._drawn_over = windows
+
+    def _presses_like(self, known: analysis.Analysis, asked: BakeSettings) -> bool:
+        """Whether the ground that is shown need not be pressed again."""
+        same_loads = known.loads is self._analysis.loads and known.shot is self._analysis.shot
+        looks = replace(self._wanted.material, blur_sigma=asked.material.blur_sigma)
+        return same_loads and _pressed_by(replace(self._wanted, material=looks)) == _pressed_by(asked)
+
+    def current_scene(self) -> bpy.types.Scene | None:
+        """The scene, which may be another one after an undo."""
+        return next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
+
+    def _frame(self) -> float:
+        scene = self.current_scene()
+        return float(scene.frame_current) if scene else -np.inf
+
+    def in_contact(self) -> Contact:
+        """See `in_contact` of this module."""
+        return self._playhead.in_contact(), self._playhead.ground.cell_size, self._wanted.material.rim_reach
+
+    def keep(self, scene: bpy.types.Scene) -> None:
+        """Leave the ground as it is shown, as the bake of the frames up to now with what they were pressed with."""
+        ground = self._object(scene)
+        if ground is None:
+            return
+        with suppress(InputError):  # then what was pressed before is kept
+            self.answer(scene)
+        now = settings.snapshot(scene)
+        made_with = replace(
+            self._wanted,
+            frames=(self._wanted.frames[0], int(self._playhead.frame)),
+            shape_keys=now.shape_keys,
+            tread_m=now.tread_m,
+        )
+        footprints = self._playhead.footprints()
+        vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
+        shown = PressedGround.at(footprints, **at_the_end(made_with))
+        place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
+        left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
+        published = jobs.run(publish(left, place, made_with))
+        sign(
+            published.display_mesh,
+            settings.found(self._owner),
+            made_with.inputs(Acts.WRITING),
+            staleness.of_movers(scene, made_with),
+            summary=bake_report.summary_of_prints(footprints),
+        )
+
+    def discard(self) -> None:
+        """Leave the ground as it was before."""
+        owner = next((obj for obj in bpy.data.objects if obj.session_uid == self._owner.uid), None)
+        ground = owner or self._ground.object(None)
+        if ground is not None:
+            baked_ground.clear(ground)
+
+
+def _display_mesh(wanted: BakeSettings, known: analysis.Analysis) -> LiveGround:
+    """What takes the prints: the ground, or a copy that is fine where its characters will step.
+
+    Raises
+    ------
+    InputError
+        If the ground is too coarse and is to stay so.
+    """
+    assert wanted.ground is not None
+    ground, shot = settings.found(wanted.ground), known.shot
+    unit_scale, cell_size, detail = wanted.unit_scale_m, wanted.cell_size_m, wanted.detail
+    vertices = shot.surface.vertices if shot.surface else ground_mesh.rest_vertices(ground, unit_scale)
+    plan = shot.plan or plan_ground(shot.motions)
+    if plan.footfalls is not None:
+        footfalls = cells_at(plan.footfalls, cell_size)
+        cover = coverage(vertices, slice(None), footfalls, cell_size)
+        under = np.flatnonzero(np.isin(keys_at(vertices[:, :2], cell_size), footfalls))
+        if wants_detail(ground, cover, detail, cell_size, shortest_sole(shot.motions)) or are_undone(
+            ground, vertices, under, shot.terrain, unit_scale=unit_scale, detail=detail
+        ):
+            surface = trail_detail.surface_of(ground, unit_scale)
+            region = trail_detail.region_around(footfalls, cell_size, reach_of(wanted.material))
+            refinement = refine(surface, region, cell_size)
+            with trail_detail.draft(ground, surface, refinement) as draft:
+                ground = trail_detail.publish(ground, draft)
+            vertices = refinement.at_vertices(surface, surface.vertices)
+    return LiveGround(ground, vertices, shot, unit_scale)
+
+
+_ENDED = object()
+
+
+def _in_steps(job: jobs.Job[jobs.Result]) -> Generator[None, None, jobs.Result]:
+    """A job whose progress nobody asks for."""
+    while True:
+        try:
+            next(job)
+        except StopIteration as end:
+            result: jobs.Result = end.value
+            return result
+        yield
+
+
+def _pressed_by(wanted: BakeSettings) -> dict[str, Any]:
+    """The settings on which the prints depend: the name of a preset is none of them."""
+    return replace(wanted, preset="").between(Acts.READING, Acts.PRESSING)

@@ -1,0 +1,42 @@
+"""Sliders in live mode, in a real Blender: the prints follow, and nobody waits."""
+
+import pytest
+
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
+
+LONGEST_WAIT = 1.5
+"""From letting go of a slider at frame 150 until all prints are as the settings say [s]."""
+LONGEST_PART = 0.1
+"""Of the processor, between two events [s]."""
+
+
+@pytest.fixture
+def facts(tell):
+    return tell("live_answers")
+
+
+def test_the_newest_steps_follow_while_the_slider_is_dragged(facts):
+    assert facts["mass"][1] > 1.3 * facts["mass"][0]
+    newest = [seen[0] for seen in facts["while dragged"]]
+    assert len(set(newest)) > 4
+    assert min(newest) < 1.2 * facts["before"][0]
+
+
+def test_all_prints_are_there_soon_after(facts):
+    assert facts["seconds after letting go"] < LONGEST_WAIT
+    assert facts["after"][1] < 1.2 * facts["before"][1]
+
+
+def test_nobody_waits_for_it(facts):
+    assert facts["number of parts"] > 10
+    assert facts["parts"][0] < LONGEST_PART
+
+
+def test_what_is_kept_is_what_a_bake_gives_with_these_settings(facts):
+    assert facts["kept"]
+    assert facts["outdated"] == ""
+    assert facts["baked again: differs by"] < 1e-6
+
+
+def test_nothing_goes_wrong_on_the_console(facts):
+    assert "softground_addon" not in facts["printed"]  # as in the lines of a traceback
