@@ -160,6 +160,30 @@ class Hand:
                 return x, y
         return None
 
+    def find_field(self, path: str, offset: float = 0.75) -> Any:
+        """Place of the field of a property, by the end of the data path that Shift-Ctrl-C copies from it."""
+        region = self.region()
+        x = region.x + int(region.width * offset)
+        for y in range(region.y + region.height - ROW, region.y, -ROW):
+            bpy.context.window_manager.clipboard = ""
+            yield from self.move(x, y)
+            yield from self.key("C", ctrl=True, shift=True)
+            if bpy.context.window_manager.clipboard.endswith(path):
+                return x, y
+        raise LookupError(f"there is no field for {path} in the sidebar")
+
+    def drag(self, place: tuple[int, int], by: int, *, steps: int, seconds: float) -> Steps:
+        """Drag a field sideways by some pixels, in even steps."""
+        x, y = place
+        yield from self.move(x, y)
+        self.event("LEFTMOUSE", "PRESS")
+        for step in range(1, steps + 1):
+            self.place = (x + by * step // steps, y)
+            self.event("MOUSEMOVE", "NOTHING")
+            yield seconds / steps
+        self.event("LEFTMOUSE", "RELEASE")
+        yield SHORT
+
     def press_button(self, operator: str, offset: float = 0.5) -> Steps:
         place = yield from self.find_button(operator, offset)
         if place is None:
