@@ -159,6 +159,7 @@ def bake(
     shot.ground = ground
     shot.characters.clear()
     shot.ground_margin = 0.0  # grounds lie side by side
+    shot.relief = "OFF"  # figures show what is computed
     shot.sink_feet = False  # scenes ask for a response where they show one
     if cell_size:
         shot.cell_size = cell_size

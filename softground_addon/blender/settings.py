@@ -152,6 +152,10 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         detail=options.detail,
         shape_keys=options.shape_keys,
         tread_m=typed(options.tread),
+        tread_pattern=options.tread_pattern,
+        relief=options.relief,
+        relief_strength=typed(options.relief_strength),
+        relief_look=options.material.surface if options.relief != "OFF" else "",
         margin_m=typed(options.ground_margin),
         keep_forces=options.keep_forces,
     )
@@ -312,7 +316,7 @@ def _of_preset(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, A
 
 def _defaults(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, Any]]:
     """What a scene starts with beside the cells."""
-    return [*_of_preset(scene, preset), (scene.softground, "sink_feet", True)]
+    return [*_of_preset(scene, preset), (scene.softground, "sink_feet", True), (scene.softground, "relief", "FINE")]
 
 
 COARSER = 4.0

@@ -16,6 +16,9 @@ from .ground.material import GroundMaterial, Pressure
 from .loads.estimate import ForceModel
 from .response.response import GroundingOptions, TiltOptions
 
+CLOSE_UP_SPACING = 0.0025
+"""Distance of the vertices of a trail that is seen from close by [m]: grooves of a tread are 4 mm wide."""
+
 
 class Acts(IntEnum):
     """What a setting acts on first, in the order of a bake: a later one leaves what came before as it is."""
@@ -160,6 +163,13 @@ class BakeSettings(SceneUnits):
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
     shape_keys : bool
     tread_m : float
+    tread_pattern : str
+        One of `relief.tread.PATTERNS`.
+    relief : 'OFF', 'FINE' or 'CLOSE_UP'
+    relief_strength : float
+        Of all relief: 1 is as the look's amounts say.
+    relief_look : str
+        The look whose relief is shown; empty where none is.
     margin_m : float
         How far a ground that is made reaches beyond the walk.
     keep_forces : bool
@@ -182,8 +192,17 @@ class BakeSettings(SceneUnits):
     detail: str = field(metadata=_on(Acts.WRITING))
     shape_keys: bool = field(metadata=_on(Acts.WRITING))
     tread_m: float = field(metadata=_on(Acts.WRITING))
+    tread_pattern: str = field(metadata=_on(Acts.WRITING))
+    relief: str = field(metadata=_on(Acts.WRITING))
+    relief_strength: float = field(metadata=_on(Acts.WRITING))
+    relief_look: str = field(metadata=_on(Acts.WRITING))
     margin_m: float = field(metadata=_on(Acts.OUTPUT))
     keep_forces: bool = field(metadata=_on(Acts.OUTPUT))
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
+        return min(self.cell_size_m, CLOSE_UP_SPACING) if self.relief == "CLOSE_UP" else self.cell_size_m
 
     def between(self, first: Acts, last: Acts) -> dict[str, Any]:
         """The settings that act first on one of these stages."""

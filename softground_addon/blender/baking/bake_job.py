@@ -216,7 +216,7 @@ def _created(
     reach = created_ground.reach_of(wanted.material)
     yield Progress("write", 0.2)
     wide = created_ground.widened(scene, plan, wanted.margin_m)
-    layout = created_ground.lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach)
+    layout = created_ground.lay_out(wide, wanted.spacing_m, wanted.unit_scale_m, reach=reach)
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)
@@ -251,7 +251,7 @@ def _given(
         findings = [*findings, undone_prints(ground)]
     coarse = trail_detail.surface_of(ground, unit_scale)
     refinement = yield from meanwhile(
-        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), cell_size)
+        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), wanted.spacing_m)
     )
     drafted_name = settings.name_of(drafts.enter_context(trail_detail.draft(settings.found(name), coarse, refinement)))
     yield Progress("write", 0.4)

@@ -16,6 +16,8 @@ from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
+from ...core.relief.steps import StepRelief, all_together
+from ...core.relief_plan import relief_at, shod_of
 from ...core.settings import BakeSettings
 from .. import settings
 from ..ground import baked_ground, ground_mesh, playback
@@ -59,6 +61,9 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)
     sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **moment))
+    relief = yield from meanwhile(Progress("write", 0.65), relief_at.slices(footprints, x, y, made_with))
+    if relief:
+        sample = sample.with_relief(*all_together(relief, len(x)).T)
     over_time = playback_curves_at.slices(
         footprints,
         x,
@@ -66,13 +71,14 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
         blur_sigma=made_with.material.blur_sigma,
         frame_rate=made_with.frame_rate,
         time_stretch=made_with.time_stretch,  # nodes count the animation's frames
+        relief=relief,
     )
     spans, lines = yield from meanwhile(Progress("write", 0.7), over_time)
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         table = settings.name_of(drafts.enter_context(playback.keyframe_tables(lines)))
         del lines  # they are large, and all is in the table
         yield Progress("write", 0.8)
-        marks = _tread(footprints, place.position, made_with)
+        marks = _tread(footprints, place.position, made_with, relief)
         yield Progress("write", 0.9)
         yield from baked_ground.write(
             place,
@@ -85,7 +91,17 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             marks=marks,
         )
         is_draft, error, show = place.is_draft, spans.error, place.publish
-        del place, x, y, sample, over_time, spans, marks, stored  # all is in the mesh, of which Blender makes another
+        del (
+            place,
+            x,
+            y,
+            sample,
+            over_time,
+            spans,
+            marks,
+            stored,
+            relief,
+        )  # all is in the mesh, of which Blender makes another
         if is_draft:
             yield Progress("write", 0.9)
         shown = show()
@@ -118,17 +134,13 @@ def sign(
     staleness.store(inputs, ground, hashes)
 
 
-FEET_IN_SHOES = 2
-"""Feet of those who wear shoes."""
-
-
-def _tread(footprints: Sequence[Footprint], position: Array, made_with: BakeSettings) -> Array | None:
+def _tread(
+    footprints: Sequence[Footprint], position: Array, made_with: BakeSettings, relief: Sequence[StepRelief]
+) -> Array | None:
     """What `ground_mesh.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
-    has one."""
-    shod = set()
-    for one in made_with.characters:
-        feet = [sole for sole in one.soles if sole.bone and not sole.limb]
-        shod |= {(one.name, sole.name) for sole in feet if len(feet) == FEET_IN_SHOES}
+    has one, or relief has it in the mesh."""
+    in_relief = {(step.character, step.sole) for step, its in zip(footprints, relief, strict=False) if its.tread}
+    shod = shod_of(made_with) - in_relief
     if not made_with.tread_m > 0 or not any((step.character, step.sole) in shod for step in footprints):
         return None
     marks = sole_marks(footprints, footprints[0].cell_size, shod)

@@ -122,6 +122,8 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
     options = scene.softground
     if not options.is_property_set("sink_feet"):
         options.sink_feet = False  # nobody looks on here: an animation is changed where that was asked for
+    if not options.is_property_set("relief"):
+        options.relief = "OFF"  # and farms bake what they have baked so far
     add_character(scene, rigs[0])
 
 

@@ -58,7 +58,7 @@ class Layout:
 def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
     """A new ground with the material of the preset, set as the scene's ground."""
     wide = widened(scene, plan, wanted.margin_m)
-    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
+    layout = lay_out(wide, wanted.spacing_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
     with draft(layout, soft_edge(wanted.margin_m)) as ground:
         publish(scene, ground, wanted.surface)
     return ground

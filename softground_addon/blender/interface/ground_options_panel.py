@@ -37,6 +37,11 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
         for field in ("characteristic_time", "shortest_time"):
             column.prop(options.material, field)
         column.prop(options, "tread_mm")
+        column.prop(options, "tread_pattern")
+        column.prop(options, "relief")
+        amount = column.row()
+        amount.active = options.relief != "OFF"
+        amount.prop(options, "relief_strength", text="Amount")
         layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
 
 

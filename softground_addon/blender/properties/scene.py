@@ -152,6 +152,36 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         precision=4,
     )
     tread_mm: in_unit("tread", 1e-3, "Tread (mm)", _TREAD, min=0.0, soft_max=5.0, precision=1)
+    tread_pattern: EnumProperty(
+        name="Tread Pattern",
+        description="What the soles of shoes press into the ground where its relief is fine enough to show it, with "
+        "Close-Up as a rule",
+        items=[
+            ("HIKING", "Hiking", "Blocks around the edge, chevrons within, a plain waist"),
+            ("TRAINER", "Trainer", "Waves across the sole, cut along its middle"),
+            ("BARE", "Bare Foot", "No shoe: gaps between the ball and the toes"),
+        ],
+        default="HIKING",
+    )
+    relief: EnumProperty(
+        name="Relief",
+        description="Broken edges, crumbs, cracks and tread on the prints that are shown. What the ground does to "
+        "feet, and forces and depths, stay as they are",
+        items=[
+            ("OFF", "Off", "Smooth prints, as they are computed"),
+            ("FINE", "Fine", "In the mesh as fine as the cells: for trails and whole figures"),
+            ("CLOSE_UP", "Close-Up", "With vertices 2.5 mm apart along the trail, and the tread of shoes in the mesh"),
+        ],
+        default="OFF",
+    )
+    relief_strength: FloatProperty(
+        name="Relief Amount",
+        description="How rough prints are: 1 as the ground's look has it, 0 smooth",
+        default=1.0,
+        min=0.0,
+        max=2.0,
+        precision=2,
+    )
     tilt: PointerProperty(name="Tilt", type=SoftGroundTilt)
     grounding: PointerProperty(name="Grounding", type=SoftGroundGrounding)
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)

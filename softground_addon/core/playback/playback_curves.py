@@ -8,7 +8,7 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..ground.heightfield import SparseGrid
 from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
+from ..relief.steps import NOTHING, StepRelief
 from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
 from .vertex_histories import VertexHistories, vertex_histories
@@ -113,12 +114,13 @@ def playback_curves_at(
     frame_rate: float,
     time_stretch: float = 1.0,
     tolerance: float = TOLERANCE,
+    relief: Sequence[StepRelief] = (),
 ) -> Slices[tuple[Spans, PlaybackCurves]]:
     """The record as curves at given places.
 
     Parameters
     ----------
-    footprints, x, y, blur_sigma, tolerance
+    footprints, x, y, blur_sigma, tolerance, relief
         See `vertex_histories.vertex_histories`.
     frame_rate : float
         Frames of the footprints per second [Hz].
@@ -134,9 +136,15 @@ def playback_curves_at(
         **{name: PackedArray(nothing) for name in ("start", "end", "offset", "last_height", "last_contact")},
     }
     position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
-    for places in _parts(footprints, x, y):
+    parts = _parts(footprints, x, y)
+    for places, reliefs in zip(parts, _relief_of_parts(relief, parts, len(x)), strict=True):
         over_time = yield from vertex_histories.slices(
-            footprints, x[places], y[places], blur_sigma=blur_sigma, tolerance=tolerance
+            footprints,
+            x[places],
+            y[places],
+            blur_sigma=blur_sigma,
+            tolerance=tolerance,
+            relief=reliefs,
         )
         yield
         spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)
@@ -162,6 +170,25 @@ def _parts(footprints: Sequence[Footprint], x: Array, y: Array) -> list[Indices]
         contacts.write(footprint.window, contacts.read(footprint.window) + 1)
     so_far = np.cumsum(contacts.nearest(x[order], y[order])[0])
     return np.split(order, np.flatnonzero(np.diff(so_far // CONTACTS_AT_ONCE)) + 1)
+
+
+def _relief_of_parts(
+    relief: Sequence[StepRelief], parts: Sequence[Indices], places: int
+) -> Iterator[Sequence[StepRelief]]:
+    """The relief of all steps at the places of each part, nothing where there is none."""
+    part_of, within = np.empty(places, dtype=np.intp), np.empty(places, dtype=np.intp)
+    for number, part in enumerate(parts):
+        part_of[part], within[part] = number, np.arange(len(part))
+    reached: list[list[tuple[int, StepRelief]]] = [[] for _ in parts]
+    for step_number, step in enumerate(relief):
+        for number in np.unique(part_of[step.point]).tolist():
+            reached[number].append((step_number, step))
+    for number in range(len(parts)):
+        reliefs = [NOTHING] * len(relief)
+        for step_number, step in reached[number]:
+            there = part_of[step.point] == number
+            reliefs[step_number] = replace(step, point=within[step.point[there]], change=step.change[there])
+        yield reliefs
 
 
 def curves(over_time: VertexHistories, frame_rate: float) -> tuple[Spans, PlaybackCurves]:

@@ -7,7 +7,7 @@ time is the sum of its ramps, so that frames can be shown in any order, and betw
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,30 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     ramp = np.flatnonzero((at[:-1] // count == at[1:] // count) & change.any(axis=1))
     start, stop = at[:-1][ramp], at[1:][ramp]
     return Fit(Ramps(start // count, when[start], when[stop], change[ramp]), error + QUANTUM / 2)
+
+
+def grown(ramps: Ramps, points: Indices, change: Array, span: tuple[float, float]) -> Ramps:
+    """Ramps that also bring points (N,) a change (N, C), as these points move: each ramp its part of it.
+
+    Points without a ramp take theirs over a span of frames.
+
+    Examples
+    --------
+    >>> pressed = Ramps(np.array([0, 0]), np.array([1.0, 3.0]), np.array([2.0, 4.0]), np.array([[-1.0], [-3.0]]))
+    >>> deeper = grown(pressed, np.array([0, 5]), np.array([[-0.5], [0.25]]), (1.0, 4.0))
+    >>> deeper.point.tolist(), deeper.change[:, 0].tolist(), deeper.start.tolist()
+    ([0, 0, 5], [-1.125, -3.375, 0.25], [1.0, 3.0, 1.0])
+    """
+    path = np.abs(ramps.change).sum(axis=1)
+    count = max(int(points.max(initial=-1)), int(ramps.point.max(initial=-1))) + 1
+    whole = np.zeros((count, change.shape[1]))
+    whole[points] = change
+    length = np.bincount(ramps.point, path, minlength=count)
+    share = path / np.where(length > 0, length, 1.0)[ramps.point]
+    more = replace(ramps, change=ramps.change + share[:, None] * whole[ramps.point])
+    still = points[length[points] == 0]
+    start, end = (np.full(len(still), frame) for frame in span)
+    return Ramps.joined([more, Ramps(still, start, end, whole[still])], change.shape[1])
 
 
 def _ends_of_movements(values: Array) -> NDArray[np.bool_]:

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred_inside, gaussian_kernel
 from ..ground.heightfield import Window
+from ..ground.places import Places, inside
 from ..numerics import bilinear
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import QUANTUM, Footprint
-from .ramps import TOLERANCE, Ramps, fit
+from ..relief.steps import NOTHING, StepRelief
+from .ramps import TOLERANCE, Ramps, fit, grown
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -79,7 +81,13 @@ class VertexHistories:
 
 @sliced
 def vertex_histories(
-    footprints: Sequence[Footprint], x: Array, y: Array, *, blur_sigma: float, tolerance: float = TOLERANCE
+    footprints: Sequence[Footprint],
+    x: Array,
+    y: Array,
+    *,
+    blur_sigma: float,
+    tolerance: float = TOLERANCE,
+    relief: Sequence[StepRelief] = (),
 ) -> Slices[VertexHistories]:
     """The record as it is seen from given places.
 
@@ -93,75 +101,42 @@ def vertex_histories(
     tolerance : float
         Largest error of a displayed height while it moves [m]; where footprints move the same ground at the same
         time, they share it.
+    relief : sequence of StepRelief
+        Of each footprint at these places, if there is relief: it grows with the movement that its step makes.
     """
-    places = _Places(x, y)
+    places = Places(x, y)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
-    footprints = _near(footprints, places, kernels)
+    near = _near(footprints, places, kernels)
+    footprints = [footprints[number] for number in near]
+    reliefs = [relief[number] if relief else NOTHING for number in near]
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
     movements: list[Ramps] = []
     contacts: list[PointContacts] = []
     error = 0.0
-    for number, footprint in enumerate(footprints):
+    for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
+        own: list[Ramps] = []
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
         for points, frames, moved in _movements(footprint, places, kernels[footprint.cell_size]):
             shared = np.zeros(len(points))
             for other in together:
-                shared += _inside(reach[other], footprints[other].cell_size, x[points], y[points])
+                shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
             fitted = fit(frames, moved, np.array([tolerance, SHADING_TOLERANCE]) / shared[:, None])
-            movements.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
+            own.append(replace(fitted.ramps, point=points[fitted.ramps.point]))
             error = max(error, float((fitted.error[:, 0] * shared).max(initial=0.0)))
             yield
+        if len(its_relief.point):
+            own = [
+                grown(Ramps.joined(own, 2), its_relief.point, its_relief.change, (spans[number, 0], spans[number, 1]))
+            ]
+        movements += own
         contacts.append(_point_contacts(footprint, places))
         yield
     return VertexHistories(Ramps.joined(movements, 2), _joined(contacts), error)
 
 
-class _Places:
-    """Places in the plane, found by window.
-
-    Parameters
-    ----------
-    x, y : (K,) float arrays
-        World positions [m].
-    """
-
-    BIN = 0.5
-    """Side of the bins [m]."""
-
-    def __init__(self, x: Array, y: Array) -> None:
-        self.x, self.y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        column, row = np.floor(self.x / self.BIN), np.floor(self.y / self.BIN)
-        self._order = np.lexsort((column, row))
-        bins, self._first = np.unique(
-            np.stack([row[self._order], column[self._order]], axis=-1), axis=0, return_index=True
-        )
-        self._rows, self._columns = bins.T
-        self._first = np.append(self._first, len(self._order))
-
-    def within(self, window: Window, cell_size: float) -> Indices:
-        """Places in the cells of a window, (N,), ascending."""
-        low = np.floor(np.array([window.column, window.row]) * cell_size / self.BIN)
-        high = np.floor(np.array([window.column + window.columns, window.row + window.rows]) * cell_size / self.BIN)
-        near = (self._columns >= low[0]) & (self._columns <= high[0]) & (self._rows >= low[1]) & (self._rows <= high[1])
-        found = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
-        points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
-        return points[_inside(window, cell_size, self.x[points], self.y[points])]
-
-    def window(self, points: Indices, cell_size: float) -> Window:
-        """The cells around some of the places."""
-        place = self.x[points], self.y[points]
-        return Window.around(np.min(place, axis=1), np.max(place, axis=1), cell_size)
-
-
-def _inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
-    """Which places lie in the cells of a window."""
-    column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
-    return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)
-
-
-def _near(footprints: Sequence[Footprint], places: _Places, kernels: Mapping[float, Array]) -> list[Footprint]:
-    """The footprints that may reach some of the places."""
+def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[float, Array]) -> list[int]:
+    """Numbers of the footprints that may reach some of the places."""
     if not len(places.x) or not footprints:
         return []
     margin = {size: _margin(kernel) for size, kernel in kernels.items()}
@@ -171,7 +146,7 @@ def _near(footprints: Sequence[Footprint], places: _Places, kernels: Mapping[flo
     size, reach = np.array([(size, margin[size]) for _, size in windows]).T[..., None]
     low, high = (np.array([bound(places.x), bound(places.y)]) for bound in (np.min, np.max))
     near = ((first - reach) * size <= high) & ((first + cells + reach) * size >= low)
-    return [footprints[number] for number in np.flatnonzero(near.all(axis=1))]
+    return [int(number) for number in np.flatnonzero(near.all(axis=1))]
 
 
 def _margin(kernel: Array) -> int:
@@ -187,7 +162,7 @@ def _span(footprint: Footprint) -> tuple[float, float]:
     return float(frames.min()) - footprint.frame_step, float(frames.max())
 
 
-def _movements(footprint: Footprint, places: _Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
+def _movements(footprint: Footprint, places: Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
     """Displayed height and compression of the places that a footprint moves, block by block.
 
     Yields
@@ -232,10 +207,10 @@ def _changes(footprint: Footprint, window: Window) -> tuple[Array, Array]:
     for channel, changes in enumerate((footprint.compression, footprint.rim)):
         row, column = np.divmod(changes.cells, own.columns)
         row, column = row + own.row - window.row, column + own.column - window.column
-        inside = (row >= 0) & (row < window.rows) & (column >= 0) & (column < window.columns)
-        when.append(np.repeat(changes.frames, np.diff(changes.first))[inside])
-        where.append(((channel * window.rows + row) * window.columns + column)[inside])
-        amounts.append(changes.amounts[inside])
+        within = (row >= 0) & (row < window.rows) & (column >= 0) & (column < window.columns)
+        when.append(np.repeat(changes.frames, np.diff(changes.first))[within])
+        where.append(((channel * window.rows + row) * window.columns + column)[within])
+        amounts.append(changes.amounts[within])
     frame = np.concatenate(when)
     if not len(frame):
         return np.zeros(0), np.zeros((0, 2, window.rows, window.columns))
@@ -248,7 +223,7 @@ def _changes(footprint: Footprint, window: Window) -> tuple[Array, Array]:
     return frames, heights.reshape(count, 2, window.rows, window.columns)
 
 
-def _look_up(values: Array, window: Window, cell_size: float, places: _Places, points: Indices) -> Array:
+def _look_up(values: Array, window: Window, cell_size: float, places: Places, points: Indices) -> Array:
     """Values (T, channels, rows, columns) of a window at places, bilinear between cell centres: (T, channels, N)."""
     column = places.x[points] / cell_size - 0.5 - window.column
     row = places.y[points] / cell_size - 0.5 - window.row
@@ -260,7 +235,7 @@ def _look_up(values: Array, window: Window, cell_size: float, places: _Places, p
     return bilinear.between((flat[..., at] for at in (corner, corner + 1, above, above + 1)), u, v)
 
 
-def _point_contacts(footprint: Footprint, places: _Places) -> PointContacts:
+def _point_contacts(footprint: Footprint, places: Places) -> PointContacts:
     """Contacts of a footprint with the places in its cells."""
     window = footprint.window
     points = places.within(window, footprint.cell_size)

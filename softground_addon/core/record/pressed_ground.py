@@ -42,6 +42,15 @@ class GroundSample:
     rim: Array
     age: Array
 
+    def with_relief(self, height: Array, compression: Array) -> GroundSample:
+        """The same with so much more displayed height and compression (K,) [m]."""
+        return replace(
+            self,
+            display=self.display + height,
+            compression=self.compression + compression,
+            rim=self.rim + height + compression,
+        )
+
     def moved_at(self, points: NDArray[np.intp]) -> GroundSample:
         """The same with heights that change at some of the places only."""
         moves = np.zeros(len(self.raw), dtype=bool)

@@ -1,0 +1,54 @@
+"""Places in the plane, found by window."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .heightfield import Window
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Places:
+    """Places in the plane, found by window.
+
+    Parameters
+    ----------
+    x, y : (K,) float arrays
+        World positions [m].
+    """
+
+    BIN = 0.5
+    """Side of the bins [m]."""
+
+    def __init__(self, x: Array, y: Array) -> None:
+        self.x, self.y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        column, row = np.floor(self.x / self.BIN), np.floor(self.y / self.BIN)
+        self._order = np.lexsort((column, row))
+        bins, self._first = np.unique(
+            np.stack([row[self._order], column[self._order]], axis=-1), axis=0, return_index=True
+        )
+        self._rows, self._columns = bins.T
+        self._first = np.append(self._first, len(self._order))
+
+    def within(self, window: Window, cell_size: float) -> Indices:
+        """Places in the cells of a window, (N,), ascending."""
+        low = np.floor(np.array([window.column, window.row]) * cell_size / self.BIN)
+        high = np.floor(np.array([window.column + window.columns, window.row + window.rows]) * cell_size / self.BIN)
+        near = (self._columns >= low[0]) & (self._columns <= high[0]) & (self._rows >= low[1]) & (self._rows <= high[1])
+        found = [self._order[self._first[k] : self._first[k + 1]] for k in np.flatnonzero(near)]
+        points = np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
+        return points[inside(window, cell_size, self.x[points], self.y[points])]
+
+    def window(self, points: Indices, cell_size: float) -> Window:
+        """The cells around some of the places."""
+        place = self.x[points], self.y[points]
+        return Window.around(np.min(place, axis=1), np.max(place, axis=1), cell_size)
+
+
+def inside(window: Window, cell_size: float, x: Array, y: Array) -> NDArray[np.bool_]:
+    """Which places lie in the cells of a window."""
+    column, row = np.floor(x / cell_size) - window.column, np.floor(y / cell_size) - window.row
+    return (column >= 0) & (column < window.columns) & (row >= 0) & (row < window.rows)

@@ -1,0 +1,154 @@
+"""How much relief a ground shows: the amounts of all layers, from a table in JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .layers import Apron, Cracks, Crumbs, Edge, Fans, Floor, Layer, Lip, Lumps, Streaks
+
+FOLDER = Path(__file__).parents[2] / "presets" / "relief"
+"""Where the amounts of each look are, as `LOOK.json`."""
+
+LAYERS: Mapping[str, type[Layer]] = {
+    "edge": Edge,
+    "lumps": Lumps,
+    "floor": Floor,
+    "apron": Apron,
+    "streaks": Streaks,
+    "fans": Fans,
+    "lip": Lip,
+    "cracks": Cracks,
+    "crumbs": Crumbs,
+}
+"""The layers by the names that a table gives them; several of one kind are a list."""
+
+LARGEST = 1e4
+"""Of the numbers in a table [mm]."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """By how much outlines are bent (`amount`), in bends of a `size` [mm]."""
+
+    size: float
+    amount: float
+
+
+@dataclass(frozen=True)
+class Chunks:
+    """Pieces of a `size` that are missing from the edge, or were left standing, by up to about half of `shift` [mm]."""
+
+    size: float
+    shift: float
+    share: float = 0.55
+
+
+@dataclass(frozen=True)
+class Tread:
+    """Height of what a tread leaves standing [mm], and the parts of it that are lost in the best and worst places."""
+
+    height: float
+    kept: float = 0.0
+    lost: float = 0.7
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """The relief of a ground. Lengths are millimetres.
+
+    Attributes
+    ----------
+    depth : float
+        Depth of the prints that the heights are given for; those of shallower ones are lower.
+    bends : tuple of Bend
+        Of the outline and all that lies along it.
+    bends_with_depth : bool
+        Whether walls are bent at each depth otherwise.
+    chunks : Chunks or None
+    wall : float
+        Width of the wall seen from above; 0 keeps the walls that the simulation has.
+    tread : Tread or None
+    layers : tuple of Layer
+    """
+
+    depth: float
+    bends: tuple[Bend, ...] = ()
+    bends_with_depth: bool = False
+    chunks: Chunks | None = None
+    wall: float = 0.0
+    tread: Tread | None = None
+    layers: tuple[Layer, ...] = ()
+
+
+@cache
+def of_look(look: str, folder: Path = FOLDER) -> Amounts:
+    """The amounts of a look.
+
+    Raises
+    ------
+    InputError
+        If there is no table of it, or it holds something else.
+    """
+    path = folder / f"{look}.json"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"Relief '{path}' cannot be read: {error}") from None
+    return parse(text, f"Relief '{path}'")
+
+
+def parse(text: str, origin: str) -> Amounts:
+    """The amounts in the text of a table.
+
+    Raises
+    ------
+    InputError
+        Naming `origin`, and the field that is wrong.
+    """
+    try:
+        table = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{origin}: this is no JSON ({error}).") from None
+    if not isinstance(table, dict):
+        raise InputError(f"{origin}: this is no table of amounts.")
+    layers = [
+        _made(kind, values, f"{origin}, {name}")
+        for name, kind in LAYERS.items()
+        for values in _list(table.pop(name, []))
+    ]
+    parts: dict[str, Any] = {
+        "bends": tuple(_made(Bend, one, f"{origin}, bends") for one in _list(table.pop("bends", [])))
+    }
+    for name, kind in (("chunks", Chunks), ("tread", Tread)):
+        if name in table:
+            parts[name] = _made(kind, table.pop(name), f"{origin}, {name}")
+    with_depth = table.pop("bends_with_depth", False) is True
+    plain = _made(Amounts, table, origin)
+    return Amounts(plain.depth, wall=plain.wall, bends_with_depth=with_depth, layers=tuple(layers), **parts)
+
+
+def _list(values: Any) -> list[Any]:
+    return values if isinstance(values, list) else [values]
+
+
+def _made(kind: type[Any], values: Any, origin: str) -> Any:
+    """An instance of a dataclass of numbers from a table."""
+    known = {one.name: one for one in fields(kind)}
+    if not isinstance(values, dict) or not values.keys() <= known.keys():
+        raise InputError(f"{origin}: it must be a table of {', '.join(known)}.")
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{origin}: '{name}' is {value!r}; it must be a number.")
+        if abs(value) > LARGEST:
+            raise InputError(f"{origin}: '{name}' is {value!r}; it must be at most {LARGEST:g}.")
+    missing = [name for name, one in known.items() if one.default is MISSING and name not in values]
+    if missing:
+        raise InputError(f"{origin}: it lacks {', '.join(missing)}.")
+    return kind(**values)

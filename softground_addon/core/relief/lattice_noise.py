@@ -1,0 +1,181 @@
+"""Noise that depends on place alone: values of an integer lattice, hashed, with smooth passages between them.
+
+Whole numbers are hashed and polynomials interpolate, so that every platform gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Lattice = NDArray[np.uint32]
+
+DEVIATION = 0.65
+"""Standard deviation of the noise: most of it is within one amplitude."""
+
+ALONG_AN_AXIS = 181 / 231
+"""Part of the variance of a lattice that is left between its values, for each axis: the mean of (1 - p)² + p² over the
+`_passage` p."""
+
+
+def hashed(seed: int, *lattice: NDArray[np.int64]) -> Lattice:
+    """A random number for each place of a lattice, from 0 to 2³² - 1.
+
+    The mixing steps are those of a 32-bit integer hash found by search [1]_.
+
+    References
+    ----------
+    .. [1] Wellons, C. (2018). Prospecting for Hash Functions. nullprogram.com/blog/2018/07/31 (lowbias32).
+    """
+    value = np.full(np.broadcast_shapes(*(axis.shape for axis in lattice)), seed & 0xFFFFFFFF, dtype=np.uint32)
+    for axis, step in zip(lattice, (0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D), strict=False):
+        value = value ^ (axis & 0xFFFFFFFF).astype(np.uint32) * np.uint32(step)
+        value ^= value >> np.uint32(16)
+        value = value * np.uint32(0x7FEB352D)
+        value ^= value >> np.uint32(15)
+        value = value * np.uint32(0x846CA68B)
+        value ^= value >> np.uint32(16)
+    return value
+
+
+def uniform(seed: int, *lattice: NDArray[np.int64]) -> Array:
+    """A random number for each place of a lattice, from 0 to 1."""
+    return np.asarray(hashed(seed, *lattice) * 2.0**-32)
+
+
+def rise(share: Array) -> Array:
+    """From 0 at 0 to 1 at 1, level at both ends and outside."""
+    part = np.clip(share, 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))
+
+
+def _passage(share: Array) -> Array:
+    """The same with ends that do not bend either (Perlin 2002, doi:10.1145/566654.566636, eq. 1)."""
+    return np.asarray(share * share * share * (share * (share * 6.0 - 15.0) + 10.0))
+
+
+def noise(seed: int, size: float, *place: Array) -> Array:
+    """Noise whose features are about `size` [m] large.
+
+    Parameters
+    ----------
+    seed : int
+    size : float
+        From one value of the lattice to the next [m].
+    *place : (N,) float arrays
+        World x and y, for noise in space also z [m].
+
+    Returns
+    -------
+    (N,) float array
+        Of mean 0 and standard deviation `DEVIATION`.
+
+    Examples
+    --------
+    >>> at = np.array([0.1, 0.1, 0.1 + 1e-9])
+    >>> value = noise(7, 0.02, at, at)
+    >>> bool(value[0] == value[1]), bool(abs(value[0] - value[2]) < 1e-6), bool(value[0] == noise(8, 0.02, at, at)[0])
+    (True, True, False)
+    """
+    whole, share = [], []
+    for axis in place:
+        at = axis / size
+        cell = np.floor(at)
+        whole.append(cell.astype(np.int64))
+        share.append(_passage(at - cell))
+    return np.asarray(
+        _between(_values(seed, whole), whole, share) * (DEVIATION * np.sqrt(3.0 / ALONG_AN_AXIS ** len(place)))
+    )
+
+
+def _values(seed: int, cells: list[NDArray[np.int64]]) -> Callable[[list[NDArray[np.int64]]], Array]:
+    """What looks up values of a lattice, from -1 to 1: in a box around some cells if it is small, else each hashed."""
+    low = [int(axis.min(initial=0)) for axis in cells]
+    size = [int(axis.max(initial=0)) + 2 - first for axis, first in zip(cells, low, strict=True)]
+    if np.prod(size, dtype=float) > 8 * len(cells[0]):
+        return lambda corner: uniform(seed, *corner) * 2.0 - 1.0
+    axes = [np.arange(first, first + count, dtype=np.int64) for first, count in zip(low, size, strict=True)]
+    box = (uniform(seed, *np.meshgrid(*axes, indexing="ij", sparse=True)) * 2.0 - 1.0).ravel()
+    strides = np.cumprod([1, *size[:0:-1]])[::-1].tolist()
+    start = sum(first * stride for first, stride in zip(low, strides, strict=True))
+
+    def look_up(corner: list[NDArray[np.int64]]) -> Array:
+        at = corner[0] * strides[0] - start
+        for axis, stride in zip(corner[1:], strides[1:], strict=True):
+            at = at + axis * stride
+        return np.asarray(box[at])
+
+    return look_up
+
+
+def _between(
+    look_up: Callable[[list[NDArray[np.int64]]], Array],
+    corner: list[NDArray[np.int64]],
+    share: list[Array],
+    axis: int = 0,
+) -> Array:
+    """Values of a lattice between its places, along one axis after the other."""
+    if axis == len(corner):
+        return look_up(corner)
+    further = [*corner[:axis], corner[axis] + 1, *corner[axis + 1 :]]
+    low, high = (_between(look_up, each, share, axis + 1) for each in (corner, further))
+    return np.asarray(low + share[axis] * (high - low))
+
+
+def fractal(seed: int, size: float, octaves: int, gain: float, *place: Array, finest: float = 0.0) -> Array:
+    """Octaves of noise, each of half the size; those finer than `finest` [m] are left out. Deviates as `noise`."""
+    total, weight = np.zeros(len(place[0])), 0.0
+    for octave in range(octaves):
+        scale, part = size / 2.0**octave, gain**octave
+        weight += part * part
+        if scale >= finest:
+            total += part * noise(seed + octave, scale, *place)
+    return np.asarray(total / np.sqrt(weight))
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Voronoi cells at N places, all (N,) arrays.
+
+    Attributes
+    ----------
+    number : uint32 array
+        The cell that each place is in, as a random number.
+    to_edge : array
+        Distance to the second nearest centre, less that to the nearest [m]: 0 on edges.
+    x, y : array
+        From the centre of its cell [m].
+    """
+
+    number: Lattice
+    to_edge: Array
+    x: Array
+    y: Array
+
+
+def cells(seed: int, size: float, x: Array, y: Array) -> Cells:
+    """Voronoi cells of about `size` [m], a centre in each square of a lattice.
+
+    After Worley, S. (1996). A Cellular Texture Basis Function. doi:10.1145/237170.237267.
+    """
+    u, v = x / size, y / size
+    column, row = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
+    nearest, second = np.full(len(u), np.inf), np.full(len(u), np.inf)
+    number = np.zeros(len(u), dtype=np.uint32)
+    away = np.zeros((2, len(u)))
+    for j in (-1, 0, 1):
+        for i in (-1, 0, 1):
+            value = hashed(seed, column + i, row + j)
+            dx = u - column - i - (value & np.uint32(0xFFFF)) * 2.0**-16
+            dy = v - row - j - (value >> np.uint32(16)) * 2.0**-16
+            distance = dx * dx + dy * dy
+            closer = distance < nearest
+            second = np.where(closer, nearest, np.minimum(second, distance))
+            nearest = np.where(closer, distance, nearest)
+            number = np.where(closer, value, number)
+            away = np.where(closer, np.stack([dx, dy]), away)
+    return Cells(number, (np.sqrt(second) - np.sqrt(nearest)) * size, *(away * size))

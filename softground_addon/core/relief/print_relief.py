@@ -1,0 +1,199 @@
+"""The relief of one print: its outline broken, its wall rebuilt, and the layers of its ground on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record.footprints import Footprint
+from .amounts import Amounts, Chunks
+from .lattice_noise import cells, noise, rise, uniform
+from .layers import MM, Around
+from .print_shape import PrintShape, shape_of
+from .tread import GROOVE, LENGTH, PATTERNS, Under
+
+Array = NDArray[np.float64]
+
+SHALLOW = 0.5
+"""Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""
+MOST_VOLUME = 0.2
+"""Largest part by which a print is made deeper or shallower to keep its volume."""
+
+
+@dataclass(frozen=True)
+class Relief:
+    """What relief does at places, all (N,) arrays [m].
+
+    Attributes
+    ----------
+    height, compression : array
+        Change of the displayed height, and of the displayed compression.
+    pressed : array
+        From 0 to 1: how far the print wipes out what earlier ones left there.
+    """
+
+    height: Array
+    compression: Array
+    pressed: Array
+
+
+class PrintRelief:
+    """The relief of one print, at any place.
+
+    Parameters
+    ----------
+    shape : PrintShape
+    amounts : Amounts
+    seed : int
+        The print's own.
+    finest : float
+        Least size of what the ground shows [m].
+    tread : str, optional
+        One of `tread.PATTERNS` that the sole has; nothing of it is shown where its grooves are too narrow for that.
+    tread_strength : float
+        Its height over that of the amounts.
+    """
+
+    def __init__(
+        self,
+        shape: PrintShape,
+        amounts: Amounts,
+        seed: int,
+        finest: float,
+        tread: str | None = None,
+        tread_strength: float = 1.0,
+    ) -> None:
+        self._shape, self._amounts, self._seed, self._finest = shape, amounts, seed, finest
+        self._size = (shape.along[1] - shape.along[0]) / LENGTH
+        self._tread = tread if GROOVE * self._size > 1.5 * finest else None
+        self._tread_strength = tread_strength
+        self._wider, self._deeper = 0.0, 0.0
+        x, y = (place.ravel() for place in np.meshgrid(*shape.window.centres(shape.cell_size)))
+        places = self._look_up(x, y)
+        self._wider = self._widening(places)
+        relief = self._relief(places)
+        weight = places.fade * relief.pressed * places.floor
+        self._deeper = float(np.clip(relief.height.sum() / max(weight.sum(), 1e-12), -MOST_VOLUME, MOST_VOLUME))
+
+    @property
+    def has_tread(self) -> bool:
+        """Whether a tread is in it."""
+        return self._tread is not None and self._amounts.tread is not None
+
+    def at(self, x: Array, y: Array) -> Relief:
+        """The relief at world places (N,)."""
+        return self._relief(self._look_up(x, y))
+
+    def _widening(self, places: _Places) -> float:
+        """How much further out the wall has to be for the print to keep its volume [m]; 0 where it is kept as it is."""
+        if not self._amounts.wall:
+            return 0.0
+        step = 0.5 * self._shape.cell_size
+        excess, wider = (float(self._rebuilt(places, by)[0].sum()) for by in (0.0, step))
+        growth = (wider - excess) / step
+        limit = self._amounts.wall * MM
+        return float(np.clip(-excess / growth, -limit, limit)) if growth < 0 else 0.0
+
+    def _look_up(self, x: Array, y: Array) -> _Places:
+        shape, amounts = self._shape, self._amounts
+        outline, _, compression, rim, _, fade, inward_x, inward_y = shape.at(x, y)
+        bend = [np.zeros(len(x)), np.zeros(len(x))]
+        depth = [-compression] if amounts.bends_with_depth else []
+        for number, octave in enumerate(amounts.bends):
+            size, amount = octave.size * MM * shape.fineness, octave.amount * MM * shape.fineness
+            if size >= self._finest:
+                for axis in (0, 1):
+                    bend[axis] += amount * noise(self._seed + 2 * number + axis, size, x, y, *depth)
+        bent = shape.at(x + bend[0], y + bend[1])
+        inward = bent[0]
+        if amounts.chunks and amounts.chunks.size * MM * shape.fineness >= 2 * self._finest:
+            inward = inward + self._chunks(amounts.chunks, x + 0.5 * bend[0], y + 0.5 * bend[1])
+        return _Places(
+            x, y, x - outline * inward_x, y - outline * inward_y, inward, bent[1], compression, rim, bent[2], bent[3],
+            bent[4], fade,
+        )  # fmt: skip
+
+    def _chunks(self, chunks: Chunks, x: Array, y: Array) -> Array:
+        """How much further inside the outline places are than they were, for pieces of the edge that broke [m]."""
+        size = chunks.size * MM * self._shape.fineness
+        pieces = cells(self._seed + 31, size, x, y)
+        middle = self._shape.at(x - pieces.x, y - pieces.y)[0]
+        number = pieces.number.astype(np.int64)
+        shift = (uniform(32, number) - 0.62) * chunks.shift * MM * self._shape.fineness
+        shift = np.where(shift < 0, 0.5 * shift, shift)
+        return np.where((np.abs(middle) < 0.6 * size) & (uniform(33, number) < chunks.share), shift, 0.0)
+
+    def _rebuilt(self, places: _Places, wider: float) -> tuple[Array, Array, Array]:
+        """Change of height and compression by the broken wall, and what is pressed, with the wall so much wider [m]."""
+        wall = self._amounts.wall * MM * self._shape.fineness
+        if wall:
+            pressed = rise((places.inward + wider) / wall + 0.5)
+            compression, rim = places.floor * pressed, places.continued * (1.0 - pressed)
+        else:
+            pressed = rise(places.inward / (2.0 * self._shape.cell_size) + 0.5)
+            compression, rim = places.bent_compression, places.bent_rim
+        deeper = (compression - places.compression) * places.fade
+        return (rim - places.rim) * places.fade - deeper, deeper, pressed
+
+    def _relief(self, places: _Places) -> Relief:
+        height, compression, pressed = self._rebuilt(places, self._wider)
+        share = min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
+        around = Around(
+            self._seed, places.x, places.y, places.foot_x, places.foot_y, places.inward + self._wider, pressed,
+            self._finest, self._shape.fineness,
+        )  # fmt: skip
+        layers = sum((layer.heights(around) for layer in self._amounts.layers), np.zeros(len(places.x)))
+        layers = share * (layers + self._standing(places, around))
+        deeper = self._deeper * pressed * places.floor * places.fade
+        return Relief(height + layers * places.fade - deeper, compression + deeper, pressed)
+
+    def _standing(self, places: _Places, around: Around) -> Array:
+        """What the tread leaves standing in the print [m]."""
+        tread, shape = self._amounts.tread, self._shape
+        if tread is None or self._tread is None:
+            return np.zeros(len(places.x))
+        bent = [around.length(1.2) * around.noise(number, 20.0) for number in (41, 42)]
+        along, across = shape.under_sole(places.x + bent[0], places.y + bent[1])
+        middle = sum(shape.along) / 2
+        under = Under((along - middle) / self._size, across / self._size, around.inward / self._size)
+        lost = tread.kept + (tread.lost - tread.kept) * around.patches(43, 30.0)
+        within = rise((around.inward - around.length(3.0)) / around.length(6.0))
+        ridges = PATTERNS[self._tread](under)
+        return (ridges - 0.3) * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Places around a print and what is there, all (N,) arrays: see `Around` and `PrintShape`."""
+
+    x: Array
+    y: Array
+    foot_x: Array
+    foot_y: Array
+    inward: Array
+    floor: Array
+    compression: Array
+    rim: Array
+    bent_compression: Array
+    bent_rim: Array
+    continued: Array
+    fade: Array
+
+
+def relief_of_print(
+    footprint: Footprint,
+    amounts: Amounts,
+    *,
+    blur_sigma: float,
+    finest: float,
+    seed: int,
+    tread: str | None = None,
+    tread_strength: float = 1.0,
+) -> PrintRelief | None:
+    """The relief of a footprint; None where it pressed nothing. See `PrintRelief`."""
+    shape = shape_of(footprint, blur_sigma)
+    if shape is None or not shape.depth > 0:
+        return None
+    return PrintRelief(shape, amounts, seed, finest, tread, tread_strength)

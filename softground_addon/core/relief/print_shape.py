@@ -1,0 +1,175 @@
+"""The shape of one print: how far from its outline each place lies, and how deep it is without its wall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.display_blur import blurred_inside, gaussian_kernel
+from ..ground.heightfield import Window
+from ..numerics import bilinear
+from ..record.footprints import Footprint
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+REACH = 0.06
+"""How far from its outline a print's relief goes [m]."""
+MOST_CELLS = 64
+"""Cells that the distance to an outline is known for at most: ground of smaller cells carries small feet."""
+CORE = 0.008
+"""Distance from the outline at which a print is as deep as its floor [m]."""
+EVEN = 0.006
+"""Standard deviation of the blur that evens out a floor [m]."""
+TOUCHED = 0.05
+"""Compression, in parts of nearly the deepest, from which a cell belongs to the print: walls slide further."""
+NEARLY = 90
+"""Percentile of the compressed cells' depths that counts as the deepest."""
+SHARP = 0.02
+"""Half the width of a print from which lengths of the ground's grain are whole; in smaller ones they are less [m]."""
+
+
+MOVED = 1e-5
+"""Ground that moves less has no relief [m]; and none beside such cells: what has relief moves anyway."""
+FADING = 0.012
+"""Width over which relief ends where the print no longer moves the ground [m]."""
+
+
+@dataclass(frozen=True)
+class PrintShape:
+    """One print on the cells of a window.
+
+    Attributes
+    ----------
+    window : Window
+    cell_size : float
+        Side of a cell [m].
+    fields : (8, rows, columns) float array
+        Distance to the outline, positive inside, up to `REACH`; depth of the floor, continued beyond the outline;
+        displayed compression and rim; and the rim continued into the print, all [m]; how near the end of the ground
+        that the print moves a cell is, from 0 at that end to 1; and the direction inward, along x and y.
+    depth : float
+        Mean depth of the floor [m].
+    fineness : float
+        How much smaller than usual lengths are, as the print is small: 1 or less.
+    position : (2,) float array
+        Middle of the pressure [m].
+    heading : (2,) float array
+        Direction of the toes.
+    along : (float, float)
+        Where heel and toes end along it, from the middle of the pressure [m].
+    """
+
+    window: Window
+    cell_size: float
+    fields: Array
+    depth: float
+    fineness: float
+    position: Array
+    heading: Array
+    along: tuple[float, float]
+
+    def at(self, x: Array, y: Array) -> Array:
+        """The fields at world places (N,), bilinear between cells, (8, N)."""
+        column = np.clip(x / self.cell_size - 0.5 - self.window.column, 0.0, self.window.columns - 1.001)
+        row = np.clip(y / self.cell_size - 0.5 - self.window.row, 0.0, self.window.rows - 1.001)
+        left, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
+        corner = low * self.window.columns + left
+        flat = self.fields.reshape(len(self.fields), -1)
+        above = corner + self.window.columns
+        around = (flat[:, at] for at in (corner, corner + 1, above, above + 1))
+        return np.asarray(bilinear.between(around, np.asarray(column - left), np.asarray(row - low)))
+
+    def under_sole(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """How far along the foot and to its left places lie from the middle of the pressure [m]."""
+        dx, dy = x - self.position[0], y - self.position[1]
+        cos, sin = self.heading
+        return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
+    """The shape of a footprint as it is displayed with some blur [m]; None where it pressed nothing."""
+    size = footprint.cell_size
+    kernel = gaussian_kernel(blur_sigma / size)
+    margin = len(kernel) // 2 + 2
+    window = footprint.window.expanded(margin)
+    compression, rim = (np.pad(footprint.tile(changes), margin) for changes in (footprint.compression, footprint.rim))
+    pressed = compression[compression > 0]
+    if not len(pressed):
+        return None
+    inside = compression > TOUCHED * np.percentile(pressed, NEARLY)
+    far = min(int(np.ceil(REACH / size)), MOST_CELLS)
+    to_print, _ = nearest(inside, far)
+    to_ground, _ = nearest(~inside, far)
+    outline = _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0)) * size
+    fineness = float(min(1.0, outline.max() / SHARP))
+    core = outline > CORE * fineness
+    core = core if core.any() else inside
+    even = gaussian_kernel(min(EVEN * fineness / size, float(far)))
+    floor = _blurred(compression.ravel()[nearest(core, far)[1]].reshape(inside.shape), even)
+    displayed, risen = (_blurred(values, kernel) for values in (compression, rim))
+    outside = _blurred((~inside).astype(np.float64), kernel)
+    continued = np.where(outside > 0.2, risen / np.maximum(outside, 0.2), risen)
+    moved = (displayed > MOVED) | (risen > MOVED)
+    to_end, _ = nearest(~moved, far)
+    uphill = np.gradient(_blurred(outline, gaussian_kernel(1.5)), size)
+    x, y = np.meshgrid(*window.centres(size))
+    heading = np.array([np.cos(footprint.heading), np.sin(footprint.heading)])
+    along = (x[inside] - footprint.position[0]) * heading[0] + (y[inside] - footprint.position[1]) * heading[1]
+    return PrintShape(
+        window,
+        size,
+        np.stack(
+            [
+                outline,
+                floor,
+                displayed,
+                risen,
+                continued,
+                np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0),
+                *uphill[::-1],
+            ]
+        ),
+        float(compression[core].mean()),
+        fineness,
+        footprint.position[:2],
+        heading,
+        (float(along.min()), float(along.max())),
+    )
+
+
+def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:
+    """Distance to the nearest chosen cell's centre, up to `far`, and which that is [cells].
+
+    Exact by one direction after the other (Felzenszwalb and Huttenlocher 2012, doi:10.4086/toc.2012.v008a019), with
+    the minimum over all columns within reach in place of the envelope of parabolas.
+
+    Examples
+    --------
+    >>> distance, which = nearest(np.array([[True, False, False], [False, False, False]]), 9)
+    >>> distance.round(3).tolist(), which[1].tolist()
+    ([[0.0, 1.0, 2.0], [1.0, 1.414, 2.236]], [0, 0, 0])
+    """
+    rows, columns = chosen.shape
+    row = np.arange(rows)[:, None]
+    below = np.maximum.accumulate(np.where(chosen, row, -far - rows), axis=0)
+    above = np.minimum.accumulate(np.where(chosen, row, 2 * rows + far)[::-1], axis=0)[::-1]
+    source = np.where(row - below <= above - row, below, above)
+    high = np.minimum(np.abs(source - row), far + 1).astype(np.float64) ** 2
+    best = high.copy()
+    which = np.clip(source, 0, rows - 1) * columns + np.arange(columns)
+    own = which.copy()
+    for shift in range(1, min(far, columns - 1) + 1):
+        for here, there in ((slice(shift, None), slice(None, -shift)), (slice(None, -shift), slice(shift, None))):
+            distance = high[:, there] + shift * shift
+            closer = distance < best[:, here]
+            best[:, here] = np.where(closer, distance, best[:, here])
+            which[:, here] = np.where(closer, own[:, there], which[:, here])
+    return np.minimum(np.sqrt(best), float(far)), which
+
+
+def _blurred(values: Array, kernel: Array) -> Array:
+    return blurred_inside(np.pad(values, len(kernel) // 2, mode="edge"), kernel)

@@ -1,0 +1,138 @@
+"""The relief of all steps at the places of a ground: what each step adds, and what it wipes out of those before."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.display_blur import gaussian_kernel
+from ..ground.places import Places
+from ..numerics.slices import Slices, sliced
+from ..record.edits import step_id
+from ..record.footprints import Footprint
+from .amounts import Amounts
+from .print_relief import relief_of_print
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+QUANTUM = 2.0**-20
+"""Step of heights [m], as of those that are played (`playback.ramps.QUANTUM`)."""
+
+
+@dataclass(frozen=True)
+class StepRelief:
+    """What the relief of one step adds to the ground while the step presses it.
+
+    Attributes
+    ----------
+    point : (N,) int array
+        The places, each once.
+    change : (N, 2) float array
+        Of the displayed height and the displayed compression [m].
+    tread : bool
+        Whether the tread of the sole is in it.
+    """
+
+    point: Indices
+    change: Array
+    tread: bool = False
+
+
+NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)))
+"""Of a step that has none."""
+
+
+@dataclass(frozen=True)
+class ReliefSettings:
+    """What relief a ground shows.
+
+    Attributes
+    ----------
+    amounts : Amounts
+    finest : float
+        Distance between the vertices that show it [m].
+    strength : float
+        Of all of it: 1 is as the amounts say.
+    tread : str
+        One of `tread.PATTERNS`.
+    tread_strength : float
+        Height of the tread over that of the amounts.
+    shod : collection of (str, str)
+        Characters and names of the soles that have a tread.
+    """
+
+    amounts: Amounts
+    finest: float
+    strength: float = 1.0
+    tread: str = "HIKING"
+    tread_strength: float = 1.0
+    shod: Collection[tuple[str, str]] = ()
+
+
+@sliced
+def relief_of_steps(
+    footprints: Sequence[Footprint], x: Array, y: Array, wanted: ReliefSettings, *, blur_sigma: float
+) -> Slices[list[StepRelief]]:
+    """What each step adds to the displayed ground at places (K,), in the order of the footprints.
+
+    A step presses flat what earlier ones left under it: it takes their relief away where it presses, as it comes.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+        In the order of their first contact.
+    x, y : (K,) float arrays
+        World positions [m].
+    wanted : ReliefSettings
+    blur_sigma : float
+        Standard deviation of the display blur [m].
+    """
+    places = Places(x, y)
+    standing = np.zeros((len(places.x), 2))
+    steps = []
+    for footprint in footprints:
+        yield
+        steps.append(_step(footprint, places, standing, wanted, blur_sigma))
+    return steps
+
+
+def _step(
+    footprint: Footprint, places: Places, standing: Array, wanted: ReliefSettings, blur_sigma: float
+) -> StepRelief:
+    """What a step adds to the relief that stands at all places (K, 2), which is brought up to date."""
+    margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
+    point = places.within(footprint.window.expanded(margin), footprint.cell_size) if len(places.x) else NOTHING.point
+    if not len(point):
+        return NOTHING
+    shod = (footprint.character, footprint.sole) in wanted.shod and wanted.tread_strength > 0
+    of_print = relief_of_print(
+        footprint,
+        wanted.amounts,
+        blur_sigma=blur_sigma,
+        finest=wanted.finest,
+        seed=zlib.crc32(step_id(footprint).encode()),
+        tread=wanted.tread if shod else None,
+        tread_strength=wanted.tread_strength,
+    )
+    if of_print is None:
+        return NOTHING
+    relief = of_print.at(places.x[point], places.y[point])
+    change = wanted.strength * np.stack([relief.height, relief.compression], axis=-1)
+    change -= relief.pressed[:, None] * standing[point]
+    change = np.round(change / QUANTUM) * QUANTUM
+    standing[point] += change
+    some = change.any(axis=1)
+    return StepRelief(point[some], change[some], of_print.has_tread)
+
+
+def all_together(steps: Sequence[StepRelief], places: int) -> Array:
+    """The sum of all steps at each of the places, (places, 2)."""
+    total = np.zeros((places, 2))
+    for step in steps:
+        total[step.point] += step.change
+    return total

@@ -1,0 +1,36 @@
+"""Shapes of prints: distances against scipy's, and depths that stay those of the record."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_edt
+
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.relief.print_shape import nearest, shape_of
+from tests.core.walkers import pressed, walk
+
+SNOW = GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distances_are_exact_within_reach(seed):
+    random = np.random.default_rng(seed)
+    chosen = random.random((31, 44)) < (0.02, 0.1, 0.5, 0.95)[seed]
+    distance, which = nearest(chosen, 12)
+    exact = distance_transform_edt(~chosen)
+    near = exact <= 12
+    assert np.allclose(distance[near], exact[near])
+    assert (distance[~near] == 12).all()
+    row, column = np.divmod(which, 44)
+    at = np.indices(chosen.shape)
+    assert chosen.ravel()[which[near]].all()
+    assert np.allclose(np.hypot(row - at[0], column - at[1])[near], exact[near])
+
+
+def test_the_floor_is_as_deep_as_the_record_says_and_goes_on_beyond_the_outline():
+    _, footprints = pressed(walk(steps=1), SNOW)
+    step = footprints[0]
+    shape = shape_of(step, SNOW.blur_sigma)
+    outline, floor = shape.fields[:2]
+    assert floor[outline > 0.012].mean() == pytest.approx(shape.depth, rel=0.05)
+    assert floor[np.abs(outline) < 0.02].min() > 0.5 * shape.depth
+    assert shape.depth < step.max_depth_m

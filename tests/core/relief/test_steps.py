@@ -1,0 +1,154 @@
+"""Relief of steps: volumes stay, no two prints are alike, later steps wipe out earlier ones, and all of it grows."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.presets import SURFACES
+from softground_addon.core.playback.ramps import QUANTUM
+from softground_addon.core.playback.vertex_histories import vertex_histories
+from softground_addon.core.record.pressed_ground import sample_at
+from softground_addon.core.relief import amounts
+from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps
+from tests.core.walkers import pressed, walk
+
+MATERIALS = {
+    "snow": GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005),
+    "sand": GroundMaterial(900e3, 0.5, 0.05, blur_sigma=0.01, repose_angle=0.5585, rim_bias=0.6),
+    "wet_sand": GroundMaterial(1500e3, 0.5, 0.05, blur_sigma=0.005),
+    "mud": GroundMaterial(625e3, 0.35, 0.15, blur_sigma=0.01),
+    "soil": GroundMaterial(1100e3, 0.35, 0.05, blur_sigma=0.005),
+}
+SPACING = 0.0025
+SHOWN = {"frame": 500.0, "frame_rate": 30.0, "cell_size": 0.005}
+
+
+@cache
+def steps_on(look, cell_size=0.005):
+    return tuple(pressed(walk(steps=2), MATERIALS[look], cell_size)[1])
+
+
+def around(footprints, spacing=SPACING, reach=0.26):
+    """A grid of places around footprints, (2, K)."""
+    low = np.min([step.position[:2] for step in footprints], axis=0) - reach
+    high = np.max([step.position[:2] for step in footprints], axis=0) + reach
+    x, y = np.meshgrid(*(np.arange(a, b, spacing) for a, b in zip(low, high, strict=True)))
+    return np.stack([x.ravel(), y.ravel()])
+
+
+def settings_of(look, footprints, **more):
+    shod = {(step.character, step.sole) for step in footprints}
+    return ReliefSettings(amounts.of_look(look), **({"finest": SPACING, "shod": shod} | more))
+
+
+def relief(look, footprints, place, **more):
+    return relief_of_steps(footprints, *place, settings_of(look, footprints, **more),
+                           blur_sigma=MATERIALS[look].blur_sigma)  # fmt: skip
+
+
+@pytest.mark.parametrize("look", SURFACES)
+def test_volumes_stay_within_a_percent_and_heights_change(look):
+    footprints = steps_on(look)
+    place = around(footprints)
+    found = relief(look, footprints, place)
+    sample = sample_at(footprints, *place, **SHOWN, blur_sigma=MATERIALS[look].blur_sigma)
+    for step in found:
+        pressed_there = sample.compression[step.point].sum()
+        assert abs(step.change[:, 0].sum()) < 0.01 * pressed_there
+        assert step.tread
+    height = all_together(found, place.shape[1])[:, 0]
+    assert np.abs(height).max() > 0.003
+
+
+def test_the_same_places_give_the_same_bytes_in_any_company():
+    footprints = steps_on("soil")
+    place = around(footprints)
+    whole = all_together(relief("soil", footprints, place), place.shape[1])
+    again = all_together(relief("soil", footprints, place), place.shape[1])
+    some = np.arange(0, place.shape[1], 3)
+    alone = all_together(relief("soil", footprints, place[:, some]), len(some))
+    assert np.array_equal(whole, again)
+    assert np.array_equal(whole[some], alone)
+
+
+def test_no_two_prints_are_alike_where_all_but_the_step_is_the_same():
+    step = steps_on("snow")[0]
+    later = replace(step, start_frame=step.start_frame + 100, end_frame=step.end_frame + 100)
+    place = around([step])
+    one, other = (all_together(relief("snow", [each], place), place.shape[1])[:, 0] for each in (step, later))
+    moved = (one != 0) & (other != 0)
+    assert np.std(one[moved] - other[moved]) > 0.5 * np.std(one[moved])
+
+
+def test_a_later_step_in_the_same_place_leaves_its_own_relief_alone_under_it():
+    step = steps_on("snow")[0]
+    later = replace(step, start_frame=step.start_frame + 100, end_frame=step.end_frame + 100)
+    place = around([step])
+    alone = all_together(relief("snow", [later], place), place.shape[1])[:, 0]
+    both = all_together(relief("snow", [step, later], place), place.shape[1])[:, 0]
+    x, y = place - step.position[:2, None]
+    middle = np.hypot(x, y) < 0.02
+    assert np.abs(both - alone)[middle].max() <= 4 * QUANTUM
+    assert np.abs(both - alone).max() > 0.002  # around it the earlier one stands
+
+
+def test_relief_grows_with_the_ramps_of_its_step_and_never_back():
+    footprints = steps_on("wet_sand")[:1]
+    place = around(footprints, 0.004)
+    found = relief("wet_sand", footprints, place)
+    sigma = MATERIALS["wet_sand"].blur_sigma
+    plain = vertex_histories(footprints, *place, blur_sigma=sigma).movement
+    with_it = vertex_histories(footprints, *place, blur_sigma=sigma, relief=found).movement
+    count = place.shape[1]
+    frames = np.arange(footprints[0].start_frame - 3, footprints[0].end_frame + 3)
+    heights, reliefs = np.stack([[a.at(f, count)[:, 0] for f in frames] for a in (plain, with_it)])
+    grown = np.abs(reliefs - heights)
+    assert (np.diff(grown, axis=0) > -4 * QUANTUM).all()
+    assert np.abs((reliefs - heights)[-1] - all_together(found, count)[:, 0]).max() <= 4 * QUANTUM
+    ramped = np.isin(np.arange(count), plain.point)
+    still = (np.diff(heights, axis=0) == 0) & (np.diff(plain_compression(plain, frames, count), axis=0) == 0)
+    assert (np.abs(np.diff(reliefs, axis=0))[still & ramped] <= QUANTUM).all()
+    assert len(with_it.point) <= len(plain.point) + (~ramped).sum()  # ramps carry it, none are added for it
+
+
+def plain_compression(movement, frames, count):
+    return np.array([movement.at(frame, count)[:, 1] for frame in frames])
+
+
+def test_off_changes_nothing_and_strength_is_a_share():
+    footprints = steps_on("mud")
+    place = around(footprints, 0.005)
+    whole = all_together(relief("mud", footprints[:1], place), place.shape[1])
+    half = all_together(relief("mud", footprints[:1], place, strength=0.5), place.shape[1])
+    assert np.abs(half - whole / 2).max() <= QUANTUM
+    assert not all_together(relief("mud", footprints, place, strength=0.0), place.shape[1]).any()
+
+
+def test_lengths_are_those_of_the_ground_and_not_of_the_foot_down_to_small_feet():
+    """A print of a tenth of the size is as ragged for its size as the grain lets it be, and stays a print."""
+    step = steps_on("snow")[0]
+    small = replace(step, cell_size=step.cell_size / 10, position=step.position / 10)
+    shrunk = small.tile(small.compression).max()
+    assert shrunk == pytest.approx(step.max_depth_m)  # cells shrink, depths do not: a deep narrow hole
+    place = around([small], SPACING / 10, 0.026)
+    found = relief("snow", [small], place, finest=SPACING / 10)
+    assert found[0].change[:, 0].std() < 1.2 * step.max_depth_m
+    assert np.isfinite(found[0].change).all()
+
+
+def test_tables_name_what_is_wrong():
+    from softground_addon.core.errors import InputError
+
+    for text, message in (
+        ("{", "no JSON"),
+        ("[]", "no table"),
+        ('{"depth": 5, "edges": {}}', "must be a table of"),
+        ('{"depth": 5, "floor": {"size": 3}}', "lacks amount"),
+        ('{"depth": 5, "floor": {"size": "a", "amount": 1}}', "must be a number"),
+        ("{}", "lacks depth"),
+    ):
+        with pytest.raises(InputError, match=message):
+            amounts.parse(text, "Relief 'x'")
