@@ -10,6 +10,7 @@ import bpy
 from . import handlers, properties, session
 from .command_line import cli
 from .ground import look
+from .importing import import_capture
 from .interface import (
     bake_result,
     character_editing,
@@ -48,6 +49,7 @@ CLASSES = (
     *event_points.CLASSES,
     *export_formats.CLASSES,
     *menus.CLASSES,
+    *import_capture.CLASSES,
     *panels.CLASSES,
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
@@ -67,7 +69,7 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
-        for part in (handlers, overlay, menus):
+        for part in (handlers, overlay, menus, import_capture):
             part.register()
             undo.callback(part.unregister)
         look_followers.append(look.follow)

@@ -1,0 +1,132 @@
+"""File > Import > Motion Capture: C3D, TRC and AMASS files as rigs that bake like any other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...core.capture import amass, c3d, trc
+from ...core.capture.captured import Capture
+from ...core.capture.joint_centres import UPWARD, CapturedBody, captured_body
+from ...core.capture.skeleton import skeleton_of
+from ...core.errors import InputError
+from ...core.files import files
+from ..operator_base import reports_errors
+from ..settings import scene_of, units_of
+from .captured_rig import new_plate, new_rig
+
+LARGEST = 2**31
+"""Size of a file that is read [bytes]."""
+
+MARKERS: dict[str, Callable[[bytes], Capture]] = {".c3d": c3d.read, ".trc": trc.read}
+"""Readers of files of markers by their suffix."""
+
+
+def read_body(path: Path, up: str | None = None) -> CapturedBody:
+    """The body in a file of motion capture.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or holds no body.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (*MARKERS, ".npz"):
+        raise InputError(
+            f'"{path.name}" is no motion capture that SoftGround reads: choose a .c3d, .trc or AMASS .npz file'
+        )
+    try:
+        content = files.read_regular(path, LARGEST)
+    except OSError as error:
+        raise InputError(f'"{path.name}" cannot be read ({error.strerror}): choose another file') from error
+    return amass.read(content) if suffix == ".npz" else captured_body(MARKERS[suffix](content), up)
+
+
+class SOFTGROUND_OT_import_capture(bpy.types.Operator):
+    """Import motion capture as a rig, at its true speed, with its force plates"""
+
+    bl_idname = "softground.import_capture"
+    bl_label = "Import Motion Capture"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(default="*.c3d;*.trc;*.npz", options={"HIDDEN"})
+    up: EnumProperty(
+        name="Up",
+        description="Axis of the file that points up",
+        items=[("AUTO", "Automatic", "From where the hips are above the feet")]
+        + [(axis, axis, f"The file's {axis} axis points up") for axis in UPWARD],
+    )
+    scene_range: BoolProperty(
+        name="Set Scene Range", description="Set the scene's first and last frame to those of the motion", default=True
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the file, unless one was dropped."""
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Read the whole file, then make the rig."""
+        path = Path(bpy.path.abspath(self.filepath))
+        body = read_body(path, None if self.up == "AUTO" else self.up)
+        skeleton = skeleton_of(body)
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        scene = scene_of(context)
+        rate = scene.render.fps / scene.render.fps_base
+        first = scene.frame_start
+
+        def frames(count: int, sampled: float) -> Any:
+            return first + np.arange(count) * rate / sampled
+
+        unit = units_of(scene).unit_scale_m
+        poses = frames(len(skeleton.poses), body.rate)
+        rig = new_rig(context, path.stem, skeleton, poses, unit)
+        for number, plate in enumerate(body.plates, start=1):
+            new_plate(context, f"{path.stem} Plate {number}", plate, frames(len(plate.force), plate.rate), unit)
+        if self.scene_range:
+            scene.frame_end = max(first, int(np.floor(poses[-1])))
+        plates = f" and {len(body.plates)} force plates" if body.plates else ""
+        self.report({"INFO"}, f'"{rig.name}": {len(poses)} poses at {body.rate:g} Hz{plates}')
+        return {"FINISHED"}
+
+
+class SOFTGROUND_FH_capture(bpy.types.FileHandler):
+    """Motion capture that is dropped into the viewport"""
+
+    bl_idname = "SOFTGROUND_FH_capture"
+    bl_label = "Motion Capture (SoftGround)"
+    bl_import_operator = "softground.import_capture"
+    bl_file_extensions = ".c3d;.trc"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Only in a viewport."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def draw_in_import_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the importer to File > Import."""
+    menu.layout.operator("softground.import_capture", text="Motion Capture (.c3d, .trc, .npz)")
+
+
+def register() -> None:
+    """Add the entry."""
+    bpy.types.TOPBAR_MT_file_import.append(draw_in_import_menu)
+
+
+def unregister() -> None:
+    """Take the entry away."""
+    bpy.types.TOPBAR_MT_file_import.remove(draw_in_import_menu)
+
+
+CLASSES = (SOFTGROUND_OT_import_capture, SOFTGROUND_FH_capture)

@@ -1,0 +1,1 @@
+"""Motion capture as laboratories record it: markers, joint centres, force plates."""

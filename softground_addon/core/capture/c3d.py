@@ -1,0 +1,254 @@
+"""C3D files: the binary format of motion laboratories, with markers and the raw channels of force plates.
+
+References
+----------
+The C3D file format, a technical user manual (c3d.org): header, parameters, frames of points and analog
+samples, in the number formats of three families of processors.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .captured import Capture, metres
+from .plates import plates_of
+
+Array = NDArray[np.float64]
+
+_BLOCK = 512
+_KEY = 0x50
+_INTEL, _DEC, _SGI = 84, 85, 86
+_LONGEST_LABEL_LIST = 256
+"""Parameters `LABELS2`, `LABELS3`, ... that go on where one list of 255 names is full."""
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """How a family of processors writes numbers."""
+
+    processor: int
+
+    @property
+    def order(self) -> str:
+        return ">" if self.processor == _SGI else "<"
+
+    def integers(self, content: bytes, *, signed: bool = True) -> Array:
+        return np.frombuffer(content, f"{self.order}{'i' if signed else 'u'}2").astype(float)
+
+    def reals(self, content: bytes) -> Array:
+        if self.processor != _DEC:
+            with np.errstate(invalid="ignore"):  # damaged numbers are told apart later
+                return np.frombuffer(content, f"{self.order}f4").astype(float)
+        # VAX F-float: the halves of an IEEE number in turn, its exponent greater by two.
+        halves = np.frombuffer(content, "<u2").reshape(-1, 2)
+        return np.ascontiguousarray(halves[:, ::-1]).view("<f4")[:, 0].astype(float) / 4
+
+
+@dataclass
+class Parameters:
+    """The parameters of a C3D file, by group and name in capitals; each is a list of texts or an array."""
+
+    values: dict[tuple[str, str], Any] = field(default_factory=dict)
+
+    def texts(self, group: str, name: str) -> list[str]:
+        """All texts of a parameter, with those of the ones that continue it."""
+        names = [name, *(f"{name}{number}" for number in range(2, _LONGEST_LABEL_LIST))]
+        found = (self.values.get((group, each), []) for each in names)
+        return [text for value in found if isinstance(value, list) for text in value]
+
+    def text(self, group: str, name: str, missing: str = "") -> str:
+        """The first text of a parameter."""
+        return next(iter(self.texts(group, name)), missing)
+
+    def array(self, group: str, name: str) -> Array:
+        """Numbers of a parameter in Fortran's order, as the manual writes them; empty where there is none."""
+        value = self.values.get((group, name))
+        return value if isinstance(value, np.ndarray) else np.zeros(0)
+
+    def number(self, group: str, name: str, missing: float = 0.0) -> float:
+        """The first number of a parameter."""
+        values = self.array(group, name)
+        return float(values.flat[0]) if values.size else missing
+
+
+def read(content: bytes) -> Capture:
+    """Markers and plates of a C3D file.
+
+    Parameters
+    ----------
+    content : bytes
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is no C3D file, is cut short, or contradicts itself.
+    """
+    try:
+        return _read(content)
+    except (struct.error, ValueError, IndexError, OverflowError) as error:
+        raise InputError(f"the C3D file is damaged ({error}): export it again") from error
+
+
+def parameters_of(content: bytes) -> Parameters:
+    """The parameters alone, such as the subject's mass; errors as `read`."""
+    try:
+        return _parameters(content)[0]
+    except (struct.error, ValueError, IndexError, OverflowError) as error:
+        raise InputError(f"the C3D file is damaged ({error}): export it again") from error
+
+
+def _read(content: bytes) -> Capture:
+    parameters, numbers = _parameters(content)
+    layout = _Layout.of(content, parameters, numbers)
+    points, analog = _frames(content, layout, numbers)
+    unit = metres(parameters.text("POINT", "UNITS", "mm") or "mm")
+    labels = parameters.texts("POINT", "LABELS")[: layout.points]
+    labels += [f"marker {number + 1}" for number in range(len(labels), layout.points)]
+    scaled = _scaled_analog(analog, parameters, layout)
+    return Capture(
+        labels=tuple(labels),
+        points=points * unit,
+        rate=layout.rate,
+        first_frame=layout.first,
+        plates=plates_of(scaled, layout.rate * layout.samples, parameters, unit),
+    )
+
+
+def _parameters(content: bytes) -> tuple[Parameters, _Numbers]:
+    """The parameter section, and how numbers are written in the file."""
+    if len(content) < 2 * _BLOCK or content[1] != _KEY:
+        raise InputError("this is no C3D file: it lacks the mark of one in its second byte")
+    start = (content[0] - 1) * _BLOCK
+    if start < 0 or start + 4 > len(content):
+        raise InputError("the C3D file is cut short before its parameters: copy or export it again")
+    numbers = _Numbers(content[start + 3])
+    if numbers.processor not in (_INTEL, _DEC, _SGI):
+        raise InputError(f"the C3D file is written for an unknown processor ({numbers.processor}): export it again")
+    end = min(len(content), start + max(content[start + 2], 1) * _BLOCK)
+    parameters, groups = Parameters(), dict[int, str]()
+    waiting: list[tuple[int, str, Any]] = []  # parameters may come before the group that they belong to
+    place = start + 4
+    while place + 4 <= end:
+        length, group = abs(struct.unpack_from("b", content, place)[0]), struct.unpack_from("b", content, place + 1)[0]
+        if length == 0 or group == 0:
+            break
+        name = content[place + 2 : place + 2 + length].decode("latin-1").strip().upper()
+        pointer = place + 2 + length
+        (further,) = struct.unpack_from(f"{numbers.order}H", content, pointer)
+        if group < 0:
+            groups[-group] = name
+        else:
+            waiting.append((group, name, _value(content, pointer + 2, numbers)))
+        if further < 2:
+            break
+        place = pointer + further
+    for group, name, value in waiting:
+        parameters.values[groups.get(group, ""), name] = value
+    return parameters, numbers
+
+
+def _value(content: bytes, place: int, numbers: _Numbers) -> Any:
+    """One parameter: texts, or an array in the order of its dimensions."""
+    kind, count = struct.unpack_from("bB", content, place)
+    shape = tuple(content[place + 2 : place + 2 + count])
+    size = int(np.prod(shape, dtype=np.int64)) if shape else 1
+    first = place + 2 + count
+    part = content[first : first + size * abs(kind)]
+    if kind not in (-1, 1, 2, 4) or len(part) < size * abs(kind):
+        raise InputError("the C3D file is damaged in its parameters: export it again")
+    if kind == -1:
+        width = shape[0] if shape else 1
+        return [part[at : at + width].decode("latin-1").strip() for at in range(0, size, width)] if width else []
+    if kind == 1:
+        values = np.frombuffer(part, np.int8).astype(float)
+    else:
+        values = numbers.integers(part) if kind == 2 else numbers.reals(part)
+    return values.reshape(shape, order="F") if shape else values
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the frames are and what each holds."""
+
+    points: int
+    channels: int
+    samples: int
+    """Analog samples of each channel in a frame."""
+    first: int
+    frames: int
+    scale: float
+    """Of whole numbers [the file's unit]; negative where the file holds reals."""
+    start: int
+    rate: float
+
+    @staticmethod
+    def of(content: bytes, parameters: Parameters, numbers: _Numbers) -> _Layout:
+        words = numbers.integers(content[:24], signed=False).astype(int)
+        scale, rate = numbers.reals(content[12:16])[0], numbers.reals(content[20:24])[0]
+        points = int(parameters.number("POINT", "USED", words[1])) & 0xFFFF
+        samples = max(int(words[9]), 1)
+        channels = int(words[2]) // samples
+        first, last = _frame_range(parameters, int(words[3]), int(words[4]))
+        start = (int(parameters.number("POINT", "DATA_START", words[8])) & 0xFFFF) - 1
+        return _Layout(
+            points,
+            channels,
+            samples,
+            first,
+            last - first + 1,
+            float(parameters.number("POINT", "SCALE", scale)),
+            start * _BLOCK,
+            float(parameters.number("POINT", "RATE", rate)),
+        )
+
+
+def _frame_range(parameters: Parameters, first: int, last: int) -> tuple[int, int]:
+    """First and last frame; beyond 65,535 they are in parameters of two words."""
+    start, end = (parameters.array("TRIAL", f"ACTUAL_{edge}_FIELD").ravel() for edge in ("START", "END"))
+    if len(start) == 2 and len(end) == 2:
+        low, high = (int(words[0]) % 65536 + 65536 * (int(words[1]) % 65536) for words in (start, end))
+        return (low, high) if high >= low else (first, last)
+    return first, last
+
+
+def _frames(content: bytes, layout: _Layout, numbers: _Numbers) -> tuple[Array, Array]:
+    """Points (F, M, 3) [the file's unit] and raw analog samples (F·samples, channels)."""
+    real = layout.scale < 0
+    width = 4 if real else 2
+    values = 4 * layout.points + layout.channels * layout.samples
+    size = layout.frames * values * width
+    section = content[layout.start : layout.start + size]
+    if layout.frames < 1 or layout.start < _BLOCK or values < 1 or len(section) < size:
+        raise InputError(
+            f"the C3D file is cut short: {layout.frames} frames of {values * width} bytes should follow, "
+            f"{max(len(section), 0)} bytes do; copy or export it again"
+        )
+    table = (numbers.reals(section) if real else numbers.integers(section)).reshape(layout.frames, values)
+    points = table[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
+    seen = (points[..., 3:] >= 0) & np.isfinite(points).all(axis=-1, keepdims=True)
+    where = np.where(seen, points[..., :3] * (1.0 if real else layout.scale), np.nan)
+    return where, table[:, 4 * layout.points :].reshape(layout.frames * layout.samples, layout.channels)
+
+
+def _scaled_analog(raw: Array, parameters: Parameters, layout: _Layout) -> Array:
+    """Analog samples in the units of their channels, (S, channels)."""
+    if not layout.channels:
+        return raw
+    if parameters.text("ANALOG", "FORMAT").upper() == "UNSIGNED" and layout.scale > 0:
+        raw = raw % 65536
+
+    def each(name: str, missing: float) -> Array:
+        values = parameters.array("ANALOG", name).ravel()[: layout.channels]
+        return np.append(values, np.full(layout.channels - len(values), missing))
+
+    offsets = each("OFFSET", 0.0)
+    if parameters.text("ANALOG", "FORMAT").upper() == "UNSIGNED":
+        offsets %= 65536
+    return (raw - offsets) * each("SCALE", 1.0) * parameters.number("ANALOG", "GEN_SCALE", 1.0)

@@ -1,0 +1,107 @@
+"""What a capture file holds, whatever its format: the paths of markers, and the force on each plate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+
+LENGTHS = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0}
+"""Units that markers come in [m]."""
+
+MOST_FRAMES_PER_SECOND = 1e5
+"""Beyond it a frame rate is none [Hz]."""
+
+
+@dataclass(frozen=True)
+class Plate:
+    """What a force plate measured, in the laboratory's axes.
+
+    Attributes
+    ----------
+    corners : (4, 3) float array
+        Of its surface [m].
+    rate : float
+        Samples per second [Hz].
+    force : (S, 3) float array
+        Of the plate on the foot, once `joint_centres.captured_body` has read it [N].
+    moment : (S, 3) float array
+        About the middle of the surface [N·m].
+    """
+
+    corners: Array
+    rate: float
+    force: Array
+    moment: Array
+
+    @property
+    def normal(self) -> Array:
+        """Unit vector perpendicular to the surface, (3,)."""
+        across = np.cross(self.corners[0] - self.corners[1], self.corners[0] - self.corners[3])
+        return np.asarray(across / np.linalg.norm(across))
+
+    def centre_of_pressure(self) -> Array:
+        """Where on the surface the force acts, (S, 3) [m]; NaN where nothing presses."""
+        pressing = self.force @ self.normal
+        with np.errstate(divide="ignore", invalid="ignore"):
+            arm = np.cross(self.normal, self.moment) / pressing[:, None]
+        return np.asarray(self.corners.mean(axis=0) + np.where(np.isfinite(arm), arm, np.nan))
+
+    def free_moment(self) -> Array:
+        """Moment about the normal at the centre of pressure, (S,) [N·m]; NaN where nothing presses."""
+        arm = self.centre_of_pressure() - self.corners.mean(axis=0)
+        return np.asarray((self.moment - np.cross(arm, self.force)) @ self.normal)
+
+
+@dataclass(frozen=True)
+class Capture:
+    """Markers over time, and the plates that were stepped on.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Names of the markers.
+    points : (F, M, 3) float array
+        Their positions in the laboratory's axes [m]; NaN where a marker was not seen.
+    rate : float
+        Frames per second [Hz].
+    first_frame : int
+        Number of the first frame.
+    plates : tuple of Plate
+    """
+
+    labels: tuple[str, ...]
+    points: Array
+    rate: float
+    first_frame: int = 1
+    plates: tuple[Plate, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.labels or not len(self.points):
+            raise InputError("the file holds no markers: record or export it with its trajectories")
+        if not (np.isfinite(self.rate) and 0 < self.rate <= MOST_FRAMES_PER_SECOND):
+            raise InputError(f"the file has a frame rate of {self.rate:g} Hz: export it again with its frame rate")
+
+
+def metres(unit: str) -> float:
+    """Length of a unit [m].
+
+    Raises
+    ------
+    InputError
+        For a unit that is not one of `LENGTHS`.
+
+    Examples
+    --------
+    >>> metres(" mm ")
+    0.001
+    """
+    try:
+        return LENGTHS[unit.strip().lower()]
+    except KeyError:
+        raise InputError(f"the file's unit of length is {unit!r}: export it in {', '.join(LENGTHS)}") from None
