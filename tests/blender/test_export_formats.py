@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree
 
 import bpy
 import numpy as np
@@ -13,7 +14,7 @@ from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.output import event_exports, export_formats, exports, image_exports
+from softground_addon.blender.output import event_exports, export_formats, exports, image_exports, opensim_exports
 from tests.blender import command_line, point_caches, shots
 from tests.blender.grounds import plane
 from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image
@@ -66,6 +67,37 @@ def test_a_mesh_comes_back_with_the_same_heights_from_beside_the_blend(scene, tm
         world = played(copy, int(min(frame, 100)))
         tolerance = {"tolerance": 1e-5} if kind == "OBJ" else {}
         assert_stands_as_recorded(ground, frame, world, **tolerance)
+
+
+def opensim_table(path):
+    """Columns of a storage file by name, as OpenSim's manual has it."""
+    head, _, rest = path.read_text().partition("endheader\n")
+    about = dict(line.split("=") for line in head.splitlines()[1:])
+    labels, *rows = rest.splitlines()
+    table = np.array([row.split("\t") for row in rows], float)
+    assert table.shape == (int(about["nRows"]), int(about["nColumns"]))
+    return dict(zip(labels.split("\t"), table.T, strict=True))
+
+
+def test_opensim_gets_the_forces_that_bear_the_body_y_up(scene, tmp_path):
+    assert bpy.ops.softground.export(filepath=str(tmp_path / "walk"), format="OPENSIM_MOT") == {"FINISHED"}
+    assert files_in(tmp_path) == ["walk.mot", "walk.xml"]
+    columns = opensim_table(tmp_path / "walk.mot")
+    loads = ElementTree.parse(tmp_path / "walk.xml").getroot()[0]
+    assert loads.findtext("datafile") == "walk.mot"
+    bodies = {force.findtext("applied_to_body"): force for force in loads.iter("ExternalForce")}
+    assert bodies.keys() == {"calcn_l", "calcn_r"}
+    vertical = {body: columns[force.findtext("force_identifier") + "y"] for body, force in bodies.items()}
+    weight = scene.softground.characters[0].mass * 9.81
+    np.testing.assert_allclose(np.mean(vertical["calcn_l"] + vertical["calcn_r"]), weight, rtol=0.1)
+    # A left foot presses on the left: OpenSim's z points right of who walks along x.
+    feet = {body: (columns[force.findtext("point_identifier") + "z"], vertical[body]) for body, force in bodies.items()}
+    left, right = (np.average(z, weights=force) for z, force in (feet["calcn_l"], feet["calcn_r"]))
+    assert abs(left - right) > 0.05
+    heights = columns[bodies["calcn_l"].findtext("point_identifier") + "y"]
+    assert np.abs(heights).max() < 0.05
+    assert bpy.ops.softground.export(filepath=str(tmp_path / "walk"), format="OPENSIM_STO") == {"FINISHED"}
+    assert opensim_table(tmp_path / "walk.sto").keys() == columns.keys()
 
 
 def test_a_point_cache_holds_the_frames_asked_for_and_plays_on_the_ground(scene, tmp_path):
@@ -162,7 +194,7 @@ def test_a_folder_that_is_missing_or_locked_is_named(scene, tmp_path, kind, monk
 def test_a_full_disk_is_named_and_leaves_the_older_file(scene, small_disk, kind, capfd):
     old = small_disk / f"ground{export_formats.FORMATS[kind].suffix}"
     old.write_bytes(b"old")
-    filled = shutil.disk_usage(small_disk).free if kind in event_exports.KINDS else 100 * 1024
+    filled = shutil.disk_usage(small_disk).free if kind in event_exports.KINDS | opensim_exports.KINDS else 100 * 1024
     with (small_disk / "filler").open("wb") as filler:
         filler.write(bytes(filled))
     options = [f"--format={kind}", f"--output={old}", "--resolution=512"]

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
 from ..operator_base import OnBake, beside_file, reports_errors
-from . import event_exports, exports, image_exports
+from . import event_exports, exports, image_exports, opensim_exports
 
 LARGEST_IMAGE = 16384
 """Most pixels along the sides of an image."""
@@ -87,6 +87,10 @@ def _events(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) 
     return [options.path]
 
 
+def _opensim(scene: bpy.types.Scene, _ground: bpy.types.Object, options: Options) -> list[Path]:
+    return opensim_exports.write(scene, options.path, options.start, options.end)
+
+
 @dataclass(frozen=True)
 class Format:
     """A kind of file that a bake can be written to.
@@ -123,6 +127,10 @@ FORMATS = {
     **{
         kind: Format(suffix, label, description, _events)
         for kind, (suffix, label, description, _) in event_exports.KINDS.items()
+    },
+    **{
+        kind: Format(suffix, label, description, _opensim)
+        for kind, (suffix, label, description) in opensim_exports.KINDS.items()
     },
 }
 """All formats: a further one is a row here."""
@@ -253,7 +261,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         written = export(
             scene, Options(self.format, path, start, end, self.resolution, self.uv_map, outdated=self.outdated)
         )
-        what = str(written[0]) if len(written) == 1 else f"{len(written)} images to {path.parent}"
+        what = str(written[0]) if len(written) == 1 else f"{len(written)} files to {path.parent}"
         self.report({"INFO"}, f"Wrote {what}")
         return {"FINISHED"}
 

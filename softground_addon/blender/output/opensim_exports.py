@@ -1,0 +1,64 @@
+"""The estimated forces of a shot as OpenSim reads them: a table for each character, and the loads that apply it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.files import files, opensim
+from ...core.loads.estimate import CharacterLoads
+from ..reading import analysis
+
+KINDS = {
+    "OPENSIM_MOT": (".mot", "OpenSim Loads (MOT)", "Forces and centres of pressure, with the external loads as XML"),
+    "OPENSIM_STO": (".sto", "OpenSim Storage (STO)", "Forces and centres of pressure as a storage file"),
+}
+"""Suffix, label and description of each kind of file."""
+
+
+def write(scene: bpy.types.Scene, path: Path, start: int, end: int) -> list[Path]:
+    """Write the forces on all soles at the simulation's time steps; with several characters a file each.
+
+    Raises
+    ------
+    InputError
+        If the shot cannot be read, or a file cannot be written.
+    """
+    everybody = analysis.read(scene).loads
+    written = []
+    for character in everybody:
+        own = f"_{bpy.path.clean_name(character.motion.name)}" if len(everybody) > 1 else ""
+        written += _write_one(character, path.with_stem(path.stem + own), start, end)
+    return written
+
+
+def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> list[Path]:
+    frames = character.motion.frames
+    shown = (frames >= start) & (frames <= end)
+    time = (frames[shown] - start) / character.motion.frame_rate
+    feet = [
+        opensim.FootForce(
+            sole.sole.name,
+            sole.sole.side,
+            character.forces.forces[shown, number],
+            np.where(
+                character.contacts.touching[shown, number, None],
+                character.forces.centre_of_pressure[shown, number],
+                np.nan,
+            ),
+        )
+        for number, sole in enumerate(character.motion.soles)
+    ]
+    _write_text(path, opensim.storage(character.motion.name, time, feet))
+    if path.suffix != ".mot":
+        return [path]
+    loads = path.with_suffix(".xml")
+    _write_text(loads, opensim.external_loads(character.motion.name, path.name, feet))
+    return [path, loads]
+
+
+def _write_text(path: Path, text: str) -> None:
+    with files.replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")

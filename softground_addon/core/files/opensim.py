@@ -1,0 +1,104 @@
+"""OpenSim's files: forces on the feet as storage (.mot, .sto), and the external loads that name them (.xml).
+
+OpenSim's axes are y up; what is north of a character here is -z there.
+
+References
+----------
+OpenSim documentation, "Motion (.mot) Files", "Storage (.sto) Files" and "External Loads" (Seth et al. 2018, "OpenSim",
+10.1371/journal.pcbi.1006223).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_BODIES = {"L": "calcn_l", "R": "calcn_r"}
+"""Bodies of OpenSim's models that a left and a right foot press on."""
+
+
+@dataclass(frozen=True)
+class FootForce:
+    """The force of the ground on one sole, Z up.
+
+    Attributes
+    ----------
+    name : str
+        Of the sole.
+    side : str
+        "L", "R" or "".
+    force : (N, 3) float array
+        [N]
+    point : (N, 3) float array
+        Where it acts [m].
+    """
+
+    name: str
+    side: str
+    force: Array
+    point: Array
+
+    @property
+    def identifier(self) -> str:
+        """What its columns begin with: letters, digits and underscores.
+
+        Examples
+        --------
+        >>> FootForce("foot.L", "L", np.zeros((1, 3)), np.zeros((1, 3))).identifier
+        'ground_foot_L'
+        """
+        return "ground_" + "".join(letter if letter.isalnum() else "_" for letter in self.name)
+
+
+def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
+    """A storage file: time, and force and point of each sole.
+
+    Parameters
+    ----------
+    name : str
+        Of the table, in its first line.
+    time : (N,) float array
+        [s]
+    feet : sequence of FootForce
+    """
+    labels, columns = ["time"], [time[:, None]]
+    for foot in feet:
+        for kind, values in (("v", foot.force), ("p", np.where(np.isfinite(foot.point), foot.point, 0.0))):
+            labels += [f"{foot.identifier}_{kind}{axis}" for axis in "xyz"]
+            columns.append(_y_up(values))
+    table = np.concatenate(columns, axis=1)
+    head = [name, "version=1", f"nRows={len(table)}", f"nColumns={len(labels)}", "inDegrees=yes", "endheader"]
+    rows = ["\t".join(f"{value:.6f}" for value in row) for row in table.tolist()]
+    return "\n".join([*head, "\t".join(labels), *rows, ""])
+
+
+def external_loads(name: str, storage_file: str, feet: Sequence[FootForce]) -> str:
+    """The external loads that apply a storage file to the feet of a model; soles of no side to bodies of their name."""
+    document = ElementTree.Element("OpenSimDocument", Version="40000")
+    loads = ElementTree.SubElement(document, "ExternalLoads", name=name)
+    objects = ElementTree.SubElement(loads, "objects")
+    for foot in feet:
+        force = ElementTree.SubElement(objects, "ExternalForce", name=foot.identifier)
+        for tag, text in (
+            ("applied_to_body", _BODIES.get(foot.side, foot.name)),
+            ("force_expressed_in_body", "ground"),
+            ("point_expressed_in_body", "ground"),
+            ("force_identifier", f"{foot.identifier}_v"),
+            ("point_identifier", f"{foot.identifier}_p"),
+        ):
+            ElementTree.SubElement(force, tag).text = text
+    ElementTree.SubElement(loads, "groups")
+    ElementTree.SubElement(loads, "datafile").text = storage_file
+    ElementTree.indent(document, "\t")
+    return '<?xml version="1.0" encoding="UTF-8" ?>\n' + ElementTree.tostring(document, encoding="unicode") + "\n"
+
+
+def _y_up(vectors: Array) -> Array:
+    """Vectors (N, 3) in OpenSim's axes."""
+    return np.stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]], axis=1)
