@@ -1,4 +1,4 @@
-"""Measured trials: joint centres and plate forces from CSV, as the motion that the core reads."""
+"""Measured trials: joint centres and plate forces from CSV or C3D, as the motion that the core reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from softground_addon.core.capture import c3d
+from softground_addon.core.capture.captured import Plate
+from softground_addon.core.capture.joint_centres import CapturedBody, captured_body
 from softground_addon.core.motion.motion import JOINTS, CharacterMotion, Sole, SoleMotion
+from softground_addon.core.numerics.intervals import runs
 
 Array = NDArray[np.float64]
 
@@ -17,6 +21,10 @@ SIDES = ("l", "r")
 LANDMARKS = ("heel", "ball", "toe")
 CSV_JOINTS = {"mid_hip": "hips"}
 """Joints that the files call otherwise than `JOINTS`."""
+MASSES = ("BODYMASS", "MASS", "WEIGHT")
+"""Parameters of a C3D file that hold the subject's mass [kg]."""
+LOADED = 20.0
+"""Vertical force at which a plate is stepped on [N]."""
 KINDS = {"walk": "walk", "run": "run", "dj": "drop jump", "jump": "jump", "squat": "squat", "sts": "chair"}
 """Kinds of motion by a word in a trial's name; where there is none, the name says nothing ("other")."""
 
@@ -76,6 +84,59 @@ def read_trial(csv: Path) -> Trial:
         np.nan_to_num(np.stack([vectors(f"grf_{side}") for side in SIDES], axis=1)),
         csv.with_suffix(".bvh"),
     )
+
+
+def read_c3d(path: Path) -> Trial:
+    """The trial in a C3D file with markers and plates; a `NAME.json` beside it with `mass_kg` comes before its own.
+
+    A plate that is stepped on is taken to bear the foot that is nearest to its centre of pressure during that step.
+    """
+    content = path.read_bytes()
+    body = captured_body(c3d.read(content))
+    return Trial(
+        path.stem, _mass(path, content), body.rate, body.joints, _forces_on_feet(body), path.with_suffix(".bvh")
+    )
+
+
+def _mass(path: Path, content: bytes) -> float:
+    """Body mass [kg] by the file beside the trial, else by the trial's parameters."""
+    about = path.with_suffix(".json")
+    if about.exists():
+        return float(json.loads(about.read_text())["mass_kg"])
+    values = c3d.parameters_of(content).values
+    masses = [value for (_, name), value in values.items() if name in MASSES and isinstance(value, np.ndarray)]
+    if not masses or not masses[0].size or not masses[0].flat[0] > 0:
+        raise SystemExit(f'{path} does not say how heavy its subject is: write {{"mass_kg": ...}} to {about}')
+    return float(masses[0].flat[0])
+
+
+def _forces_on_feet(body: CapturedBody) -> Array:
+    """Force of the plates on the left and the right foot at the frames of the markers, (F, 2, 3) [N]."""
+    count = len(body.joints["heel_l"])
+    forces = np.zeros((count, len(SIDES), 3))
+    for plate in body.plates:
+        force, centre = _at_frames(plate, body.rate, count)
+        for first, last in zip(*runs(force[:, 2] > LOADED), strict=True):
+            step = slice(first, last)
+            foot = np.argmin([np.nanmean(_distance(body, side, centre[step], step)) for side in SIDES])
+            forces[step, foot] += force[step]
+    return forces
+
+
+def _at_frames(plate: Plate, rate: float, count: int) -> tuple[Array, Array]:
+    """Force [N] and centre of pressure [m] of a plate, its samples averaged over each frame, (F, 3) each."""
+    samples = max(round(plate.rate / rate), 1)
+    frames = [
+        values[: count * samples].reshape(count, samples, 3).mean(axis=1) for values in (plate.force, plate.moment)
+    ]
+    averaged = Plate(plate.corners, rate, *frames)
+    return averaged.force, averaged.centre_of_pressure()
+
+
+def _distance(body: CapturedBody, side: str, place: Array, step: slice) -> Array:
+    """Along the ground from the middle of a foot, (F,) [m]."""
+    middle = (body.joints[f"heel_{side}"][step] + body.joints[f"ball_{side}"][step]) / 2
+    return np.asarray(np.linalg.norm((place - middle)[:, :2], axis=1))
 
 
 def _bridged(path: Array) -> Array:

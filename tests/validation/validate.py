@@ -1,7 +1,8 @@
 """Both force models against force plates: `python -m tests.validation.validate DIR` prints a table.
 
-Every trial of DIR (three files each, see `trials.read_trial`) is estimated twice: from its joint centres, and from
-its BVH through Blender with the automatic set-up. Writes build/validation.json and one plot for each trial and path.
+Every trial of DIR (C3D, or three files each, see `trials.read_trial`) is estimated from its joint centres, and where it
+has a BVH from that through Blender with the automatic set-up. Writes build/validation.json and one plot for each trial
+and path.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.plots import plot_trial
 from tests.validation.scoring import plates_saw_everything, score
 from tests.validation.through_blender import motion_of_bvh
-from tests.validation.trials import Trial, motion_of_trial, read_trial
+from tests.validation.trials import Trial, motion_of_trial, read_c3d, read_trial
 
 Array = NDArray[np.float64]
 
@@ -60,12 +61,15 @@ HEADINGS = (
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("directory", type=Path, help="folder of trials: NAME.csv, NAME.json, NAME.bvh")
+    parser.add_argument("directory", type=Path, help="folder of trials: NAME.c3d, or NAME.csv, NAME.json, NAME.bvh")
     parser.add_argument("--output", type=Path, default=Path("build"), help="folder for validation.json and the plots")
     options = parser.parse_args()
     trials = [read_trial(csv) for csv in sorted(options.directory.glob("*.csv"))]
+    trials += [read_c3d(file) for file in sorted(options.directory.glob("*.[cC]3[dD]"))]
     if not trials:
-        parser.error(f"{options.directory} holds no trial: give a folder with NAME.csv, NAME.json and NAME.bvh files")
+        parser.error(
+            f"{options.directory} holds no trial: give a folder of C3D files, or of NAME.csv, .json and .bvh files"
+        )
     options.output.mkdir(parents=True, exist_ok=True)
     rows = [row for trial in trials for row in validate(trial, options.output)]
     (options.output / "validation.json").write_text(json.dumps(rows, indent=1))
