@@ -13,15 +13,16 @@ from .errors import InputError
 from .ground.heightfield import HeightField, Window
 from .ground.soft_ground import SoftGround
 from .loads.estimate import CharacterLoads
-from .motion.motion import SoleMotion
+from .motion.motion import Sole, SoleMotion
 from .numerics.intervals import runs
-from .pressing.contact_layout import ContactLayout, Steps
+from .pressing.contact_layout import ContactLayout
 from .pressing.ground_cells import Timing, UndisturbedCells
 from .pressing.open_contact import OpenContact
 from .pressing.prop_layout import PropLayout
 from .pressing.sole_layout import SoleLayout
-from .pressing.sole_points import SolePoints, sole_points
+from .pressing.sole_points import SolePoints, flat_pose, sole_points
 from .pressing.solver import GroundSolver
+from .record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
 from .record.footprints import Footprint
 
 Array = NDArray[np.float64]
@@ -33,6 +34,9 @@ LONGEST_SLIDE = 0.25
 """How far a foot slides within one print, in body heights: further on, it is another place that it prints, ..."""
 SHORTEST_SLIDE = 0.08
 """... if it takes as long for it [s]."""
+
+MOST_VERTICES = 20_000
+"""Most vertices of a contact shape that is kept with its prints, so that they can be moved."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,9 @@ class _Waiting:
             contact = self._contacts.popleft()
             earlier = self._latest.get(contact.of)
             goes_on = earlier is not None and earlier.layout.end == contact.since
-            opened = self._latest[contact.of] = OpenContact(contact.layout(self._frames), earlier if goes_on else None)
+            layout = contact.layout(self._frames)
+            opened = OpenContact(layout, earlier if goes_on else None, contact.kept(layout.steps))
+            self._latest[contact.of] = opened
             yield opened
 
 
@@ -178,6 +184,8 @@ class _Contact:
         Steps of the time grid from which it touches, and presses.
     points : SolePoints or None
         Of the sole, None of a prop.
+    pressing : PressingSole or None
+        What is kept of the sole; None of one that is too large for that.
     """
 
     character: CharacterLoads
@@ -186,6 +194,11 @@ class _Contact:
     since: int
     first: int
     points: SolePoints | None
+    pressing: PressingSole | None
+
+    def kept(self, steps: Steps) -> ContactSteps | None:
+        """What its footprint keeps of its steps."""
+        return kept_steps(self.pressing, steps, self.character.motion.time_step) if self.pressing else None
 
     def layout(self, frames: Array) -> ContactLayout:
         """How it is laid out, at steps of the time grid that are at these scene frames."""
@@ -206,6 +219,10 @@ class _Contact:
         return SoleLayout(motion.name, sole, steps, self.points)
 
 
+def _is_kept(sole: Sole) -> bool:
+    return sole.prop is None or len(sole.prop.vertices) <= MOST_VERTICES
+
+
 def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
     """The contacts of a sole of a character, which appears at a step of the time grid."""
     motion = character.motion.soles[index]
@@ -219,10 +236,13 @@ def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -
         )
     )
     points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.prop else None
+    pressing = kept_sole(motion.sole, flat_pose(motion.transforms)) if tracks and _is_kept(motion.sole) else None
     for since, end in tracks:
         begin = max(since, 1 - offset)  # the first step of the grid is a state, it presses nothing
         if begin < end:
-            yield _Contact(character, (number, index), slice(begin, end), since + offset, begin + offset, points)
+            yield _Contact(
+                character, (number, index), slice(begin, end), since + offset, begin + offset, points, pressing
+            )
 
 
 def _tracks(

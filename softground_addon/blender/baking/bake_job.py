@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.events import events
+from ...core.edited_steps import with_edits
 from ...core.files import report
 from ...core.findings import Finding
 from ...core.ground_plan import GroundPlan
@@ -27,6 +27,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.record import record
+from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.self_check import self_check
@@ -63,7 +64,13 @@ class BakeResult:
     footprints: tuple[Footprint, ...]
 
 
-def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | None = None) -> Job[BakeResult]:
+def bake(
+    scene: bpy.types.Scene,
+    *,
+    write: bool = True,
+    wanted: BakeSettings | None = None,
+    edits: Mapping[str, StepEdit] | None = None,
+) -> Job[BakeResult]:
     """Bake the scene's characters into its ground.
 
     Without a ground in the settings, one is created that fits the walk.
@@ -75,6 +82,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         False computes and reports only, and changes nothing.
     wanted : BakeSettings, optional
         What to do, from `shots.settings_of`; by default what the scene's settings say as the bake begins.
+    edits : mapping of step id to StepEdit, optional
+        What is changed of single steps; by default what was changed of those of the bake that is on the ground.
 
     Raises
     ------
@@ -94,12 +103,15 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     shot_hash = yield from meanwhile(Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, vertices))
     sampled = time.perf_counter()
 
-    loads, footprints, forces, responses = yield from _press(wanted, shot)
+    if edits is None:
+        edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
+    loads, left, forces, responses = yield from _press(wanted, shot, edits)
+    footprints = left.footprints
     simulated = time.perf_counter()
 
     gaps = response_job.gap_table(responses)
     if gaps is None:
-        gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, footprints)
+        gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, left.edited)
     layers = (yield from response_job.layers_of(wanted, shot.rigs, responses)) if write else []
     inputs = wanted.inputs()
     if surface and surface.factors is not None:
@@ -108,6 +120,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     ground_name = wanted.ground.name if wanted.ground else "the ground"
     checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
     findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving]
+    findings += bake_report.edit_findings(left)
     of_responses = response_job.findings(responses)
     happened = events(loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     build_report = partial(
@@ -115,6 +128,8 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
         inputs=inputs,
         input_hash=input_hash,
         footprints=footprints,
+        pressed_again=left.pressed_again,
+        edits=left.edits,
         offsets_mm=bake_report.offsets_mm(loads),
         forces=forces,
         gaps_mm=gaps,
@@ -129,7 +144,7 @@ def bake(scene: bpy.types.Scene, *, write: bool = True, wanted: BakeSettings | N
     written: _Written | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        written = yield from _write(scene, wanted, shot, footprints, about, sole_length)
+        written = yield from _write(scene, wanted, shot, replace(left, about=about), sole_length)
         findings += written.findings
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
@@ -167,8 +182,7 @@ def _write(
     scene: bpy.types.Scene,
     wanted: BakeSettings,
     shot: Shot,
-    footprints: Sequence[Footprint],
-    about: dict[str, Any],
+    left: record.BakeRecord,
     sole_length: float,
 ) -> Job[_Written]:
     """Put the prints on the ground, all of them in the last step.
@@ -179,14 +193,11 @@ def _write(
     wanted : BakeSettings
     shot : Shot
         Of its ground; the motions are not needed.
-    footprints : sequence of Footprint
-    about : dict
-        What is stored with them; its inputs are told the name of a ground that is created.
+    left : BakeRecord
+        The inputs that it is about are told the name of a ground that is created.
     sole_length : float
         Of the shortest sole [m].
     """
-    edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
-    left = record.BakeRecord(footprints, about, edits)
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(left.edited, **at_the_end(wanted))
@@ -198,7 +209,7 @@ def _write(
         if shot.surface is None:
             assert shot.plan is not None
             place = yield from _created(drafts, scene, wanted, shot.plan, trail)
-            about["inputs"]["ground"] = place.display_mesh.name
+            left.about["inputs"]["ground"] = place.display_mesh.name
         else:
             place, findings = yield from _given(drafts, wanted, shot, shot.surface, trail, sole_length)
         del trail
@@ -265,9 +276,11 @@ def _given(
 
 
 def _press(
-    wanted: BakeSettings, shot: Shot
-) -> Job[tuple[list[CharacterLoads], list[Footprint], dict[str, object] | None, list[response_job.CharacterResponse]]]:
-    """Loads, footprints and, on request, forces of a shot, and how its characters answer.
+    wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit]
+) -> Job[
+    tuple[list[CharacterLoads], record.BakeRecord, dict[str, object] | None, list[response_job.CharacterResponse]]
+]:
+    """Loads, footprints and, on request, forces of a shot, and how its characters answer to the edited steps.
 
     Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
     lean that the pressed ground gives is the lean that pressed it.
@@ -281,15 +294,24 @@ def _press(
     leaning = None
     for _ in range(response_job.LEAN_PASSES):
         before = leaning
-        leaning = yield from response_job.leaning(loads, standing, shot.terrain, footprints, asked)
+        left = _edited(wanted, shot, footprints, edits)
+        leaning = yield from response_job.leaning(loads, standing, shot.terrain, left.edited, asked)
         if not response_job.leans_anew(leaning, before):
             break
         known = list(zip(before.motions if before else standing, loads, strict=True))
         loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions), known)
         footprints, forces = yield from _simulate(wanted, shot, loads)
     check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
-    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, footprints, asked)
-    return loads, footprints, forces, responses
+    left = _edited(wanted, shot, footprints, edits)
+    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, left.edited, asked)
+    return loads, left, forces, responses
+
+
+def _edited(
+    wanted: BakeSettings, shot: Shot, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
+) -> record.BakeRecord:
+    left = record.BakeRecord(footprints, {})
+    return with_edits(left, edits, ground_of(wanted, shot), wanted.cell_size_m) if edits else left
 
 
 def _simulate(

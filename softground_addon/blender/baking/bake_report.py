@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.findings import Finding
 from ...core.loads.estimate import CharacterLoads
+from ...core.record.edits import without_step
 from ...core.record.footprints import Footprint
+from ...core.record.record import BakeRecord
 from .. import settings
 from ..ground import ground_mesh, still_ground
 from ..jobs import STAGES
@@ -40,6 +42,20 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
             f"at frame {frame}, where the bake starts.",
             "Apply the modifier at the frame that is wanted, or switch it off.",
         )
+    ]
+
+
+def edit_findings(left: BakeRecord) -> list[Finding]:
+    """Which of the artist's edits have lost their step."""
+    return [
+        Finding(
+            "edit_without_step",
+            "warning",
+            f"The edit of step '{name}' has no step any more: nothing of that character, with that foot, touches the "
+            "ground at its frame.",
+            "It is kept for when the step comes back; reset it to drop it.",
+        )
+        for name in without_step(left.footprints, left.edits)
     ]
 
 

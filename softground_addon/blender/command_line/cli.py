@@ -20,6 +20,8 @@ from ...batch.manifest import BatchShot
 from ...core.errors import BakeError, InputError, SoftGroundError
 from ...core.files import files, report
 from ...core.ground import presets
+from ...core.record.archive import LARGEST_TEXT
+from ...core.record.edits import StepEdit, from_json
 from .. import jobs, settings
 from ..baking import bake_job
 from ..characters.selection import set_up_automatically
@@ -136,6 +138,7 @@ def _bake(options: argparse.Namespace) -> None:
     scene = _scene(options.scene)
     target = _save_target(options)
     _check_places(options, target)
+    edits = _edits(options.edits) if options.edits else None
     set_up_automatically(scene)
     if options.preset:
         settings.apply_preset(scene, _preset(options.preset))
@@ -146,7 +149,7 @@ def _bake(options: argparse.Namespace) -> None:
     for path, value in options.overrides:
         settings.assign(scene.softground, path, value)
     show = _ending_with(options.parent, _PROGRESS[options.progress])
-    result = jobs.run(bake_job.bake(scene, write=not options.dry_run), show)
+    result = jobs.run(bake_job.bake(scene, write=not options.dry_run, edits=edits), show)
     _write_results(options, target, result.report, read)
     if options.progress == "json":
         said = {"stage": "done", "fraction": 1.0, "overall": 1.0, "totals": result.report["totals"]}
@@ -193,6 +196,8 @@ def _files_read(options: argparse.Namespace) -> list[Path]:
     paths = [bpy.path.abspath(path, library=library) for path, library in linked]
     if options.preset and options.preset.lower().endswith(".json"):
         paths.append(options.preset)
+    if options.edits:
+        paths.append(str(options.edits))
     return [Path(os.path.realpath(path)) for path in (bpy.data.filepath, *paths) if path]
 
 
@@ -238,6 +243,25 @@ def _scene(name: str | None) -> bpy.types.Scene:
         known = ", ".join(f"'{scene.name}'" for scene in bpy.data.scenes)
         raise InputError(f"There is no scene '{name}' in the shot. There are: {known}.")
     return scene
+
+
+def _edits(path: Path) -> dict[str, StepEdit]:
+    """The edits of steps in a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or says what cannot be meant.
+    """
+    try:
+        if path.stat().st_size > LARGEST_TEXT:
+            raise InputError(f"'{path}' is too large for edits of steps: give a file as the bake's report names steps.")
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"The edits '{path}' cannot be read: {error.strerror}.") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"The edits '{path}' are no JSON: {error}.") from None
+    return from_json(content, f"The edits '{path}'")
 
 
 def _preset(name_or_path: str) -> presets.Preset:

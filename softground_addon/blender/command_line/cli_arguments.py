@@ -63,6 +63,7 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
         "--set", dest="overrides", action="append", default=[], type=_override, metavar="PATH=VALUE",
         help="a setting under scene.softground, e.g. material.youngs_modulus=4e5; may be repeated",
     )  # fmt: skip
+    bake.add_argument("--edits", type=Path, metavar="FILE.json", help="changes of single steps, by the report's ids")
     destination = bake.add_mutually_exclusive_group()
     destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the baked shot under this name")
     destination.add_argument("--in-place", action="store_true", help="save the baked shot over the opened file")

@@ -6,13 +6,14 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
-from ..record.edits import step_id
+from ..record.edits import StepEdit, edit_as_json, edits_by_number, step_id
 from ..record.footprints import Footprint
 
 SCHEMA_VERSION = 1
@@ -23,6 +24,8 @@ def build(
     inputs: Mapping[str, object],
     input_hash: str,
     footprints: Sequence[Footprint],
+    pressed_again: Mapping[int, Footprint | None] = MappingProxyType({}),
+    edits: Mapping[str, StepEdit] = MappingProxyType({}),
     offsets_mm: Mapping[str, Mapping[str, float]],
     timings: Mapping[str, float],
     playback_error_m: float | None = None,
@@ -42,7 +45,9 @@ def build(
     input_hash : str
         From `hash_inputs`: equal for bakes with equal inputs.
     footprints : sequence of Footprint
-        In the order of their first contact.
+        In the order of their first contact, as they were baked.
+    pressed_again, edits
+        Of the `BakeRecord`: what stands for some of them, and why. Steps of which nothing is left have `left_out`.
     offsets_mm : mapping of character to (sole to mm)
         Constant float (positive) or sink of the source animation that was taken out of each sole.
     timings : mapping
@@ -62,33 +67,23 @@ def build(
     events : sequence of mapping
         From `core.after.events`.
     """
-    steps: list[dict[str, Any]] = [
-        {
-            "id": step_id(footprint),
-            "contact": footprint.sole,
-            "character": footprint.character,
-            "frame_start": round(float(footprint.start_frame), 3),
-            "frame_end": round(float(footprint.end_frame), 3),
-            "position": [round(float(value), 5) for value in footprint.position],
-            "area_m2": float(footprint.area_m2),
-            "peak_force_n": float(footprint.peak_force_n),
-            "max_depth_m": float(footprint.max_depth_m),
-            "compressed_m3": float(footprint.compressed_m3),
-            "rim_m3": float(footprint.rim_m3),
-        }
-        for footprint in footprints
+    changes = edits_by_number(footprints, edits)
+    steps = [
+        _step(footprint, pressed_again.get(number, footprint), changes.get(number))
+        for number, footprint in enumerate(footprints)
     ]
+    counted = [step for step in steps if not step.get("left_out")]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
         "input_hash": input_hash,
         "steps": steps,
         "totals": {
-            "steps": len(steps),
-            "peak_force_n": max((step["peak_force_n"] for step in steps), default=0.0),
-            "max_depth_m": max((step["max_depth_m"] for step in steps), default=0.0),
-            "compressed_m3": sum(step["compressed_m3"] for step in steps),
-            "rim_m3": sum(step["rim_m3"] for step in steps),
+            "steps": len(counted),
+            "peak_force_n": max((step["peak_force_n"] for step in counted), default=0.0),
+            "max_depth_m": max((step["max_depth_m"] for step in counted), default=0.0),
+            "compressed_m3": sum(step["compressed_m3"] for step in counted),
+            "rim_m3": sum(step["rim_m3"] for step in counted),
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},
@@ -106,6 +101,29 @@ def build(
     if forces is not None:
         report["forces"] = dict(forces)
     return report
+
+
+def _step(baked: Footprint, left: Footprint | None, edit: StepEdit | None) -> dict[str, Any]:
+    """What the report says of a step, as it was left; where nothing is, as it was baked."""
+    footprint = left or baked
+    step: dict[str, Any] = {
+        "id": step_id(baked),
+        "contact": footprint.sole,
+        "character": footprint.character,
+        "frame_start": round(float(footprint.start_frame), 3),
+        "frame_end": round(float(footprint.end_frame), 3),
+        "position": [round(float(value), 5) for value in footprint.position],
+        "area_m2": float(footprint.area_m2),
+        "peak_force_n": float(footprint.peak_force_n),
+        "max_depth_m": float(footprint.max_depth_m),
+        "compressed_m3": float(footprint.compressed_m3),
+        "rim_m3": float(footprint.rim_m3),
+    }
+    if edit is not None:
+        step["edit"] = edit_as_json(edit)
+    if left is None:
+        step["left_out"] = True
+    return step
 
 
 def summary(report: Mapping[str, Any]) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Window
 from ..motion.motion import Sole
+from ..record.contact_steps import Steps
 from .ground_cells import GroundCells, Imprints, Timing
 from .rim import lean_of_landing, leaning
 
@@ -23,35 +24,6 @@ LARGEST_SPREAD = 4
 """Nor does a sliding sole's window grow beyond so many times that of the sole at rest."""
 
 
-@dataclass(frozen=True)
-class Steps:
-    """What a sole does at N steps in a row.
-
-    Attributes
-    ----------
-    first : int
-        Number of the first of them.
-    frames : (N,) float array
-        Scene frame of each.
-    poses : (N, P, 4, 4) float array
-        Of the sole's patches.
-    approach : (K, P, 4, 4) float array
-        Those of one or two steps before.
-    forces, normals : (N, 3) float arrays
-        Ground reaction force [N] and the ground's unit normal.
-    centres : (N, 3) float array
-        Centre of pressure [m].
-    """
-
-    first: int
-    frames: Array
-    poses: Array
-    approach: Array
-    forces: Array
-    normals: Array
-    centres: Array
-
-
 class ContactLayout(ABC):
     """One sole from touching down to leaving, as it is laid out on the cells of the ground.
 
@@ -63,6 +35,8 @@ class ContactLayout(ABC):
     sole : Sole
     steps : Steps
         All of the contact.
+    strength : float
+        Its compression over what the loads lead to.
 
     Attributes
     ----------
@@ -74,8 +48,8 @@ class ContactLayout(ABC):
         Which way the rim leans at each step; see `rim.leaning`.
     """
 
-    def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
-        self.character, self.sole, self.steps = character, sole, steps
+    def __init__(self, character: str, sole: Sole, steps: Steps, *, strength: float = 1.0) -> None:
+        self.character, self.sole, self.steps, self.strength = character, sole, steps, strength
         self.first, self.end = steps.first, steps.first + len(steps.frames)
         self.force = np.maximum(np.einsum("ni,ni->n", steps.forces, steps.normals), 0.0)
         self._landing_drop = landing_drop(sole, np.concatenate([steps.approach, steps.poses[:1]]), steps.normals[0])
@@ -102,7 +76,18 @@ class ContactLayout(ABC):
         while last > end and (window.cells > allowed or window.cells * (last - start) > most):
             last = end + (last - end) // (2 * per_frame) * per_frame
             window = self._window(start, last, cells)
-        return self._lay_out(start, last, window, cells, timing.step, sinkage)
+        return self._deeper(self._lay_out(start, last, window, cells, timing.step, sinkage), cells)
+
+    def window(self, cells: GroundCells) -> Window:
+        """The cells that the whole contact may change, but for ground that slides."""
+        return self._window(self.first, self.end, cells)
+
+    def _deeper(self, imprints: Imprints, cells: GroundCells) -> Imprints:
+        """The imprints with `strength` times their compression, as far as the layer is deep."""
+        if self.strength == 1.0:
+            return imprints
+        deepest = cells.material.layer_depth * (imprints.factors.depth if imprints.factors else 1.0)
+        return replace(imprints, target=np.minimum(imprints.target * self.strength, deepest))
 
     def heading(self, step: int) -> float:
         """Direction of the toes at a step of the contact, counter-clockwise from world x [rad]."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import SparseGrid
+from ..record.contact_steps import ContactSteps
 from ..record.footprints import Footprint, FootprintRecorder
 from .contact_layout import ContactLayout
 from .ground_cells import GroundCells, Imprints, Timing
@@ -21,6 +22,8 @@ class OpenContact:
     layout : ContactLayout
     earlier : OpenContact, optional
         The contact that this one goes on from without leaving the ground, where a long track is cut into several.
+    pressed_by : ContactSteps, optional
+        What its footprint keeps of it.
 
     Attributes
     ----------
@@ -32,8 +35,10 @@ class OpenContact:
         Volumes that it compressed and raised, and that found no place to rise [m³].
     """
 
-    def __init__(self, layout: ContactLayout, earlier: OpenContact | None = None) -> None:
-        self.layout, self.earlier = layout, earlier
+    def __init__(
+        self, layout: ContactLayout, earlier: OpenContact | None = None, pressed_by: ContactSteps | None = None
+    ) -> None:
+        self.layout, self.earlier, self.pressed_by = layout, earlier, pressed_by
         self.recorder: FootprintRecorder | None = None
         self.compression: SparseGrid | None = None
         self.compressed = self.raised = self.unplaced = 0.0
@@ -77,4 +82,5 @@ class OpenContact:
             unplaced_rim_m3=self.unplaced,
             load_frames=frames,
             load_n=layout.force,
+            pressed_by=self.pressed_by,
         )

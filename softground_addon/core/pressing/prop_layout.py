@@ -14,7 +14,8 @@ from ..ground.variation import Factors, layer_factors
 from ..motion.motion import Sole
 from ..motion.props import Prop
 from ..numerics.interpolation import turning
-from .contact_layout import ContactLayout, Steps
+from ..record.contact_steps import Steps
+from .contact_layout import ContactLayout
 from .deformation import compression_rate
 from .ground_cells import GroundCells, Imprints, Loads
 from .indentation import stress
@@ -45,10 +46,10 @@ class PropLayout(ContactLayout):
         All of the contact.
     """
 
-    def __init__(self, character: str, sole: Sole, steps: Steps) -> None:
+    def __init__(self, character: str, sole: Sole, steps: Steps, *, strength: float = 1.0) -> None:
         assert sole.prop is not None, sole.name
         self.prop: Prop = sole.prop
-        super().__init__(character, sole, steps)
+        super().__init__(character, sole, steps, strength=strength)
         poses, outer = steps.poses[:, 0], self.prop.probes.T
         extent = np.zeros((2, len(poses), 2))
         for k, pose in enumerate(poses):

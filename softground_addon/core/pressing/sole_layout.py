@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from ..ground.heightfield import Window
 from ..ground.variation import layer_factors
 from ..motion.motion import Sole
-from .contact_layout import ContactLayout, Steps
+from ..record.contact_steps import Steps
+from .contact_layout import ContactLayout
 from .deformation import Sinking, compression_rate, sink, target_compression, touching_fraction
 from .ground_cells import GroundCells, Imprints, Loads
 from .pressure import pressure_field
@@ -32,9 +33,9 @@ class SoleLayout(ContactLayout):
         Of that sole.
     """
 
-    def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints) -> None:
+    def __init__(self, character: str, sole: Sole, steps: Steps, points: SolePoints, *, strength: float = 1.0) -> None:
         self.points = points
-        super().__init__(character, sole, steps)
+        super().__init__(character, sole, steps, strength=strength)
 
     def _window(self, start: int, end: int, cells: GroundCells) -> Window:
         window = contact_window(self.points, self.steps.poses[start - self.first : end - self.first], cells.cell_size)

@@ -108,12 +108,7 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
     transforms : (F, P, 4, 4) float array
         Its motion, to know how its patches lie to each other when the sole is flat.
     """
-
-    def alignment(steps: slice) -> Array:
-        rotation = transforms[steps][..., :3, :3]
-        return np.einsum("fji,fpji->f", rotation[:, 0], rotation)  # traces of the rotations between the patches
-
-    flat = transforms[int(in_stretches(alignment, len(transforms)).argmax())]
+    flat = flat_pose(transforms)
     patches: list[PatchPoints] = []
     for number, patch in enumerate(sole.patches):
         points = _patch_points(patch)
@@ -126,6 +121,17 @@ def sole_points(sole: Sole, transforms: Array) -> SolePoints:
         used = free > 0
         patches.append(PatchPoints(points.positions[used], points.normals[used], free[used]))
     return SolePoints(tuple(patches), float(np.ptp(sole.outline, axis=0).max()))
+
+
+def flat_pose(transforms: Array) -> Array:
+    """Poses (P, 4, 4) of a sole's patches where it is flattest, of a motion (F, P, 4, 4)."""
+
+    def alignment(steps: slice) -> Array:
+        rotation = transforms[steps][..., :3, :3]
+        return np.einsum("fji,fpji->f", rotation[:, 0], rotation)  # traces of the rotations between the patches
+
+    flattest: Array = transforms[int(in_stretches(alignment, len(transforms)).argmax())]
+    return flattest
 
 
 def reach(points: SolePoints, transforms: Array) -> tuple[Array, Array]:

@@ -56,17 +56,30 @@ def step_id(footprint: Footprint) -> str:
 
 def edit_of(footprint: Footprint, edits: Mapping[str, StepEdit]) -> StepEdit:
     """What the artist changed of a step; where several edits belong to it, the one nearest to its middle."""
+    name = _key_of(footprint, edits)
+    return edits[name] if name is not None else UNCHANGED
+
+
+def _key_of(footprint: Footprint, edits: Mapping[str, StepEdit]) -> str | None:
+    """The id under which a step's edit stands."""
     who, middle = _who(footprint), _middle(footprint)
-    of_sole = {
-        float(frame): edit for name, edit in edits.items() for key, _, frame in [name.rpartition("@")] if key == who
-    }
+    of_sole = {float(frame): name for name in edits for key, _, frame in [name.rpartition("@")] if key == who}
     meant = [frame for frame in of_sole if footprint.start_frame <= frame <= footprint.end_frame or frame == middle]
-    return of_sole[min(meant, key=lambda frame: abs(frame - middle))] if meant else UNCHANGED
+    return of_sole[min(meant, key=lambda frame: abs(frame - middle))] if meant else None
 
 
-def edited(footprints: Iterable[Footprint], edits: Mapping[str, StepEdit]) -> list[Footprint]:
-    """The footprints that the ground is made from."""
-    return [footprint for footprint in footprints if not edit_of(footprint, edits).mute]
+def edits_by_number(footprints: Iterable[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, StepEdit]:
+    """What the artist changed, by the number of the step; steps that are as they were baked are left out."""
+    if not edits:
+        return {}
+    changes = {number: edit_of(footprint, edits) for number, footprint in enumerate(footprints)}
+    return {number: edit for number, edit in changes.items() if edit != UNCHANGED}
+
+
+def without_step(footprints: Iterable[Footprint], edits: Mapping[str, StepEdit]) -> list[str]:
+    """Ids of edits that belong to no step any more."""
+    used = {_key_of(footprint, edits) for footprint in footprints} if edits else set()
+    return [name for name in edits if name not in used]
 
 
 def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
@@ -79,14 +92,22 @@ def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
     """
     return {
         "schema_version": SCHEMA_VERSION,
-        "steps": {
-            name: {
-                key: list(value) if isinstance(value, tuple) else value
-                for key in _FIELDS
-                if (value := getattr(edit, key)) != getattr(UNCHANGED, key)
-            }
-            for name, edit in edits.items()
-        },
+        "steps": {name: edit_as_json(edit) for name, edit in edits.items()},
+    }
+
+
+def edit_as_json(edit: StepEdit) -> dict[str, Any]:
+    """What one edit changes, for JSON.
+
+    Examples
+    --------
+    >>> edit_as_json(StepEdit(strength=0.5, move_m=(0.1, 0.0)))
+    {'strength': 0.5, 'move_m': [0.1, 0.0]}
+    """
+    return {
+        key: list(value) if isinstance(value, tuple) else value
+        for key in _FIELDS
+        if (value := getattr(edit, key)) != getattr(UNCHANGED, key)
     }
 
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.heightfield import Window
+from . import contact_arrays
+from .contact_steps import ContactSteps
 from .footprints import Changes, Footprint
 
 _TEXTS = ("character", "sole")
@@ -40,7 +42,7 @@ _SERIES = {
         for name in ("frames", "first", "cells", "amounts")
     },
 }
-ARRAYS = ("numbers", *_VECTORS, *_SERIES, *(f"{key}.count" for key in _SERIES))
+ARRAYS = ("numbers", *_VECTORS, *_SERIES, *(f"{key}.count" for key in _SERIES), *contact_arrays.KINDS)
 """Names of the arrays that a record is stored as."""
 
 _RANGES = {
@@ -79,13 +81,17 @@ class Parts:
         return cls(kind, len(flat), [flat])
 
 
-def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dict[str, Parts]]:
+def to_parts(
+    footprints: Sequence[Footprint],
+) -> tuple[list[dict[str, str]], list[dict[str, str]], dict[str, Parts]]:
     """The record as texts and a few flat arrays of 64-bit floats and 32-bit integers, to be stored as native data.
 
     Returns
     -------
     names : list of dict
         Character and sole of each footprint.
+    soles : list of dict
+        Name and side of each sole that pressed them.
     arrays : dict of str to Parts
         `numbers`, `position` and `window` are of all footprints; each series likewise, with `<series>.count` saying
         how many of its values belong to each footprint.
@@ -99,10 +105,15 @@ def to_parts(footprints: Sequence[Footprint]) -> tuple[list[dict[str, str]], dic
         counts = [len(attrgetter(key)(footprint)) for footprint in footprints]
         arrays[key] = Parts(kind, sum(counts), map(attrgetter(key), footprints))
         arrays[f"{key}.count"] = Parts.whole(counts, np.int32)
-    return names, arrays
+    soles, columns = contact_arrays.to_columns([footprint.pressed_by for footprint in footprints])
+    for key, parts in columns.items():
+        arrays[key] = Parts(contact_arrays.KINDS[key], sum(map(len, parts)), parts)
+    return names, soles, arrays
 
 
-def from_arrays(names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]) -> list[Footprint]:
+def from_arrays(
+    names: Sequence[Mapping[str, str]], soles: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]
+) -> list[Footprint]:
     """The record from what `to_parts` gave, each array put together.
 
     Raises
@@ -112,7 +123,10 @@ def from_arrays(names: Sequence[Mapping[str, str]], arrays: Mapping[str, Any]) -
     """
     try:
         columns = _columns(len(names), arrays)
-        footprints = [_footprint(name, {k: v[i] for k, v in columns.items()}) for i, name in enumerate(names)]
+        contacts = contact_arrays.from_columns(soles, arrays, len(names))
+        footprints = [
+            _footprint(name, {k: v[i] for k, v in columns.items()}, contacts[i]) for i, name in enumerate(names)
+        ]
         for footprint in footprints:
             _check(footprint)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -146,13 +160,16 @@ def _sized(arrays: Mapping[str, Any], key: str, size: int, kind: type) -> NDArra
     return values.astype(kind)
 
 
-def _footprint(name: Mapping[str, str], values: Mapping[str, NDArray[Any]]) -> Footprint:
+def _footprint(
+    name: Mapping[str, str], values: Mapping[str, NDArray[Any]], pressed_by: ContactSteps | None
+) -> Footprint:
     content: dict[str, Any] = {key: str(name[key]) for key in _TEXTS}
     content |= zip(_NUMBERS, values["numbers"].tolist(), strict=True)
     content |= {key: values[key] for key in _SERIES if "." not in key}
     for quantity in ("compression", "rim"):
         content[quantity] = Changes(**{field.name: values[f"{quantity}.{field.name}"] for field in fields(Changes)})
-    return Footprint(window=Window(*values["window"].tolist()), position=values["position"], **content)
+    content |= {"window": Window(*values["window"].tolist()), "position": values["position"]}
+    return Footprint(pressed_by=pressed_by, **content)
 
 
 SPARSEST = 1000
@@ -175,6 +192,8 @@ def _check(footprint: Footprint) -> None:
         raise ValueError("loads and frames do not match")
     if not len(footprint.contact_cells) == len(footprint.contact_start) == len(footprint.contact_end):
         raise ValueError("contacts and frames do not match")
+    if (made_by := footprint.pressed_by) and made_by.approach + len(footprint.load_frames) != made_by.count:
+        raise ValueError("a contact's steps and its loads do not match")
     for changes in (footprint.compression, footprint.rim):
         if len(changes.first) != len(changes.frames) + 1 or len(changes.cells) != len(changes.amounts):
             raise ValueError("changes and frames do not match")

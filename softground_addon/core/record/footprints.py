@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..ground.heightfield import HeightField, SparseGrid, Window
 from ..numerics.packed import Packed
+from .contact_steps import ContactSteps
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -88,6 +89,8 @@ class Footprint:
         Cells that it touched, row·columns + column.
     contact_start, contact_end : (C,) float arrays
         First and last scene frame at which it touched each of them.
+    pressed_by : ContactSteps or None
+        What the sole did, to press it again elsewhere; None of a print that was itself edited, and of old records.
     """
 
     character: str
@@ -111,6 +114,7 @@ class Footprint:
     contact_cells: Packed[np.int32] = Packed()
     contact_start: Packed[np.float64] = Packed()
     contact_end: Packed[np.float64] = Packed()
+    pressed_by: ContactSteps | None = None
 
     def tile(self, changes: Changes, frame: float = np.inf) -> Array:
         """Sum of the compression or rim changes up to a frame, (rows, columns) of its window [m]."""

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..numerics.slices import Slices, sliced
 from . import archive as members
+from . import contact_arrays
 from . import edits as step_edits
 from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
 
-FORMAT = 2
+FORMAT = 3
 """Version of the bytes' layout. Who raises it adds to `MIGRATIONS` what lifts the version before."""
 
 Layout = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -32,8 +33,20 @@ def _with_edits(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Layout
     return text | {"edits": step_edits.to_json({})}, arrays
 
 
-MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {1: _with_edits}
-"""What lifts a layout of a version to the next. Version 1 had no edits."""
+def _without_contacts(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Layout:
+    count = len(text["footprints"])
+    _, columns = contact_arrays.to_columns([None] * count)
+    empty = {
+        key: np.concatenate([np.empty(0), *columns[key]]).astype(kind) for key, kind in contact_arrays.KINDS.items()
+    }
+    return text | {"soles": [], "pressed_again": []}, arrays | empty
+
+
+MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {
+    1: _with_edits,
+    2: _without_contacts,
+}
+"""What lifts a layout of a version to the next. Version 1 had no edits, version 2 nothing to press steps again from."""
 
 _TEXT = "record.json"
 _DAMAGE = (
@@ -68,27 +81,36 @@ class BakeRecord:
         What is known about them: numbers and texts, for JSON.
     edits : mapping of step id to StepEdit
         What the artist changed of them.
+    pressed_again : mapping of int to Footprint or None
+        What stands for some of the footprints because of the edits; None where nothing of one is left.
     """
 
     footprints: Sequence[Footprint]
     about: Mapping[str, Any]
     edits: Mapping[str, step_edits.StepEdit] = field(default_factory=dict)
+    pressed_again: Mapping[int, Footprint | None] = field(default_factory=dict)
 
     @property
     def edited(self) -> list[Footprint]:
         """The footprints as the artist left them: those that the ground is made from."""
-        return step_edits.edited(self.footprints, self.edits)
+        muted = {n for n, edit in step_edits.edits_by_number(self.footprints, self.edits).items() if edit.mute}
+        left = dict(enumerate(self.footprints)) | dict.fromkeys(muted) | dict(self.pressed_again)
+        return [footprint for footprint in left.values() if footprint is not None]
 
 
 @sliced
 def dump(record: BakeRecord) -> Slices[bytes]:
     """The record as bytes: equal records give equal bytes."""
-    names, arrays = to_parts(record.footprints)
+    again = sorted(record.pressed_again.items())
+    prints = [footprint for _, footprint in again if footprint is not None]
+    names, soles, arrays = to_parts([*record.footprints, *prints])
     content = {
         "format": FORMAT,
         "footprints": names,
         "about": dict(record.about),
         "edits": step_edits.to_json(record.edits),
+        "soles": soles,
+        "pressed_again": [[number, footprint is not None] for number, footprint in again],
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -128,14 +150,30 @@ def load(content: bytes) -> BakeRecord:
                 )
             if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
                 raise ValueError("it has parts that no record has")
-            arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in ARRAYS}
+            known = ARRAYS if version == FORMAT else set(ARRAYS) - set(contact_arrays.KINDS)
+            arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in known}
         for older in range(version, FORMAT):
             text, arrays = MIGRATIONS[older](text, arrays)
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
+        soles, again = text["soles"], [(number, there) for number, there in text["pressed_again"]]
+        baked = _count_baked(len(names), again)
     except _DAMAGE as error:
         raise InputError(
             f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
         ) from None
-    return BakeRecord(
-        from_arrays(names, arrays), about, step_edits.from_json(edits, "The stored record's edits of steps")
-    )
+    changes = step_edits.from_json(edits, "The stored record's edits of steps")
+    footprints = from_arrays(names, soles, arrays)
+    prints = iter(footprints[baked:])
+    pressed_again = {number: next(prints) if there else None for number, there in again}
+    return BakeRecord(footprints[:baked], about, changes, pressed_again)
+
+
+def _count_baked(count: int, again: list[tuple[Any, Any]]) -> int:
+    """How many of so many footprints were baked, the others being pressed again; ValueError where that cannot be."""
+    baked = count - sum(there is True for _, there in again)
+    numbers = [number for number, _ in again]
+    if any(type(number) is not int or not 0 <= number < baked for number in numbers) or sorted(set(numbers)) != numbers:
+        raise ValueError("steps were pressed again that it does not have")
+    if any(type(there) is not bool for _, there in again):
+        raise ValueError("it does not say which steps are left")
+    return baked

@@ -7,7 +7,8 @@ import pytest
 
 from softground_addon.core.after.events import COLUMNS, as_edited, between, events
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.record.edits import StepEdit, edited, step_id
+from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.record.record import BakeRecord
 from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed, walk
 
 SNOW = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
@@ -110,7 +111,7 @@ def test_both_feet_out_of_a_jump_land_at_the_speed_of_the_fall():
 def test_muted_steps_have_no_events_and_moved_ones_take_them_along(baked, table):
     _, footprints = baked
     muted, moved = map(step_id, footprints[:2])
-    left = edited(footprints, {muted: StepEdit(mute=True)})
+    left = BakeRecord(footprints, {}, {muted: StepEdit(mute=True)}).edited
     left = [replace(one, position=one.position + np.array([1, 2, 0])) if step_id(one) == moved else one for one in left]
     rows = as_edited(table, footprints, left)
     assert {row["step"] for row in rows} == {step_id(one) for one in left}

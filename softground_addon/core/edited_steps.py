@@ -1,0 +1,439 @@
+"""Footprints as the artist's edits leave them: the steps that changed, and those that meet them, are pressed again.
+
+The result is a function of the record, the edits and the undisturbed ground alone. Whoever makes a ground, be it a bake
+or an edit of a single step, gets the same footprints from them, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .ground.heightfield import HeightField, Terrain, Window
+from .ground.soft_ground import SoftGround
+from .numerics.cell_keys import ROW, Keys, among
+from .numerics.rigid import rotation, turn_between, unit
+from .pressing.contact_layout import ContactLayout
+from .pressing.ground_cells import Timing, UndisturbedCells
+from .pressing.open_contact import OpenContact
+from .pressing.prop_layout import PropLayout
+from .pressing.sole_layout import SoleLayout
+from .pressing.sole_points import SolePoints, sole_points
+from .pressing.solver import GroundSolver
+from .record.contact_steps import PressingSole, Steps
+from .record.edits import UNCHANGED, StepEdit, edits_by_number
+from .record.footprints import QUANTUM, Footprint
+from .record.record import BakeRecord
+
+Array = NDArray[np.float64]
+Change = tuple[int, StepEdit]
+"""Number of a step, and what was changed of it."""
+
+VISIBLE = 5e-5
+"""Change of a print that makes those meet it that come later be pressed again [m]: a quarter of what playback keeps."""
+SLIDING = 0.25
+"""How far around a step ground may slide into it, where the material has an angle of repose [m]."""
+
+
+def with_edits(left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGround, cell_size: float) -> BakeRecord:
+    """A record with other edits in place of those that it has.
+
+    Parameters
+    ----------
+    left : BakeRecord
+    edits : mapping of step id to StepEdit
+    ground : SoftGround
+        That it was baked on.
+    cell_size : float
+        Side of a cell [m].
+
+    Raises
+    ------
+    InputError
+        See `EditedSteps.pressed_again`.
+    """
+    steps = EditedSteps(left.footprints, ground, cell_size)
+    again = steps.pressed_again(edits_by_number(left.footprints, edits))
+    return replace(left, edits=dict(edits), pressed_again=again)
+
+
+class EditedSteps:
+    """The footprints of a record, of which some are edited.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+        As they were baked.
+    ground : SoftGround
+        That they were baked on.
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, footprints: Sequence[Footprint], ground: SoftGround, cell_size: float) -> None:
+        self._footprints, self._ground, self._cell_size = footprints, ground, cell_size
+        undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self._solver = GroundSolver(ground, HeightField(cell_size), undisturbed)
+        self._points: dict[int, SolePoints] = {}
+        self._known: dict[frozenset[Change], _Group] = {}
+        self._met: dict[frozenset[frozenset[Change]], bool] = {}
+        self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
+        self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
+
+    def pressed_again(self, edits: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+        """What stands for some of the footprints.
+
+        Parameters
+        ----------
+        edits : mapping of int to StepEdit
+            From `record.edits.edits_by_number`.
+
+        Returns
+        -------
+        dict of int to Footprint or None
+            By the number of the footprint; None where nothing of it is left.
+
+        Raises
+        ------
+        InputError
+            If a step is to be moved of which the record keeps too little.
+        """
+        edits = {number: edit for number, edit in edits.items() if edit != UNCHANGED}
+        groups = [self._group(frozenset({change})) for change in sorted(edits.items(), key=lambda item: item[0])]
+        while pair := next((pair for pair in _near(groups) if self._meet(*pair)), None):
+            groups = [group for group in groups if group not in pair]
+            groups.append(self._group(pair[0].edits | pair[1].edits))
+        self._known = {changes: group for changes, group in self._known.items() if _within(changes, edits)}
+        self._met = {pair: met for pair, met in self._met.items() if pair <= self._known.keys()}
+        return dict(sorted(item for group in groups for item in group.prints.items()))
+
+    def _group(self, edits: frozenset[Change]) -> _Group:
+        """Steps that were edited, and those that meet them."""
+        if edits not in self._known:
+            self._known[edits] = self._pressed(edits)
+        return self._known[edits]
+
+    def _pressed(self, edits: frozenset[Change]) -> _Group:
+        members = dict(edits)
+        while True:
+            prints = self._press(members)
+            changed = {n: self._changed_cells(self._footprints[n], footprint) for n, footprint in prints.items()}
+            later = {
+                other
+                for n, cells in changed.items()
+                for other in self._meeting(cells, float(self._frames[n, 0]))
+                if other not in members and self._footprints[other].pressed_by
+            }
+            if not later:
+                break
+            members |= dict.fromkeys(later, UNCHANGED)
+        kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
+        windows = [footprint.window for footprint in kept.values() if footprint]
+        window = _union([*windows, *(self._footprints[n].window for n in kept)])
+        return _Group(edits, kept, {n: changed[n] for n in kept}, window)
+
+    def _meet(self, one: _Group, other: _Group) -> bool:
+        """Whether steps of one group meet what another one changed."""
+        pair = frozenset({one.edits, other.edits})
+        if pair not in self._met:
+            self._met[pair] = bool(one.prints.keys() & other.prints.keys()) or self._touch(one, other)
+        return self._met[pair]
+
+    def _touch(self, one: _Group, other: _Group) -> bool:
+        return any(
+            self._reads(number, group.prints[number], cells)
+            for group, another in ((one, other), (other, one))
+            for number in group.prints
+            for cells in another.changed.values()
+        )
+
+    def _meeting(self, cells: Keys, since: float) -> Iterable[int]:
+        """Steps that press cells at a frame or later."""
+        if not len(cells):
+            return []
+        column, row, columns, rows = _window_of(cells)
+        low, size = self._windows[:, :2], self._windows[:, 2:]
+        near = (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
+        near &= self._frames[:, 1] >= since
+        return [n for n in np.flatnonzero(near).tolist() if self._reads(n, self._footprints[n], cells)]
+
+    def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
+        """Whether a step, as it was baked or as it is now, presses some cells."""
+        prints = (self._footprints[number], footprint)
+        return any(
+            bool(among(cells, pressed).any())
+            for one in prints
+            if one is not None
+            for pressed in [_cells(one, _all_of(one) if self._ground.material.repose_angle else one.contact_cells)]
+        )
+
+    def _changed_cells(self, before: Footprint, after: Footprint | None) -> Keys:
+        """Cells in which two prints of a step differ visibly."""
+        quantities = ("compression", "rim") if self._ground.material.repose_angle else ("compression",)
+        window = before.window.union(after.window) if after else before.window
+        differs = np.zeros((window.rows, window.columns), bool)
+        for quantity in quantities:
+            difference = np.zeros(differs.shape)
+            for one, sign in ((before, -1.0), (after, 1.0)):
+                if one is not None:
+                    difference[_part(window, one.window)] += sign * one.tile(getattr(one, quantity))
+            differs |= np.abs(difference) > VISIBLE
+        return _keys(window, np.flatnonzero(differs))
+
+    def _press(self, members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+        """The prints of some steps, on what all others leave."""
+        moving = {n: edit for n, edit in sorted(members.items()) if not edit.mute}
+        layouts = {n: self._layout(self._footprints[n], edit) for n, edit in moving.items()}
+        prints: dict[int, Footprint | None] = dict.fromkeys(sorted(members))
+        if layouts:
+            prints |= self._run(layouts, members)
+        return prints
+
+    def _run(
+        self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit]
+    ) -> dict[int, Footprint | None]:
+        grid = _grid(self._footprints[next(iter(layouts))])
+        start = min(layout.first for layout in layouts.values())
+        end = max(layout.end for layout in layouts.values())
+        others = self._others(layouts, members, grid.frame(grid.number(end - 1)))
+        first = grid.number(start)
+        self._solver.state = HeightField(self._cell_size)
+        for other in others:
+            _add(self._solver.state, other.until(grid.frame(first - 1)))
+        contacts = {n: OpenContact(layout) for n, layout in layouts.items()}
+        prints: dict[int, Footprint | None] = {}
+        for number in range(first, grid.number(end - 1) + 1):
+            frame, steps = grid.frame(number), grid.steps(number)
+            for other in others:
+                _add(self._solver.state, other.at(frame))
+            under_way = [
+                one for one in contacts.values() if one.layout.first < steps.stop and one.layout.end > steps.start
+            ]
+            self._solver.advance(under_way, steps.start, steps.stop, frame, grid.timing)
+            for n, contact in contacts.items():
+                if contact in under_way and contact.layout.end <= steps.stop:
+                    self._solver.settle(contact, frame)
+                    prints[n] = contact.footprint() if contact.recorder else None
+        return prints
+
+    def _others(
+        self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit], end: float
+    ) -> list[_Baked]:
+        """The prints around some steps that stay as they were baked."""
+        margin = int(SLIDING / self._cell_size) if self._ground.material.repose_angle else 0
+        windows = [layout.window(self._solver.cells).expanded(margin) for layout in layouts.values()]
+        low, size = self._windows[:, :2], self._windows[:, 2:]
+        near = np.zeros(len(low), bool)
+        for column, row, columns, rows in windows:
+            near |= (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
+        near &= self._frames[:, 0] <= end
+        return [_Baked(self._footprints[n]) for n in np.flatnonzero(near).tolist() if n not in members]
+
+    def _layout(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
+        """A step where it is pressed now."""
+        kept = footprint.pressed_by
+        if kept is None:
+            raise InputError(
+                f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
+                "baked by an earlier SoftGround, or by a mesh of too many vertices, and can only be muted: bake again, "
+                "or give the mesh fewer vertices."
+            )
+        steps = placed(
+            kept.steps(footprint.load_frames), edit, footprint.position, self._ground.terrain, _length(kept.pressing)
+        )
+        sole = kept.pressing.sole
+        if sole.prop is not None:
+            return PropLayout(footprint.character, sole, steps, strength=edit.strength)
+        return SoleLayout(footprint.character, sole, steps, self._points_of(kept.pressing), strength=edit.strength)
+
+    def _points_of(self, pressing: PressingSole) -> SolePoints:
+        if id(pressing) not in self._points:
+            self._points[id(pressing)] = sole_points(pressing.sole, pressing.flat[None])
+        return self._points[id(pressing)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Steps that were edited, with those that meet them, the cells that each changed visibly, and their window."""
+
+    edits: frozenset[Change]
+    prints: dict[int, Footprint | None]
+    changed: dict[int, Keys]
+    window: Window
+
+
+def placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length: float) -> Steps:
+    """The steps of a contact that was moved and turned, following the ground's height and slope.
+
+    Parameters
+    ----------
+    steps : Steps
+    edit : StepEdit
+    pivot : (3,) float array
+        Middle of the print on the undisturbed ground [m].
+    terrain : Terrain
+    length : float
+        Of the sole [m]: the ground's slope is that of a plane as long.
+    """
+    if edit.move_m == (0.0, 0.0) and edit.turn_deg == 0.0:
+        return steps
+    target = pivot + np.array([*edit.move_m, 0.0])
+    turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))
+    if edit.move_m != (0.0, 0.0):
+        (here, upright_here), (there, upright_there) = (_plane(terrain, place, length) for place in (pivot, target))
+        target[2] = pivot[2] + there - here
+        if (upright_here != upright_there).any():
+            turn = rotation(turn_between(upright_here, upright_there)) @ turn
+    shift = target - turn @ pivot
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = turn, shift
+    return replace(
+        steps,
+        poses=motion @ steps.poses,
+        approach=motion @ steps.approach,
+        forces=steps.forces @ turn.T,
+        normals=steps.normals @ turn.T,
+        centres=steps.centres @ turn.T + shift,
+    )
+
+
+def _plane(terrain: Terrain, place: Array, length: float) -> tuple[float, Array]:
+    """Height and unit normal of the ground around a place; level where there is none."""
+    half = length / 2
+    x = place[0] + np.array([0.0, half, -half, 0.0, 0.0])
+    y = place[1] + np.array([0.0, 0.0, 0.0, half, -half])
+    heights = terrain.heights(x, y)
+    if not np.isfinite(heights).all():
+        height = float(heights[0])
+        return (height if np.isfinite(height) else float(place[2])), np.array([0.0, 0.0, 1.0])
+    slope = np.array([heights[1] - heights[2], heights[3] - heights[4]]) / length
+    return float(heights[0]), unit(np.array([-slope[0], -slope[1], 1.0]))
+
+
+def _length(pressing: PressingSole) -> float:
+    return float(np.ptp(pressing.sole.outline, axis=0).max())
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """The steps of a simulation, and the frames that are recorded of it.
+
+    Attributes
+    ----------
+    timing : Timing
+    begin : float
+        Scene frame of step 0.
+    """
+
+    timing: Timing
+    begin: float
+
+    def number(self, step: int) -> int:
+        """The recorded frame that a step belongs to, in a row from that of step 0."""
+        return -(-step // self.timing.steps_per_frame)
+
+    def frame(self, number: int) -> float:
+        """Its scene frame."""
+        return self.begin + number * self.timing.frame_step
+
+    def steps(self, number: int) -> range:
+        """The steps up to it, after the one before."""
+        per_frame = self.timing.steps_per_frame
+        return range((number - 1) * per_frame + 1, number * per_frame + 1)
+
+
+def _grid(footprint: Footprint) -> _Grid:
+    kept, frames = footprint.pressed_by, footprint.load_frames
+    assert kept is not None
+    spacing = (frames[-1] - frames[0]) / (len(frames) - 1) if len(frames) > 1 else footprint.frame_step
+    per_frame = max(1, round(footprint.frame_step / spacing))
+    begin = frames[0] - kept.first * footprint.frame_step / per_frame
+    whole = float(np.rint(begin))
+    timing = Timing(kept.time_step, per_frame, footprint.frame_step)
+    return _Grid(timing, whole if abs(begin - whole) < 1e-3 else float(begin))
+
+
+class _Baked:
+    """A print that stays as it was baked, frame by frame."""
+
+    def __init__(self, footprint: Footprint) -> None:
+        self._footprint = footprint
+        changes = (footprint.compression, footprint.rim)
+        self._changes = [(one.frames, one.first, one.cells, one.amounts) for one in changes]
+
+    def until(self, frame: float) -> tuple[Window, Array] | None:
+        """All that it changed up to a recorded frame."""
+        return self._sum([slice(0, int(np.searchsorted(frames, frame + 1e-6))) for frames, *_ in self._changes])
+
+    def at(self, frame: float) -> tuple[Window, Array] | None:
+        """What it changed in the recorded frame that ends at a frame."""
+        return self._sum(
+            [
+                slice(int(np.searchsorted(frames, frame - 1e-6)), int(np.searchsorted(frames, frame + 1e-6)))
+                for frames, *_ in self._changes
+            ]
+        )
+
+    def _sum(self, during: Sequence[slice]) -> tuple[Window, Array] | None:
+        if all(part.start == part.stop for part in during):
+            return None
+        window = self._footprint.window
+        sums = []
+        for part, (_, first, cells, amounts) in zip(during, self._changes, strict=True):
+            within = slice(first[part.start], first[part.stop])
+            sums.append(np.bincount(cells[within], amounts[within], window.cells))
+        return window, np.stack(sums).reshape(2, window.rows, window.columns) * QUANTUM
+
+
+def _add(ground: HeightField, change: tuple[Window, Array] | None) -> None:
+    if change is not None:
+        ground.write(change[0], ground.read(change[0]) + change[1])
+
+
+def _union(windows: Iterable[Window]) -> Window:
+    """The smallest window that holds some others."""
+    return reduce(Window.union, windows)
+
+
+def _near(groups: Sequence[_Group]) -> Iterable[tuple[_Group, _Group]]:
+    """Pairs of groups whose windows share cells."""
+    windows = np.array([group.window for group in groups]).reshape(-1, 4)
+    low, high = windows[:, :2], windows[:, :2] + windows[:, 2:]
+    near = ((low[:, None] < high) & (low < high[:, None])).all(axis=-1)
+    return ((groups[one], groups[other]) for one, other in np.argwhere(np.triu(near, 1)).tolist())
+
+
+def _within(changes: frozenset[Change], edits: Mapping[int, StepEdit]) -> bool:
+    return all(edits.get(number) == edit for number, edit in changes)
+
+
+def _all_of(footprint: Footprint) -> NDArray[np.intp]:
+    return np.arange(footprint.window.cells)
+
+
+def _cells(footprint: Footprint, cells: NDArray[np.integer]) -> Keys:
+    return _keys(footprint.window, cells)
+
+
+def _keys(window: Window, cells: NDArray[np.integer]) -> Keys:
+    """Keys of cells of a window, ascending."""
+    row, column = np.divmod(cells.astype(np.int64), window.columns)
+    keys: Keys = (row + window.row) * ROW + column + window.column
+    return keys
+
+
+def _window_of(keys: Keys) -> Window:
+    row = (keys + ROW // 2) // ROW
+    column = keys - row * ROW
+    low = int(column.min()), int(row.min())
+    return Window(*low, int(column.max()) - low[0] + 1, int(row.max()) - low[1] + 1)
+
+
+def _part(whole: Window, part: Window) -> tuple[slice, slice]:
+    row, column = part.row - whole.row, part.column - whole.column
+    return slice(row, row + part.rows), slice(column, column + part.columns)

@@ -1,0 +1,121 @@
+"""Edits of steps from a file: into the ground, the exports and the report, and with the step through further bakes."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.command_line import cli
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit, step_id
+from tests.blender import shots
+from tests.blender.grounds import heights, rest
+
+
+@pytest.fixture(scope="module")
+def shot(addon, tmp_path_factory):
+    """A saved walk, and the report of its bake."""
+    folder = tmp_path_factory.mktemp("edits")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    shots.walker(bpy.context.scene, frames=60)
+    bpy.ops.softground.add_character()
+    bpy.context.scene.softground.cell_size = 0.02
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    assert bake(folder, save="plain.blend") == 0
+    return folder, json.loads((folder / "report.json").read_text())
+
+
+def bake(folder, edits=None, save="edited.blend"):
+    options = [f"--save={folder / save}", f"--report={folder / 'report.json'}", "--progress=none"]
+    if edits is not None:
+        text = edits if isinstance(edits, str) else json.dumps({"schema_version": 1, "steps": edits})
+        (folder / "edits.json").write_text(text)
+        options.append(f"--edits={folder / 'edits.json'}")
+    return cli.run_standalone(["bake", str(folder / "shot.blend"), *options])
+
+
+def ground_in(path):
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene.softground.ground
+
+
+def stored(ground):
+    return bytes(baked_ground.stored_record(ground))
+
+
+def test_edits_from_a_file_are_in_the_ground_the_report_and_the_next_bake(shot):
+    folder, plain = shot
+    one, two, three = (step["id"] for step in plain["steps"][1:4])
+    edits = {one: {"strength": 0.5}, two: {"move_m": [0.0, 0.5], "turn_deg": 30.0}, three: {"mute": True}}
+    assert bake(folder, edits) == 0
+    report = json.loads((folder / "report.json").read_text())
+    before, after = ({step["id"]: step for step in steps["steps"]} for steps in (plain, report))
+    assert {name: step["edit"] for name, step in after.items() if "edit" in step} == edits
+    assert after[one]["max_depth_m"] == pytest.approx(0.5 * before[one]["max_depth_m"], rel=1e-3)
+    np.testing.assert_allclose(np.subtract(after[two]["position"], before[two]["position"])[:2], (0.0, 0.5), atol=0.02)
+    assert [name for name, step in after.items() if step.get("left_out")] == [three]
+    assert report["totals"]["steps"] == plain["totals"]["steps"] - 1
+    ground = ground_in(folder / "edited.blend")
+    pressed = heights(ground, DISPLAY_KEY)[:, 2] - rest(ground)[:, 2]
+    for step, depth in ((before[two], 0.0), (after[two], 0.01), (before[three], 0.0)):
+        under = np.linalg.norm(rest(ground)[:, :2] - step["position"][:2], axis=1) < 0.05
+        assert -pressed[under].min() > depth if depth else np.abs(pressed[under]).max() < 2e-3
+    steps, _ = baked_ground.load(ground)
+    bpy.ops.softground.bake()
+    again, _ = baked_ground.load(ground)  # what was edited stays so
+    assert list(map(step_id, again)) == list(map(step_id, steps))
+    assert len(again) == plain["totals"]["steps"] - 1
+    np.testing.assert_allclose([one.position for one in again], [one.position for one in steps], atol=1e-3)
+
+
+def test_edits_that_are_reset_leave_the_bytes_of_a_bake_without(shot):
+    folder, plain = shot
+    first = stored(ground_in(folder / "plain.blend"))
+    assert bake(folder, {plain["steps"][2]["id"]: {"move_m": [0.1, 0.2]}}) == 0
+    ground = ground_in(folder / "edited.blend")
+    assert stored(ground) != first
+    left = record.load(stored(ground))
+    assert {step_id(step): left.pressed_again.get(n) is not None for n, step in enumerate(left.footprints)}[
+        plain["steps"][2]["id"]
+    ]
+    assert bake(folder, {}) == 0
+    assert stored(ground_in(folder / "edited.blend")) == first
+
+
+def test_an_edit_without_a_step_is_kept_and_named(shot):
+    folder, _ = shot
+    assert bake(folder, {"Walker/foot.L@900.0": {"mute": True}}) == 0
+    report = json.loads((folder / "report.json").read_text())
+    (finding,) = [finding for finding in report["self_check"] if finding["code"] == "edit_without_step"]
+    assert "'Walker/foot.L@900.0'" in finding["message"]
+    ground = ground_in(folder / "edited.blend")
+    assert baked_ground.edits_of(ground) == {"Walker/foot.L@900.0": StepEdit(mute=True)}
+    assert ground_mesh.is_baked(ground)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "are no JSON"),
+        ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"depth": 1}}}', "unknown field 'depth'"),
+        ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"strength": NaN}}}', "'strength' is nan"),
+        ('{"schema_version": 9, "steps": {}}', "version 9"),
+        ("[" * 100_000, "are no JSON"),
+    ],
+)
+def test_a_bad_file_of_edits_gets_one_clear_line(shot, capsys, text, said):
+    folder, _ = shot
+    assert bake(folder, text) == cli.EXIT_BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"softground: The edits '{folder / 'edits.json'}'")
+    assert said in line
+
+
+def test_edits_that_are_not_there_are_named(shot, capsys):
+    folder, _ = shot
+    options = [f"--edits={folder / 'nowhere.json'}", "--dry-run"]
+    assert cli.run_standalone(["bake", str(folder / "shot.blend"), *options]) == cli.EXIT_BAD_INPUT
+    assert "nowhere.json' cannot be read: No such file" in capsys.readouterr().err

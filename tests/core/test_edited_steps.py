@@ -1,0 +1,193 @@
+"""Edited steps are pressed again, as a simulation of the whole edited motion would press them."""
+
+import time
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softground_addon.core.edited_steps import EditedSteps, with_edits
+from softground_addon.core.errors import InputError
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.record import BakeRecord
+from tests.core.walkers import pose, pressed, walk
+
+SOIL = GroundMaterial(0.3e6, 0.35, 0.15)
+MATERIALS = {
+    "soil": SOIL,
+    "hardening": replace(SOIL, hardening=3.0, rim_bias=0.5, firm_depth=0.03),
+    "crust": replace(SOIL, crust_stress=5e3, shortest_time=0.02),
+    "sand": replace(SOIL, repose_angle=0.6),
+}
+CELL = 0.01
+
+
+class Hill:
+    """A slope that begins at x = 1 m."""
+
+    RISE = 0.2
+
+    def heights(self, x, y):
+        return self.RISE * np.maximum(np.asarray(x, float) - 1.0, 0.0) + 0 * np.asarray(y)
+
+
+@cache
+def baked(material="soil", steps=5):
+    """A bake of a walk, and the loads it is of."""
+    loads = walk(steps=steps)
+    return loads, BakeRecord(tuple(pressed(loads, MATERIALS[material], CELL)[1]), {})
+
+
+def ground_of(material="soil", terrain=None):
+    return SoftGround(terrain or FlatTerrain(), MATERIALS[material])
+
+
+def edited(left, edits, material="soil"):
+    """The record with edits of steps by their number."""
+    named = {step_id(left.footprints[number]): edit for number, edit in edits.items()}
+    return with_edits(left, named, ground_of(material), CELL)
+
+
+def elsewhere(loads, footprint, edit):
+    """The loads with the motion of one contact moved and turned about its print."""
+    index = [sole.sole.name for sole in loads.motion.soles].index(footprint.sole)
+    first = footprint.pressed_by.first - footprint.pressed_by.approach
+    during = slice(first, footprint.pressed_by.first + len(footprint.load_frames))
+    turned = np.radians(edit.turn_deg)
+    there = pose((*(footprint.position[:2] + edit.move_m), 0.0), turned) @ pose((*(-footprint.position[:2]), 0.0))
+    transforms = loads.motion.soles[index].transforms.copy()
+    transforms[during] = there @ transforms[during]
+    soles = list(loads.motion.soles)
+    soles[index] = replace(soles[index], transforms=transforms)
+    return replace(loads, motion=replace(loads.motion, soles=tuple(soles)))
+
+
+def difference(one, other):
+    """Largest difference of two grounds [m]."""
+    windows = {*one.tile_windows(), *other.tile_windows()}
+    return max(float(np.abs(one.read(window) - other.read(window)).max()) for window in windows)
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize(
+    "edit", [StepEdit(move_m=(0.0537, 0.0313), turn_deg=3.0), StepEdit(move_m=(-0.6, 0.02), turn_deg=20.0)]
+)
+def test_a_moved_step_is_pressed_as_a_simulation_of_the_moved_motion_presses_it(material, edit):
+    loads, left = baked(material)
+    step = left.footprints[3]
+    whole, _ = pressed(elsewhere(loads, step, edit), MATERIALS[material], CELL)
+    ours = recompose(edited(left, {3: edit}, material).edited, cell_size=CELL)
+    # What slides comes to rest a little otherwise where the feet in contact are not pressed in turn within a frame.
+    assert difference(whole, ours) < (2e-3 if material == "sand" else 6e-5)
+    assert difference(whole, recompose(left.footprints)) > 5e-3
+
+
+def test_a_step_on_top_of_another_presses_what_that_one_left():
+    _, left = baked()
+    one, other = left.footprints[2], left.footprints[4]  # of the same foot
+    onto = StepEdit(move_m=tuple(one.position[:2] - other.position[:2]))
+    after = edited(left, {4: onto})
+    assert after.pressed_again[4].compressed_m3 < 0.3 * other.compressed_m3
+    back = edited(left, {2: StepEdit(move_m=tuple(other.position[:2] - one.position[:2]))})
+    assert sorted(back.pressed_again) == [2, 4]  # what comes later is pressed again too
+    assert back.pressed_again[4].compressed_m3 < 0.3 * other.compressed_m3
+    muted = edited(after, {4: onto, 2: StepEdit(mute=True)})
+    assert muted.pressed_again[2] is None
+    assert muted.pressed_again[4].compressed_m3 == pytest.approx(other.compressed_m3, rel=0.02)
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.5, 1.5])
+def test_strength_is_a_factor_on_the_depth_and_the_volumes(strength):
+    _, left = baked()
+    before, after = left.footprints[1], edited(left, {1: StepEdit(strength=strength)}).pressed_again[1]
+    assert after.max_depth_m == pytest.approx(strength * before.max_depth_m, abs=5e-6)
+    assert after.compressed_m3 == pytest.approx(strength * before.compressed_m3, rel=1e-3, abs=1e-12)
+    assert after.rim_m3 == pytest.approx(2 * SOIL.poisson_ratio * after.compressed_m3, rel=1e-6, abs=1e-12)
+
+
+def test_a_moved_step_follows_the_ground():
+    terrain = Hill()
+    loads = walk(steps=2)
+    left = BakeRecord(tuple(pressed(loads, SOIL, CELL, terrain)[1]), {})
+    step = left.footprints[0]
+    up = with_edits(left, {step_id(step): StepEdit(move_m=(2.0, 0.0))}, SoftGround(terrain, SOIL), CELL)
+    moved = up.pressed_again[0]
+    assert moved.position[0] == pytest.approx(step.position[0] + 2.0, abs=0.02)
+    assert moved.position[2] == pytest.approx(terrain.heights(moved.position[0], 0.0), abs=2e-3)
+    assert moved.compressed_m3 == pytest.approx(step.compressed_m3, rel=0.1)
+
+
+def test_a_step_off_the_ground_leaves_nothing():
+    class Plate:
+        def heights(self, x, y):
+            return np.where(np.asarray(x) < 3.0, 0.0, np.nan) + 0 * np.asarray(y)
+
+    _, left = baked()
+    name = step_id(left.footprints[0])
+    gone = with_edits(left, {name: StepEdit(move_m=(50.0, 0.0))}, SoftGround(Plate(), SOIL), CELL)
+    assert gone.pressed_again[0] is None
+    assert len(gone.edited) == len(left.footprints) - 1
+    assert record.dump(record.load(record.dump(gone))) == record.dump(gone)
+
+
+CHANGES = st.builds(
+    StepEdit,
+    mute=st.booleans(),
+    strength=st.floats(0.0, 3.0),
+    move_m=st.tuples(st.floats(-1.5, 1.5), st.floats(-0.3, 0.3)),
+    turn_deg=st.floats(-180.0, 180.0),
+)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    edits=st.dictionaries(st.integers(0, 4), CHANGES, max_size=4),
+    order=st.randoms(use_true_random=False),
+    material=st.sampled_from(["soil", "hardening"]),
+)
+def test_edits_one_by_one_give_the_bytes_of_all_at_once_and_reset_those_of_the_bake(edits, order, material):
+    _, left = baked(material)
+    first = record.dump(left)
+    at_once = edited(left, edits, material)
+    stored = record.load(record.dump(at_once))  # as it is met again in the file
+    assert record.dump(edited(record.load(first), edits, material)) == record.dump(at_once) == record.dump(stored)
+    steps, so_far = EditedSteps(left.footprints, ground_of(material), CELL), {}
+    names = list(edits)
+    order.shuffle(names)
+    for number in names:
+        so_far[number] = edits[number]
+        again = steps.pressed_again(so_far)
+    if edits:
+        one_by_one = replace(at_once, pressed_again=again)
+        assert record.dump(one_by_one) == record.dump(at_once)
+    assert record.dump(edited(stored, {}, material)) == first
+
+
+def test_a_print_of_which_too_little_is_kept_can_only_be_muted():
+    _, left = baked()
+    old = replace(left, footprints=[replace(footprint, pressed_by=None) for footprint in left.footprints])
+    assert edited(old, {1: StepEdit(mute=True)}).pressed_again == {1: None}
+    with pytest.raises(InputError, match=r"foot.R, at frame 21 .*can only be muted: bake again"):
+        edited(old, {1: StepEdit(strength=0.5)})
+
+
+@pytest.mark.alone
+@pytest.mark.slow
+def test_one_step_of_a_thousand_is_edited_in_50_ms():
+    _, left = baked(steps=1000)
+    steps = EditedSteps(left.footprints, ground_of(), CELL)
+    took = []
+    for number in range(480, 500):
+        start = time.perf_counter()
+        steps.pressed_again({number: StepEdit(move_m=(0.1, 0.0), turn_deg=5.0)})
+        took.append(time.perf_counter() - start)
+    print(f"one step of {len(left.footprints)}: {1e3 * np.median(took):.1f} ms, at most {1e3 * max(took):.1f} ms")
+    assert np.median(took) < 0.05
