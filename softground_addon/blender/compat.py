@@ -89,3 +89,20 @@ def straighten(curves: Any) -> None:
         kinds = curves.attributes.new("curve_type", "INT8", "CURVE")
         kinds.data.foreach_set("value", [1] * len(curves.curves))
         curves.add_curves([1])  # lets Blender count the kinds anew
+
+
+PLAYS_SOUND = bool(bpy.app.build_options.audaspace)
+"""Some builds, such as modules for servers, know no sound."""
+
+
+def strips_of(scene: bpy.types.Scene) -> Any:
+    """The strips of a scene's sequencer, which it gets if it has none."""
+    editor: Any = scene.sequence_editor or scene.sequence_editor_create()
+    return editor.strips if hasattr(editor, "strips") else editor.sequences
+
+
+def show_in_sequencer(context: bpy.types.Context, scene: bpy.types.Scene) -> None:
+    """Let the workspace's sequencer show a scene where it shows none yet: from 5.0 on it shows one of its own."""
+    workspace: Any = context.workspace
+    if workspace is not None and getattr(workspace, "sequencer_scene", scene) is None:
+        workspace.sequencer_scene = scene

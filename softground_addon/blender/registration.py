@@ -26,7 +26,7 @@ from .interface import (
     response_panel,
 )
 from .live import live
-from .output import event_points, export_formats, force_curves
+from .output import event_points, export_formats, force_curves, make_sound
 from .properties.material import look_followers
 from .properties.scene import depth_field
 
@@ -47,6 +47,7 @@ CLASSES = (
     *preset_menu.CLASSES,
     *force_curves.CLASSES,
     *event_points.CLASSES,
+    *make_sound.CLASSES,
     *export_formats.CLASSES,
     *menus.CLASSES,
     *import_capture.CLASSES,

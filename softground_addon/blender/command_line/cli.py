@@ -174,6 +174,8 @@ def _export(options: argparse.Namespace) -> None:
         options.resolution,
         options.uv_map,
         options.outdated,
+        options.samples,
+        options.stereo,
     )
     for written in export_formats.export(scene, how):
         print(written, flush=True)

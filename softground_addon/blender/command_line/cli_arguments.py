@@ -91,6 +91,10 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     export.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame; else those baked")
     export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
     export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
+    export.add_argument(
+        "--samples", type=Path, metavar="DIR", help="for wav: your own sounds, in a folder of WAV files"
+    )
+    export.add_argument("--stereo", action="store_true", help="for wav: hear the steps from the camera")
     export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
     export.set_defaults(blend=None)
 

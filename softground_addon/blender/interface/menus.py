@@ -34,6 +34,7 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.export_forces", icon="EXPORT")
         layout.operator("softground.event_markers", icon="MARKER_HLT")
         layout.operator("softground.event_points", icon="POINTCLOUD_DATA")
+        layout.operator("softground.make_sound", icon="SOUND")
         layout.separator()
         layout.operator("softground.export", icon="EXPORT")
         layout.operator("softground.final_mesh", icon="MESH_DATA")

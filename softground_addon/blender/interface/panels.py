@@ -357,6 +357,7 @@ class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("softground.event_markers", icon="MARKER_HLT")
         column.operator("softground.event_points", icon="POINTCLOUD_DATA")
+        column.operator("softground.make_sound", icon="SOUND")
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
 
 

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from .. import settings
 from ..baking import bake_report
 from ..operator_base import OnBake, beside_file, reports_errors
-from . import event_exports, exports, image_exports, opensim_exports
+from . import event_exports, exports, image_exports, opensim_exports, sound_exports
 
 LARGEST_IMAGE = 16384
 """Most pixels along the sides of an image."""
@@ -40,6 +40,10 @@ class Options:
         Of images; by default the one that is rendered.
     outdated : bool
         Whether a bake is written that no longer fits what it was made from.
+    samples : Path, optional
+        Folder of recordings, of sounds.
+    stereo : bool
+        Of sounds: whether they come from where the camera sees the steps.
     """
 
     format: str
@@ -49,6 +53,8 @@ class Options:
     resolution: int = 2048
     uv_map: str = ""
     outdated: bool = False
+    samples: Path | None = None
+    stereo: bool = False
 
 
 Writer = Callable[[bpy.types.Scene, bpy.types.Object, Options], list[Path]]
@@ -89,6 +95,13 @@ def _events(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) 
 
 def _opensim(scene: bpy.types.Scene, _ground: bpy.types.Object, options: Options) -> list[Path]:
     return opensim_exports.write(scene, options.path, options.start, options.end)
+
+
+def _sound(scene: bpy.types.Scene, ground: bpy.types.Object, options: Options) -> list[Path]:
+    sound_exports.write(
+        scene, ground, options.path, options.start, options.end, samples=options.samples, stereo=options.stereo
+    )
+    return [options.path]
 
 
 @dataclass(frozen=True)
@@ -132,6 +145,7 @@ FORMATS = {
         kind: Format(suffix, label, description, _opensim)
         for kind, (suffix, label, description) in opensim_exports.KINDS.items()
     },
+    "WAV": Format(".wav", "Footsteps (WAV)", "The sound of the steps, computed from their forces", _sound),
 }
 """All formats: a further one is a row here."""
 

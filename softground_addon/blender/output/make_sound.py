@@ -1,0 +1,82 @@
+"""*Make Sound*: the steps as a file beside the .blend, and as a strip of the sequencer at the right frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ...core.errors import InputError
+from .. import compat, settings
+from ..operator_base import OnBake, beside_file, reports_errors
+from . import sound_exports
+
+STRIP = "SoftGround Footsteps"
+FILE = "footsteps.wav"
+
+
+def put_strip(scene: bpy.types.Scene, path: Path, frame: int) -> Any:
+    """A sound strip at a frame, on the channel of the one before, which it replaces, or else on the first free one."""
+    strips = compat.strips_of(scene)
+    older = next((strip for strip in strips if strip.type == "SOUND" and strip.name.startswith(STRIP)), None)
+    channel, volume = (older.channel, older.volume) if older else (_free_channel(strips), 1.0)
+    if older:
+        sound = older.sound
+        strips.remove(older)
+        if sound is not None and not sound.users:
+            bpy.data.sounds.remove(sound)
+    strip = strips.new_sound(STRIP, str(path), channel, frame)
+    strip.volume = volume
+    return strip
+
+
+def _free_channel(strips: Any) -> int:
+    return 1 + max((strip.channel for strip in strips), default=0)
+
+
+class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
+    """Compute the sound of the footsteps from their forces, write it beside the file, and put it into the sequencer"""
+
+    bl_idname = "softground.make_sound"
+    bl_label = "Make Sound"
+    bl_options = {"REGISTER", "UNDO"}
+
+    samples: StringProperty(
+        name="Own Sounds",
+        description="Folder of WAV files of single steps to play instead, as loud as the forces say. "
+        "Those with the ground in their names, such as snow_1.wav, are for that ground",
+        subtype="DIR_PATH",
+    )
+    stereo: BoolProperty(
+        name="From the Camera",
+        description="Hear each step from where the camera sees it, softer the farther it is",
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        if not bpy.data.filepath:
+            raise InputError("The sound is written beside the .blend file: save the file first.")
+        path, options = beside_file(FILE), scene.softground
+        sound_exports.write(
+            scene,
+            options.ground,
+            path,
+            options.frame_start,
+            options.frame_end,
+            samples=Path(bpy.path.abspath(self.samples)) if self.samples else None,
+            stereo=self.stereo,
+        )
+        if compat.PLAYS_SOUND:
+            put_strip(scene, path, options.frame_start)
+            compat.show_in_sequencer(context, scene)
+        self.report({"INFO"}, f"Wrote {path}" + (", and put it into the sequencer" if compat.PLAYS_SOUND else ""))
+        return {"FINISHED"}
+
+
+CLASSES = (SOFTGROUND_OT_make_sound,)

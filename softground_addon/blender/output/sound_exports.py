@@ -1,0 +1,100 @@
+"""The sound of a bake's steps as a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.after import sound, wave_file
+from ...core.after.sound import SoundStep
+from ...core.errors import InputError
+from ...core.files import files
+from ...core.record.edits import step_id
+from ...core.record.footprints import Footprint
+from .. import settings
+from ..ground import baked_ground
+
+
+def write(
+    scene: bpy.types.Scene,
+    ground: bpy.types.Object,
+    path: Path,
+    start: int,
+    end: int,
+    *,
+    samples: Path | None = None,
+    stereo: bool = False,
+) -> None:
+    """Write the sound of some frames, which begins with the first of them.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    ground : bpy.types.Object
+    path : Path
+    start, end : int
+        First and last frame.
+    samples : Path, optional
+        Folder of recordings to play instead of computed sounds.
+    stereo : bool
+        Whether each step comes from where the camera sees it.
+
+    Raises
+    ------
+    InputError
+        If there is no bake or it has no events, the folder has no recordings, there is no camera, or the file cannot
+        be written.
+    """
+    rate = settings.frame_rate_of(scene)
+    table = baked_ground.events_of(ground)
+    footprints, _ = baked_ground.load(ground)
+    recordings = _recordings(samples) if samples else []
+    steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
+    if stereo:
+        steps = _seen_by_camera(scene, steps, footprints)
+    heard = sound.footsteps(steps, (end - start + 1) / rate, recordings)
+    with files.replacing(path) as partial:
+        partial.write_bytes(wave_file.dump(heard))
+
+
+def _recordings(folder: Path) -> list[tuple[str, np.ndarray]]:
+    """All WAV files of a folder, by name."""
+    if not folder.is_dir():
+        raise InputError(f"There is no folder '{folder}': choose one that holds WAV files of single steps.")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".wav" and path.is_file())
+    if not paths:
+        raise InputError(f"There is no WAV file in '{folder}': choose a folder that holds recordings of single steps.")
+    return [(path.name, wave_file.read(path)) for path in paths]
+
+
+def _seen_by_camera(
+    scene: bpy.types.Scene, steps: Sequence[SoundStep], footprints: Sequence[Footprint]
+) -> list[SoundStep]:
+    """The steps with the gains of two channels: to the side where the camera sees them, softer the farther they are."""
+    camera = scene.camera
+    if camera is None:
+        raise InputError(f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make mono sound.")
+    unit, places = scene.unit_settings.scale_length, {step_id(one): one for one in footprints}
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    seen = []
+    try:
+        for one in steps:
+            footprint = places[one.name]
+            scene.frame_set(int(footprint.start_frame))
+            place = camera.matrix_world.inverted() @ Vector((footprint.position / unit).tolist())
+            seen.append((place.x, max(place.length, 1e-6)))
+    finally:
+        scene.frame_set(frame, subframe=subframe)
+    nearest = min((distance for _, distance in seen), default=1.0)
+    return [replace(one, gains=_gains(side / far, nearest / far)) for one, (side, far) in zip(steps, seen, strict=True)]
+
+
+def _gains(side: float, loud: float) -> tuple[float, float]:
+    """Of left and right, of equal power wherever the sound is between -1 and 1."""
+    angle = (side + 1.0) * np.pi / 4
+    return float(loud * np.cos(angle)), float(loud * np.sin(angle))
