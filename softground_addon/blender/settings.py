@@ -154,6 +154,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         tread_m=typed(options.tread),
         tread_pattern=options.tread_pattern,
         relief=options.relief,
+        relief_vertices=options.relief_vertices,
         relief_strength=typed(options.relief_strength),
         relief_look=options.material.surface if options.relief != "OFF" else "",
         margin_m=typed(options.ground_margin),

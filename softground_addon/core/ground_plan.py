@@ -18,6 +18,7 @@ from .numerics.slices import Slices, sliced
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 MARGIN = 2.0
 """How far the ground reaches beyond the feet, in lengths of the longest sole."""
@@ -77,7 +78,7 @@ class GroundPlan:
     raster: float = 0.0
     warnings: tuple[str, ...] = ()
 
-    def fine_blocks(self, spacing: float, reach: float) -> tuple[Indices, int]:
+    def fine_blocks(self, spacing: float, reach: float, chosen: Mask | None = None) -> tuple[Indices, int]:
         """The squares that hold all places within reach of a footfall.
 
         Parameters
@@ -86,6 +87,8 @@ class GroundPlan:
             Side of a grid's cells [m].
         reach : float
             How far beyond the soles the ground changes [m].
+        chosen : (N,) bool array, optional
+            The footfalls that count; by default all.
 
         Returns
         -------
@@ -94,13 +97,14 @@ class GroundPlan:
         level : int
         """
         assert self.footfalls is not None, "where the feet come down is not known"
+        footfalls = self.footfalls if chosen is None else self.footfalls[chosen]
         reach += self.raster + spacing / 2
         level = max(0, int(np.floor(np.log2(reach / BLOCKS_IN_REACH / spacing))))
         side = spacing * 2**level
         far = reach / side + np.sqrt(0.5)  # from the middle of a block to where the place may be
         row, column = np.mgrid[-int(far) : int(far) + 1, -int(far) : int(far) + 1]
         disc = keys_of(np.stack([column, row], axis=-1)[row**2 + column**2 <= far**2])
-        return cells_of(np.unique(cells_at(self.footfalls, side)[:, None] + disc)), level
+        return cells_of(np.unique(cells_at(footfalls, side)[:, None] + disc)), level
 
 
 def extent(motions: Sequence[CharacterMotion]) -> tuple[Array, Array]:

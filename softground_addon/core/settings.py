@@ -7,6 +7,7 @@ thought, everything depends.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import IntEnum
@@ -17,7 +18,13 @@ from .loads.estimate import ForceModel
 from .response.response import GroundingOptions, TiltOptions
 
 CLOSE_UP_SPACING = 0.0025
-"""Distance of the vertices of a trail that is seen from close by [m]: grooves of a tread are 4 mm wide."""
+"""Distance of the vertices of a trail that is seen from close by [m], about: grooves of a tread are 4 mm wide."""
+
+
+def spacing_of(cell_size: float, relief: str) -> float:
+    """Distance of the vertices along a trail that show some relief [m]: that of the cells, or halved some times."""
+    halvings = max(0, round(math.log2(cell_size / CLOSE_UP_SPACING))) if relief == "CLOSE_UP" else 0
+    return cell_size / 2.0**halvings
 
 
 class Acts(IntEnum):
@@ -166,6 +173,8 @@ class BakeSettings(SceneUnits):
     tread_pattern : str
         One of `relief.tread.PATTERNS`.
     relief : 'OFF', 'FINE' or 'CLOSE_UP'
+    relief_vertices : int
+        Most that a close-up may have along the trail.
     relief_strength : float
         Of all relief: 1 is as the look's amounts say.
     relief_look : str
@@ -194,6 +203,7 @@ class BakeSettings(SceneUnits):
     tread_m: float = field(metadata=_on(Acts.WRITING))
     tread_pattern: str = field(metadata=_on(Acts.WRITING))
     relief: str = field(metadata=_on(Acts.WRITING))
+    relief_vertices: int = field(metadata=_on(Acts.WRITING))
     relief_strength: float = field(metadata=_on(Acts.WRITING))
     relief_look: str = field(metadata=_on(Acts.WRITING))
     margin_m: float = field(metadata=_on(Acts.OUTPUT))
@@ -202,7 +212,7 @@ class BakeSettings(SceneUnits):
     @property
     def spacing_m(self) -> float:
         """Distance of the vertices along the trail [m]: that of the cells, or less where pictures come close."""
-        return min(self.cell_size_m, CLOSE_UP_SPACING) if self.relief == "CLOSE_UP" else self.cell_size_m
+        return spacing_of(self.cell_size_m, self.relief)
 
     def between(self, first: Acts, last: Acts) -> dict[str, Any]:
         """The settings that act first on one of these stages."""

@@ -62,6 +62,28 @@ def test_close_up_has_a_fine_mesh_with_the_tread_in_it_and_none_painted(baked):
     assert ground_mesh.SOLE in baked["FINE"][4]
 
 
+def test_close_up_is_fine_where_the_camera_comes_near_and_as_the_cells_elsewhere(scene):
+    shots.walker(scene, frames=40)
+    bpy.ops.softground.add_character()
+    scene.render.resolution_x = scene.render.resolution_y = 200
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location = (0.0, 0.0, 0.6)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    bpy.context.view_layer.update()
+    bake(scene, cell_size=0.01, relief="CLOSE_UP")
+    place = heights(scene.softground.ground)[:, :2]
+    steps = record.load(bytes(scene.softground.ground.data[ground_mesh.RECORD])).footprints
+    away = [np.hypot(*(step.position[:2] - (0.0, 0.0))) for step in steps]
+
+    def spacing(step):
+        around = place[np.abs(place - step.position[:2]).max(axis=1) < 0.05]
+        return np.diff(np.unique(around[:, 0].round(5))).min()
+
+    assert spacing(steps[int(np.argmin(away))]) == pytest.approx(0.0025, abs=1e-4)
+    assert spacing(steps[int(np.argmax(away))]) == pytest.approx(0.01, abs=1e-4)
+
+
 def test_the_first_character_of_a_scene_gets_fine_relief(scene):
     shots.walker(scene, frames=10)
     for name in ("relief", "tread"):

@@ -36,6 +36,7 @@ from ...core.simulation import simulate
 from .. import settings
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.baked_ground import EVENTS
+from ..ground.camera_reach import near_camera
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
@@ -227,7 +228,9 @@ def _created(
     reach = created_ground.reach_of(wanted.material)
     yield Progress("write", 0.2)
     wide = created_ground.widened(scene, plan, wanted.margin_m)
-    layout = created_ground.lay_out(wide, wanted.spacing_m, wanted.unit_scale_m, reach=reach)
+    layout = created_ground.lay_out(
+        wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach, close_up=_close_up(scene, wanted, plan)
+    )
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
     yield Progress("write", 0.3)
@@ -236,6 +239,26 @@ def _created(
     )
     yield Progress("write", 0.3)
     return baked_ground.on_created(scene, settings.found(name), layout, trail, wanted.surface)
+
+
+CLOSE_UP_FROM = 1.5
+"""Grounds whose vertices lie further apart than this many spacings of a close-up get a copy that is finer."""
+
+
+def _spacing(wanted: BakeSettings, trail: Trail) -> float:
+    """Distance of the vertices of a copy along the trail [m]: that of a close-up, if there are not too many then."""
+    spacing, area = wanted.spacing_m, len(trail.moved) * wanted.cell_size_m**2
+    while spacing < wanted.cell_size_m and area / spacing**2 > wanted.relief_vertices:
+        spacing = min(2.0 * spacing, wanted.cell_size_m)
+    return spacing
+
+
+def _close_up(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> created_ground.CloseUp | None:
+    """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
+    if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
+        return None
+    near = near_camera(scene, plan.footfalls, wanted.spacing_m)
+    return created_ground.CloseUp(wanted.spacing_m, near, wanted.relief_vertices)
 
 
 def _given(
@@ -256,13 +279,14 @@ def _given(
     cover = yield from meanwhile(Progress("write", 0.2), coverage.slices(vertices, index, trail.printed, cell_size))
     ground = settings.found(name)
     findings = coverage_findings(ground, cover, detail, cell_size)
-    if not wants_detail(ground, cover, detail, cell_size, sole_length):
+    too_coarse = detail == "AUTO" and cover.spacing > CLOSE_UP_FROM * wanted.spacing_m and wanted.relief == "CLOSE_UP"
+    if not too_coarse and not wants_detail(ground, cover, detail, cell_size, sole_length):
         if not are_undone(ground, vertices, index, shot.terrain, unit_scale=unit_scale, detail=detail):
             return baked_ground.on_itself(ground, index, vertices), findings
         findings = [*findings, undone_prints(ground)]
     coarse = trail_detail.surface_of(ground, unit_scale)
     refinement = yield from meanwhile(
-        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), wanted.spacing_m)
+        Progress("write", 0.3), refine.slices(coarse, Region(trail.moved, cell_size), _spacing(wanted, trail))
     )
     drafted_name = settings.name_of(drafts.enter_context(trail_detail.draft(settings.found(name), coarse, refinement)))
     yield Progress("write", 0.4)

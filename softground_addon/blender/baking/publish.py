@@ -61,7 +61,9 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
     x, y = place.position[:, 0], place.position[:, 1]
     moment = at_the_end(made_with)
     sample = yield from meanwhile(Progress("write", 0.6), sample_at.slices(footprints, x, y, **moment))
-    relief = yield from meanwhile(Progress("write", 0.65), relief_at.slices(footprints, x, y, made_with))
+    sigma, inputs = made_with.material.blur_sigma, made_with.inputs()
+    relief_of = relief_at.slices(footprints, x, y, inputs, blur_sigma=sigma)
+    relief = yield from meanwhile(Progress("write", 0.65), relief_of)
     if relief:
         sample = sample.with_relief(*all_together(relief, len(x)).T)
     over_time = playback_curves_at.slices(
@@ -140,7 +142,7 @@ def _tread(
     """What `ground_mesh.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
     has one, or relief has it in the mesh."""
     in_relief = {(step.character, step.sole) for step, its in zip(footprints, relief, strict=False) if its.tread}
-    shod = shod_of(made_with) - in_relief
+    shod = shod_of(made_with.inputs()) - in_relief
     if not made_with.tread_m > 0 or not any((step.character, step.sole) in shod for step in footprints):
         return None
     marks = sole_marks(footprints, footprints[0].cell_size, shod)

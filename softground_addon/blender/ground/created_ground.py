@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.ground.heightfield import Terrain
 from ...core.ground.material import GroundMaterial
 from ...core.ground_plan import GroundPlan
-from ...core.meshing.graded_grid import GradedGrid, graded_grid
+from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.settings import BakeSettings
 from ..settings import find, name_of
 from .ground_mesh import discard, mesh_of, write_positions
@@ -58,7 +58,7 @@ class Layout:
 def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
     """A new ground with the material of the preset, set as the scene's ground."""
     wide = widened(scene, plan, wanted.margin_m)
-    layout = lay_out(wide, wanted.spacing_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
+    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
     with draft(layout, soft_edge(wanted.margin_m)) as ground:
         publish(scene, ground, wanted.surface)
     return ground
@@ -111,7 +111,28 @@ def reach_of(material: GroundMaterial) -> float:
     return material.rim_reach + BLUR_REACH * material.blur_sigma
 
 
-def lay_out(plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: float = 0.0) -> Layout:
+@dataclass(frozen=True)
+class CloseUp:
+    """Where a ground is finer than its cells.
+
+    Attributes
+    ----------
+    spacing : float
+        Distance of the vertices there [m], at most that of the cells; doubled where there would be too many.
+    near : (N,) bool array
+        The plan's footfalls around which it is.
+    vertices : int
+        Most that there may be.
+    """
+
+    spacing: float
+    near: NDArray[np.bool_]
+    vertices: int
+
+
+def lay_out(
+    plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: float = 0.0, close_up: CloseUp | None = None
+) -> Layout:
     """A plane ground whose vertices sit on the centres of the cells.
 
     Parameters
@@ -124,8 +145,9 @@ def lay_out(plan: GroundPlan, cell_size: float, unit_scale: float, *, reach: flo
         Metres per Blender unit.
     reach : float
         How far beyond the footfalls it is fine [m].
+    close_up : CloseUp, optional
     """
-    grid, spacing = _graded(plan, cell_size, reach)
+    grid, spacing = _graded(plan, cell_size, reach, close_up)
     place = (grid.vertices + 0.5) * spacing
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
     centre = np.append(middle, plan.terrain.heights(*middle))
@@ -189,7 +211,7 @@ def publish(scene: bpy.types.Scene, ground: bpy.types.Object, surface: str) -> N
         layer.objects.active = ground
 
 
-def _graded(plan: GroundPlan, cell_size: float, reach: float) -> tuple[GradedGrid, float]:
+def _graded(plan: GroundPlan, cell_size: float, reach: float, close_up: CloseUp | None) -> tuple[GradedGrid, float]:
     """The grid in whole spacings, its vertices in the middle of the cells, and the spacing [m]."""
 
     def corners(spacing: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -200,6 +222,18 @@ def _graded(plan: GroundPlan, cell_size: float, reach: float) -> tuple[GradedGri
         cells = np.ceil((plan.upper - plan.lower) / cell_size).prod()
         spacing = cell_size * int(np.ceil(np.sqrt(max(1.0, cells / MAX_GRID_VERTICES))))
         return graded_grid(np.zeros((0, 2), dtype=np.intp), 0, *corners(spacing), 0), spacing
+    if close_up is not None and close_up.near.any():
+        spacing = close_up.spacing
+        fine, level = plan.fine_blocks(spacing, reach, close_up.near)
+        while len(fine) * 4**level > close_up.vertices and spacing * 2 < cell_size * 1.5:
+            spacing *= 2
+            fine, level = plan.fine_blocks(spacing, reach, close_up.near)
+        if spacing < 0.75 * cell_size and len(fine) * 4**level <= close_up.vertices:
+            coarser = int(np.rint(np.log2(cell_size / spacing)))
+            further, its_level = plan.fine_blocks(spacing * 2**coarser, reach)
+            coarsest = max(level, its_level + coarser, int(np.floor(np.log2(max(COARSEST / spacing, 1.0)))))
+            far = Blocks(further, its_level + coarser, coarser)
+            return graded_grid(fine, level, *corners(spacing), coarsest, far), spacing
     spacing = cell_size
     fine, level = plan.fine_blocks(spacing, reach)
     while len(fine) * 4**level > MAX_GRID_VERTICES:

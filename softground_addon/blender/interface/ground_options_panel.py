@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ...core.loads.cell_limits import BYTES_PER_CELL
+from ...core.settings import spacing_of
 from .. import settings
 from ..ground import painted_ground
 from . import prediction
@@ -42,6 +43,14 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
         amount = column.row()
         amount.active = options.relief != "OFF"
         amount.prop(options, "relief_strength", text="Amount")
+        if options.relief == "CLOSE_UP":
+            column.prop(options, "relief_vertices")
+            predicted = prediction.of(scene)
+            if predicted:
+                row = layout.row()
+                row.active = False
+                spacing = spacing_of(settings.typed(options.cell_size), options.relief)
+                row.label(text=vertices(predicted.analysis.area, spacing), icon="INFO", translate=False)
         layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
 
 
@@ -97,6 +106,15 @@ class SOFTGROUND_PT_mesh(_Closed, bpy.types.Panel):
             row = layout.row()
             row.active = False
             row.label(text=estimate(predicted.analysis.area, options.cell_size), icon="INFO", translate=False)
+
+
+AROUND_SOLES = 3.0
+"""Area that is fine around soles over the area that they cover, about."""
+
+
+def vertices(area: float, spacing: float) -> str:
+    """Vertices of a close-up along all of a trail, from the area that soles cover [m²]."""
+    return f"About {rounded(AROUND_SOLES * area / spacing**2):,.0f} vertices along all of the trail"
 
 
 def estimate(area: float, cell_size: float) -> str:

@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
+from ...core.relief_plan import relief_at
 from ..ground import baked_ground, display_key, ground_mesh, own_data, playback
 
 
@@ -33,7 +34,10 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
     moved = playback.moved_vertices(ground_mesh.mesh_of(display_mesh))
     world = ground_mesh.rest_vertices(display_mesh, unit_scale)[moved]
     footprints, about = baked_ground.load(ground)
-    over_time = vertex_histories(footprints, *world[:, :2].T, blur_sigma=baked_ground.baked_with(about, "blur_sigma"))
+    sigma = baked_ground.baked_with(about, "blur_sigma")
+    x, y = world[:, :2].T
+    relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
+    over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
     up = ground_mesh.up_of(display_mesh, unit_scale)
 
     def samples() -> Iterator[NDArray[np.float32]]:

@@ -17,6 +17,7 @@ from ...core.meshing.uv_raster import Pixels, rasterise
 from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint
+from ...core.relief_plan import relief_at
 from .. import settings
 from ..ground import baked_ground, ground_mesh, refined_mesh
 from .exports import baked_display_mesh, written_by_blender
@@ -72,7 +73,9 @@ def export_images(
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)
-    over_time = vertex_histories(footprints, *pixels.position.T, blur_sigma=sigma)
+    x, y = pixels.position.T
+    relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
+    over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
     if not folder.is_dir():
         raise InputError(f"There is no folder '{folder}': create it first, or choose another.")
     stem = name or bpy.path.clean_name(ground.name)

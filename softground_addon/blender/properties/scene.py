@@ -170,9 +170,21 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         items=[
             ("OFF", "Off", "Smooth prints, as they are computed"),
             ("FINE", "Fine", "In the mesh as fine as the cells: for trails and whole figures"),
-            ("CLOSE_UP", "Close-Up", "With vertices 2.5 mm apart along the trail, and the tread of shoes in the mesh"),
+            (
+                "CLOSE_UP",
+                "Close-Up",
+                "With vertices 2.5 mm apart along the trail where the camera comes near, and the tread of shoes in the "
+                "mesh. Without a camera, along the whole trail",
+            ),
         ],
         default="OFF",
+    )
+    relief_vertices: IntProperty(
+        name="Most Vertices",
+        description="Vertices that Close-Up may spend along the trail; where it would take more, it is coarser",
+        default=2_000_000,
+        min=10_000,
+        soft_max=10_000_000,
     )
     relief_strength: FloatProperty(
         name="Relief Amount",

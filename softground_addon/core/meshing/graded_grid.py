@@ -10,7 +10,8 @@ de Berg et al., "Computational Geometry", 3rd ed. (2008), chapter 14: quadtrees 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,34 @@ class GradedGrid:
     face_size: Indices
 
 
-def graded_grid(fine: Indices, level: int, lower: Indices, upper: Indices, coarsest: int) -> GradedGrid:
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks that are to be made of squares of one size.
+
+    Attributes
+    ----------
+    place : (N, 2) int array
+        Column and row of each block.
+    level, size : int
+        Sides of a block and of its squares, as powers of two [cells].
+    """
+
+    place: Indices
+    level: int
+    size: int
+
+    def parents(self, count: Indices, coarsest: int) -> Keys:
+        """Keys of the blocks of twice the size of the squares, those inside of a rectangle."""
+        inside = ((self.place >= 0) & (self.place < count << coarsest - self.level)).all(axis=1)
+        blocks = np.unique(keys_of(self.place[inside]))
+        for _ in range(self.size + 1, self.level):
+            blocks = _quarters(blocks)
+        return parents_of(blocks) if self.level == self.size else blocks
+
+
+def graded_grid(
+    fine: Indices, level: int, lower: Indices, upper: Indices, coarsest: int, coarser: Blocks | None = None
+) -> GradedGrid:
     """Fill a rectangle with squares that are one cell large in given blocks and grow with the distance from them.
 
     Parameters
@@ -54,6 +82,8 @@ def graded_grid(fine: Indices, level: int, lower: Indices, upper: Indices, coars
         Corners that the rectangle reaches at least [cells]; it consists of whole squares of the largest size.
     coarsest : int
         Side of the largest squares, as a power of two [cells]; not below `level`.
+    coarser : Blocks, optional
+        Further blocks, whose squares are larger; not larger than the largest.
 
     Examples
     --------
@@ -64,7 +94,9 @@ def graded_grid(fine: Indices, level: int, lower: Indices, upper: Indices, coars
     side = 1 << coarsest
     origin = lower // side * side
     count = np.maximum(-(-upper // side) - lower // side, 1)
-    cut = _cut_blocks(np.asarray(fine) - origin // (1 << level), level, count, coarsest)
+    kinds = [Blocks(np.asarray(fine), level, 0), *([coarser] if coarser else [])]
+    inside = [replace(kind, place=kind.place - origin // (1 << kind.level)) for kind in kinds]
+    cut = _cut_blocks(inside, count, coarsest)
     blocks = keys_of(np.stack(np.meshgrid(*map(np.arange, count)), axis=-1)).ravel()
     place, size = [], []
     for number in range(coarsest, -1, -1):
@@ -75,16 +107,14 @@ def graded_grid(fine: Indices, level: int, lower: Indices, upper: Indices, coars
     return _polygons(np.concatenate(place), np.concatenate(size), origin)
 
 
-def _cut_blocks(fine: Indices, level: int, count: Indices, coarsest: int) -> dict[int, Keys]:
+def _cut_blocks(kinds: Sequence[Blocks], count: Indices, coarsest: int) -> dict[int, Keys]:
     """Keys of the blocks that are cut in four, by level: those above a fine one, and what keeps the sizes balanced."""
-    inside = ((fine >= 0) & (fine < count << coarsest - level)).all(axis=1)
-    blocks = np.unique(keys_of(fine[inside]))
-    for _ in range(1, level):
-        blocks = _quarters(blocks)
-    if level == 0:
-        blocks = parents_of(blocks)
+    blocks = np.zeros(0, dtype=np.int64)
     cut = {}
     for number in range(1, coarsest + 1):
+        for kind in kinds:
+            if kind.size + 1 == number:
+                blocks = np.union1d(blocks, kind.parents(count, coarsest))
         cut[number] = blocks
         around = cells_of(np.unique(blocks[:, None] + AROUND))
         inside = ((around >= 0) & (around < count << coarsest - number)).all(axis=1)

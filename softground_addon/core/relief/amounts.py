@@ -72,6 +72,8 @@ class Amounts:
     bends_with_depth : bool
         Whether walls are bent at each depth otherwise.
     chunks : Chunks or None
+    ledges : tuple of Bend
+        By how much the wall stands out or back at each height of its own.
     wall : float
         Width of the wall seen from above; 0 keeps the walls that the simulation has.
     tread : Tread or None
@@ -82,6 +84,7 @@ class Amounts:
     bends: tuple[Bend, ...] = ()
     bends_with_depth: bool = False
     chunks: Chunks | None = None
+    ledges: tuple[Bend, ...] = ()
     wall: float = 0.0
     tread: Tread | None = None
     layers: tuple[Layer, ...] = ()
@@ -123,9 +126,9 @@ def parse(text: str, origin: str) -> Amounts:
         for name, kind in LAYERS.items()
         for values in _list(table.pop(name, []))
     ]
-    parts: dict[str, Any] = {
-        "bends": tuple(_made(Bend, one, f"{origin}, bends") for one in _list(table.pop("bends", [])))
-    }
+    parts: dict[str, Any] = {}
+    for name in ("bends", "ledges"):
+        parts[name] = tuple(_made(Bend, one, f"{origin}, {name}") for one in _list(table.pop(name, [])))
     for name, kind in (("chunks", Chunks), ("tread", Tread)):
         if name in table:
             parts[name] = _made(kind, table.pop(name), f"{origin}, {name}")

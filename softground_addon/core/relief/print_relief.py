@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 SHALLOW = 0.5
 """Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""
+NEARLY = 0.8
+"""Sizes down to this part of the vertices' distance are shown."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
 
@@ -65,7 +67,8 @@ class PrintRelief:
         tread: str | None = None,
         tread_strength: float = 1.0,
     ) -> None:
-        self._shape, self._amounts, self._seed, self._finest = shape, amounts, seed, finest
+        self._shape, self._amounts, self._seed = shape, amounts, seed
+        self._finest = finest * NEARLY
         self._size = (shape.along[1] - shape.along[0]) / LENGTH
         self._tread = tread if GROOVE * self._size > 1.5 * finest else None
         self._tread_strength = tread_strength
@@ -130,12 +133,24 @@ class PrintRelief:
         wall = self._amounts.wall * MM * self._shape.fineness
         if wall:
             pressed = rise((places.inward + wider) / wall + 0.5)
+            pressed = rise((places.inward + wider + self._ledges(places, places.floor * pressed)) / wall + 0.5)
             compression, rim = places.floor * pressed, places.continued * (1.0 - pressed)
         else:
             pressed = rise(places.inward / (2.0 * self._shape.cell_size) + 0.5)
             compression, rim = places.bent_compression, places.bent_rim
         deeper = (compression - places.compression) * places.fade
         return (rim - places.rim) * places.fade - deeper, deeper, pressed
+
+    def _ledges(self, places: _Places, depth: Array) -> Array:
+        """How much further inside places of the wall are, which lie at some depth [m]: walls are no prisms."""
+        further = np.zeros(len(depth))
+        on_wall = np.flatnonzero(np.abs(places.inward) < 2.0 * self._amounts.wall * MM)
+        at = (places.x[on_wall], places.y[on_wall], depth[on_wall])
+        for number, octave in enumerate(self._amounts.ledges):
+            size, amount = (length * MM * self._shape.fineness for length in (octave.size, octave.amount))
+            if size >= self._finest:
+                further[on_wall] += amount * noise(self._seed + 51 + number, size, *at)
+        return further
 
     def _relief(self, places: _Places) -> Relief:
         height, compression, pressed = self._rebuilt(places, self._wider)
@@ -158,7 +173,8 @@ class PrintRelief:
         along, across = shape.under_sole(places.x + bent[0], places.y + bent[1])
         middle = sum(shape.along) / 2
         under = Under((along - middle) / self._size, across / self._size, around.inward / self._size)
-        lost = tread.kept + (tread.lost - tread.kept) * around.patches(43, 30.0)
+        worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
+        lost = tread.kept + (tread.lost - tread.kept) * worn * worn
         within = rise((around.inward - around.length(3.0)) / around.length(6.0))
         ridges = PATTERNS[self._tread](under)
         return (ridges - 0.3) * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength

@@ -54,8 +54,6 @@ class ReliefSettings:
     Attributes
     ----------
     amounts : Amounts
-    finest : float
-        Distance between the vertices that show it [m].
     strength : float
         Of all of it: 1 is as the amounts say.
     tread : str
@@ -67,7 +65,6 @@ class ReliefSettings:
     """
 
     amounts: Amounts
-    finest: float
     strength: float = 1.0
     tread: str = "HIKING"
     tread_strength: float = 1.0
@@ -114,7 +111,7 @@ def _step(
         footprint,
         wanted.amounts,
         blur_sigma=blur_sigma,
-        finest=wanted.finest,
+        finest=_finest(places, point, footprint.cell_size),
         seed=zlib.crc32(step_id(footprint).encode()),
         tread=wanted.tread if shod else None,
         tread_strength=wanted.tread_strength,
@@ -128,6 +125,13 @@ def _step(
     standing[point] += change
     some = change.any(axis=1)
     return StepRelief(point[some], change[some], of_print.has_tread)
+
+
+def _finest(places: Places, point: Indices, cell_size: float) -> float:
+    """Distance between places around a print [m], as a whole part of a cell: what is finer cannot be shown there."""
+    column, row = np.floor(places.x[point] / cell_size), np.floor(places.y[point] / cell_size)
+    cells = len(np.unique(column + 1j * row))
+    return float(cell_size / max(1.0, np.round(np.sqrt(len(point) / cells))))
 
 
 def all_together(steps: Sequence[StepRelief], places: int) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softground_addon.core.meshing.graded_grid import graded_grid
+from softground_addon.core.meshing.graded_grid import Blocks, graded_grid
 
 
 def faces_of(grid):
@@ -35,15 +35,17 @@ def layouts(draw):
     coarsest = draw(st.integers(level, 4))
     lower = np.array(draw(st.tuples(st.integers(-40, 40), st.integers(-40, 40))))
     upper = lower + np.array(draw(st.tuples(st.integers(1, 60), st.integers(1, 60))))
-    fine = draw(st.lists(st.tuples(st.integers(-20, 25), st.integers(-20, 25)), max_size=12))
-    return blocks(*fine), level, lower, upper, coarsest
+    places = st.lists(st.tuples(st.integers(-20, 25), st.integers(-20, 25)), max_size=12)
+    size = draw(st.integers(0, coarsest))
+    coarser = Blocks(blocks(*draw(places)), draw(st.integers(size, coarsest)), size) if draw(st.booleans()) else None
+    return blocks(*draw(places)), level, lower, upper, coarsest, coarser
 
 
 @settings(max_examples=150)
 @given(layouts())
 def test_the_faces_fill_the_rectangle_without_cracks(layout):
-    fine, level, lower, upper, coarsest = layout
-    grid = graded_grid(fine, level, lower, upper, coarsest)
+    lower, upper, coarsest = layout[2:5]
+    grid = graded_grid(*layout)
     low, high = grid.vertices.min(axis=0), grid.vertices.max(axis=0)
     assert (low <= lower).all()
     assert (high >= upper).all()
@@ -66,8 +68,8 @@ def test_the_faces_fill_the_rectangle_without_cracks(layout):
 @settings(max_examples=100)
 @given(layouts())
 def test_it_is_fine_where_it_is_wanted_and_sizes_change_by_two_at_most(layout):
-    fine, level, lower, upper, coarsest = layout
-    grid = graded_grid(fine, level, lower, upper, coarsest)
+    fine, level, _, _, coarsest, coarser = layout
+    grid = graded_grid(*layout)
     low, high = grid.vertices.min(axis=0), grid.vertices.max(axis=0)
     size_at = np.zeros(tuple(high - low), dtype=int)
     for face, area in zip(faces_of(grid), areas(grid), strict=True):
@@ -79,6 +81,9 @@ def test_it_is_fine_where_it_is_wanted_and_sizes_change_by_two_at_most(layout):
             first = np.maximum(block * 2**level - low, 0)
             last = np.maximum((block + 1) * 2**level - low, 0)
             assert (size_at[first[0] : last[0], first[1] : last[1]] == 1).all()
+    for block in coarser.place if coarser else ():
+        first, last = (np.maximum((block + end) * 2**coarser.level - low, 0) for end in (0, 1))
+        assert (size_at[first[0] : last[0], first[1] : last[1]] <= 2**coarser.size).all()
     for ahead, behind in ((size_at[1:], size_at[:-1]), (size_at[:, 1:], size_at[:, :-1])):
         assert (np.maximum(ahead, behind) <= 2 * np.minimum(ahead, behind)).all()
 
