@@ -126,6 +126,16 @@ def test_the_table_holds_the_same_forces(baked, tmp_path):
         baked.frame_set(int(row["frame"]))
         assert float(row["force_n"]) == pytest.approx(empty[f"{row['sole']} force"], abs=1e-2)
         assert float(row["time_s"]) == pytest.approx((int(row["frame"]) - 1) / 24, abs=1e-6)
+    assert all(0 < float(row["deviation_n"]) < 800 for row in rows if float(row["force_n"]) > 100)
+
+
+def test_the_table_outlives_who_left_the_prints(baked, tmp_path, capfd):
+    bpy.data.objects.remove(bpy.data.objects["Walker"])
+    bpy.ops.softground.export_forces(filepath=str(tmp_path / "forces"))
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "forces.csv").read_text())))
+    assert len(rows) == 2 * FRAMES
+    assert {row["deviation_n"] for row in rows} == {""}
+    assert "Without standard deviations" in capfd.readouterr().out
 
 
 def test_without_a_bake_both_say_what_is_missing(scene):

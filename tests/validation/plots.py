@@ -24,8 +24,11 @@ LONGEST = 2.6
 """Seconds of a trial that a plot shows: a few strides, so that one can see their shape."""
 
 
-def plot_trial(trial: Trial, path: str, curves: dict[str, Array], scored: Array, file: Path) -> None:
-    """Vertical force per foot and in total: plates, whole-body model, and the impulse model nearest to them."""
+def plot_trial(trial: Trial, path: str, curves: dict[str, Array], deviation: Array, scored: Array, file: Path) -> None:
+    """Vertical force per foot and in total: plates, whole-body model, and the impulse model nearest to them.
+
+    `deviation` (F, 2) is the standard deviation of the whole-body model's forces [N].
+    """
     weight = trial.mass * 9.81
     time = np.arange(len(trial.forces)) / trial.rate
     shown = time <= LONGEST
@@ -35,6 +38,10 @@ def plot_trial(trial: Trial, path: str, curves: dict[str, Array], scored: Array,
     )
     figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True, constrained_layout=True)
     pick = {"left foot": lambda f: f[:, 0, 2], "right foot": lambda f: f[:, 1, 2], "both": lambda f: f[..., 2].sum(1)}
+    for axis, band in zip(axes, deviation.T, strict=False):
+        foot = curves["WHOLE_BODY"][:, list(axes).index(axis), 2]
+        low, high = (np.maximum(foot + sign * band, 0.0)[shown] / weight for sign in (-1, 1))
+        axis.fill_between(time[shown], low, high, color="tab:red", alpha=0.2, linewidth=0)
     for axis, (what, vertical) in zip(axes, pick.items(), strict=True):
         axis.plot(time[shown], vertical(trial.forces)[shown] / weight, **MEASURED)
         for name in (impulse, "WHOLE_BODY"):

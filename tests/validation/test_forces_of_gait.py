@@ -14,6 +14,7 @@ import pytest
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.deviation import force_deviation
 from softground_addon.core.loads.estimate import CharacterLoads, estimate_loads
 from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.scoring import Score, plates_saw_everything, score
@@ -44,6 +45,25 @@ def scored(trial: Trial, motion: CharacterMotion | None = None) -> Score:
     weight, touching = trial.mass * 9.81, detect_contacts(motion, FlatTerrain()).touching
     frames = plates_saw_everything(trial.forces[..., 2], touching, weight=weight, rate=trial.rate)
     return score(forces_at_frames(motion), trial.forces, frames, weight=weight, rate=trial.rate)
+
+
+def test_errors_are_as_wide_as_their_standard_deviations_say():
+    """Two thirds of all frames lie within one of them where it is right, 95 % within two."""
+    inside = []
+    for file in sorted(DATA.glob("*.csv")):
+        trial = read_trial(file)
+        motion = motion_of_trial(trial)
+        loads = loads_of(motion)
+        steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
+        touching = detect_contacts(motion, FlatTerrain()).touching
+        seen = plates_saw_everything(trial.forces[..., 2], touching, weight=trial.mass * 9.81, rate=trial.rate)
+        error = np.abs(loads.forces.forces[::steps, :, 2] - trial.forces[..., 2])
+        bearing = seen[:, None] & (np.maximum(loads.forces.forces[::steps, :, 2], trial.forces[..., 2]) > 20)
+        deviation = force_deviation(loads)[::steps]
+        inside.append([np.mean(error[bearing] < width * deviation[bearing]) for width in (1, 2)])
+    one, two = np.median(inside, axis=0)
+    assert 0.6 < one < 0.9
+    assert two > 0.9
 
 
 def with_points(trial: Trial, change) -> Trial:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.deviation import force_deviation
 from softground_addon.core.loads.estimate import ForceModel, estimate_loads
 from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.plots import plot_trial
@@ -89,7 +90,7 @@ def validate(trial: Trial, output: Path) -> Iterator[dict[str, object]]:
             result = score(forces, trial.forces, scored, weight=trial.mass * GRAVITY, rate=trial.rate)
             about = {"trial": trial.name, "subject": trial.subject, "kind": trial.kind, "path": path, "model": model}
             yield about | dataclasses.asdict(result)
-        plot_trial(trial, path, curves, scored, output / f"{trial.name}_{path}.png")
+        plot_trial(trial, path, curves, deviation_of(motion), scored, output / f"{trial.name}_{path}.png")
 
 
 def motions_of(trial: Trial) -> Iterator[tuple[str, CharacterMotion]]:
@@ -113,6 +114,15 @@ def estimates(motion: CharacterMotion) -> Iterator[tuple[str, Array]]:
         )
         steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
         yield name, loads.forces.forces[::steps, order]
+
+
+def deviation_of(motion: CharacterMotion) -> Array:
+    """Standard deviation of the whole-body model's forces at the motion's frames, (F, 2) [N], left foot first."""
+    material = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=CHARACTERISTIC_TIMES[0])
+    loads = estimate_loads(motion, FlatTerrain(), force_model="WHOLE_BODY", material=material)
+    steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
+    order = [[sole.sole.side for sole in motion.soles].index(side) for side in "LR"]
+    return force_deviation(loads)[::steps, order]
 
 
 def print_table(rows: list[dict[str, object]]) -> None:

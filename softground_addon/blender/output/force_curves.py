@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,15 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 from numpy.typing import NDArray
 
+from ...core.errors import SoftGroundError
 from ...core.files import files
+from ...core.loads.deviation import force_deviation
+from ...core.loads.estimate import CharacterLoads
 from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
 from ..operator_base import OnBake, beside_file, reports_errors
+from ..reading import analysis
 
 Array = NDArray[np.float64]
 
@@ -47,16 +51,37 @@ def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tup
     return dict(sorted(curves.items()))
 
 
-def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float) -> str:
-    """The forces as comma-separated values, one row per frame and sole."""
+Deviations = Mapping[tuple[str, str], Array]
+"""Standard deviation of the force at each frame by character and sole [N]."""
+
+
+def deviations_of(loads: Sequence[CharacterLoads], frames: Array) -> Deviations:
+    """Standard deviations at scene frames of those forces that have one."""
+    found: dict[tuple[str, str], Array] = {}
+    for one in loads:
+        if one.motion.joints and one.motion.centre is None:
+            deviation = force_deviation(one)
+            for number, sole in enumerate(one.motion.soles):
+                values = np.interp(frames, one.motion.frames, deviation[:, number])
+                found[one.motion.name, sole.sole.name] = values
+    return found
+
+
+def table(
+    footprints: Sequence[Footprint], frames: Array, frame_rate: float, deviations: Deviations | None = None
+) -> str:
+    """The forces as comma-separated values, one row per frame and sole; a deviation that is not known stays empty."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n"])
+    rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n", "deviation_n"])
     curves = forces_over_time(footprints, frames)
+    known = deviations or {}
     for place, frame in enumerate(frames):
         for (character, sole), (force, contact) in curves.items():
             time = round((frame - frames[0]) / frame_rate, 6)
-            rows.writerow([int(frame), time, character, sole, int(contact[place]), round(float(force[place]), 3)])
+            deviation = round(float(known[character, sole][place]), 3) if (character, sole) in known else ""
+            newtons = round(float(force[place]), 3)
+            rows.writerow([int(frame), time, character, sole, int(contact[place]), newtons, deviation])
     return text.getvalue()
 
 
@@ -178,8 +203,14 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         footprints, frames = _baked(context)
+        scene = settings.scene_of(context)
+        try:
+            deviations = deviations_of(analysis.read(scene).loads, frames)
+        except SoftGroundError as error:  # the record is there without those who left it
+            self.report({"WARNING"}, f"Without standard deviations, as the shot cannot be read: {error}")
+            deviations = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
-        files.write_text(path, table(footprints, frames, settings.frame_rate_of(settings.scene_of(context))))
+        files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), deviations))
         self.report({"INFO"}, f"Wrote {path}")
         return {"FINISHED"}
 

@@ -100,7 +100,7 @@ class BodyDynamics:
         return np.where(known, np.stack([x, y], axis=-1), centre[..., :2])
 
 
-def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> BodyDynamics:
+def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cutoff_factor: float = 1.0) -> BodyDynamics:
     """Forces that the motion asks for, so far as it goes without knowing that they are 0 in flight.
 
     Parameters
@@ -110,6 +110,8 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
     airborne : (N,) bool array, optional
         Steps at which nothing seems to touch. Where they are flights and tell that contacts are brief, the cut-off is
         raised to suit them.
+    cutoff_factor : float
+        Of the cut-off found: what another choice would give.
     """
     sampled, frame_step = motion.on_frames, motion.frame_step
     points = mass_points(motion.at_frames())
@@ -130,11 +132,15 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None) -> Body
     if flying.any():
         cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
+    if cutoff_factor != 1:
+        body = smoothed(body.cutoff * cutoff_factor)
     slow = smoothed(min(SLOW_CUTOFF / (2 * np.pi * motion.pendulum_time), body.cutoff))
     return dataclasses.replace(body, slow=slow)
 
 
-def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> BodyDynamics:
+def with_flight(
+    motion: CharacterMotion, body: BodyDynamics, airborne: Mask, *, cutoff_factor: float = 1.0
+) -> BodyDynamics:
     """The same dynamics with the knowledge that nothing touches at the steps `airborne` (N,), and nothing ever pulls.
 
     In flight the force is 0: the body's mass is fitted to that, and the low-pass is the one that shows it best. Where
@@ -151,6 +157,7 @@ def with_flight(motion: CharacterMotion, body: BodyDynamics, airborne: Mask) -> 
     points, cutoff, fall = body.points, body.cutoff, motion.gravity
     if flying.any():
         points, cutoff, fall = _falling_freely(motion, body, flying)
+        cutoff *= cutoff_factor
     sampled, each = motion.on_frames, _of_each_pass(points, cutoff, motion.frame_step)
     path = np.zeros((len(sampled), 3))
     path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff)

@@ -100,6 +100,7 @@ def whole_body_forces(
     body: BodyDynamics | None = None,
     *,
     crisp_landings: bool = False,
+    cutoff_factor: float = 1.0,
 ) -> ContactForces:
     """Forces that accelerate the centre of mass as the motion shows: m·(g + a_com), where something touches.
 
@@ -114,6 +115,8 @@ def whole_body_forces(
     crisp_landings : bool
         Give a landing foot's momentum to the ground as fast as it stops, as on hard ground (see `_foot_impacts`);
         the low-pass spreads it over some tenths of a second.
+    cutoff_factor : float
+        See `body_dynamics`.
 
     Returns
     -------
@@ -121,7 +124,8 @@ def whole_body_forces(
         None pulls; they are 0 where nothing touches.
     """
     grounded = contacts.touching.any(axis=1)
-    body = with_flight(motion, body or body_dynamics(motion, ~grounded), ~grounded)
+    body = body or body_dynamics(motion, ~grounded, cutoff_factor=cutoff_factor)
+    body = with_flight(motion, body, ~grounded, cutoff_factor=cutoff_factor)
     body_weight = motion.mass * motion.gravity
     total = np.where((grounded & (body.force[:, 2] > 0))[:, None], body.force, 0.0)
     lowest = lowest_points(motion)
