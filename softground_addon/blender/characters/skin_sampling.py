@@ -219,9 +219,9 @@ def _dominant(vertex: Indices, bone: Indices, weight: Array, count: int, none: i
 
 @sliced
 def skinned(
-    skin: RigSkin, armature: bpy.types.Object, recording: Recording, chosen: Indices
+    skin: RigSkin, armature: bpy.types.Object, recording: Recording, chosen: Indices, *, axes: slice = slice(3)
 ) -> Slices[NDArray[np.float32]]:
-    """World positions of the chosen vertices over time, (F, N, 3) [m].
+    """World positions of the chosen vertices over time, (F, N, 3) [m], or some of their `axes`.
 
     Parameters
     ----------
@@ -235,21 +235,22 @@ def skinned(
     place[chosen] = np.arange(len(chosen))
     rest = np.column_stack([skin.vertices, np.ones(len(skin.vertices))])
     backs = [np.linalg.inv(np.array(armature.data.bones[name].matrix_local, dtype=float)) for name in skin.bones]
-    frames = len(recording.frames)
-    result = np.zeros((frames, 3, len(chosen)), dtype=np.float32)  # one product for all frames is the fastest
+    frames, rows = len(recording.frames), len(range(3)[axes])
+    result = np.zeros((frames, rows, len(chosen)), dtype=np.float32)  # one product for all frames is the fastest
     held = np.zeros(len(chosen), dtype=bool)
     for name, back, (moved_by, weights) in zip(skin.bones, backs, skin.weights, strict=True):
         here = place[moved_by] >= 0
         if not here.any():
             continue
         vertex, weight = moved_by[here], weights[here]
-        moved = (recording.bone(name) @ back)[:, :3].reshape(-1, 4)
-        result[..., place[vertex]] += (moved @ (weight[:, None] * rest[vertex]).T).reshape(frames, 3, -1)
+        moved = (recording.bone(name) @ back)[:, :3][:, axes].reshape(-1, 4).astype(np.float32)
+        weighted = (weight[:, None] * rest[vertex]).T.astype(np.float32)
+        result[..., place[vertex]] += (moved @ weighted).reshape(frames, rows, -1)
         held[place[vertex]] = True
         yield
     if not held.all():
-        moved = recording.armature[:, :3].reshape(-1, 4)
-        result[..., ~held] = (moved @ rest[chosen[~held]].T).reshape(frames, 3, -1)
+        unheld = recording.armature[:, :3][:, axes].reshape(-1, 4)
+        result[..., ~held] = (unheld @ rest[chosen[~held]].T).reshape(frames, rows, -1)
     return np.swapaxes(result, 1, 2)
 
 
@@ -259,7 +260,7 @@ _PROBES = 8
 _NEAR = 0.15
 """Vertices that never come this near to the lowest are left out, in body heights."""
 
-_MOST_POINTS = 3000
+_MOST_POINTS = 1500
 """Vertices that are followed at most."""
 
 _MOST_PLACES = 6_000_000
@@ -301,16 +302,15 @@ def followed_skin(
     rig = name_of(armature)
     body = np.flatnonzero(~carried(skin, armature))
     probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
-    height = (yield from skinned.slices(skin, armature, probes, body))[..., 2]
+    height = (yield from skinned.slices(skin, armature, probes, body, axes=slice(2, 3)))[..., 0]
     size = float(np.median(np.ptp(height, axis=1)))
     if not 0 < size < np.inf:
         return None
     above = (height - height.min(axis=1, keepdims=True)).min(axis=0)
     chosen = body[above < _NEAR * size]
-    most = min(_MOST_POINTS, max(_MOST_PLACES // len(recording.frames), 1))
-    if len(chosen) > most:
-        chosen = body[np.argsort(above, kind="stable")[:most]]
     chosen = chosen[np.argsort(skin.part[chosen], kind="stable")]
+    most = min(_MOST_POINTS, max(_MOST_PLACES // len(recording.frames), 1))
+    chosen = chosen[_thinned(np.unique(skin.part[chosen], return_counts=True)[1], most)]
     used, part = np.unique(skin.part[chosen], return_inverse=True)
     yield
     places = yield from skinned.slices(skin, found(rig), recording, chosen)
@@ -320,6 +320,17 @@ def followed_skin(
     links = _links(skin, found(rig))[np.ix_(used, used)] if linked else None
     motion = SkinMotion(places, part, links, rate, size)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
+
+
+def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
+    """Which points to follow of parts with so many each (P,): of large parts fewer, evenly, until `most` are left."""
+    ordered = np.sort(counts)
+    caps = (most - np.cumsum(ordered) + ordered) / np.arange(len(counts), 0, -1)
+    cap = caps[(caps <= ordered).argmax()] if counts.sum() > most else ordered[-1]
+    count = np.repeat(counts, counts)
+    rank = np.arange(len(count)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = np.minimum(max(cap, 1) / count, 1.0)
+    return np.asarray(np.floor((rank + 1) * share + 1e-9) > np.floor(rank * share + 1e-9))
 
 
 def carried(skin: RigSkin, armature: bpy.types.Object) -> NDArray[np.bool_]:

@@ -46,7 +46,8 @@ def drift_of(tracks: PartTracks) -> Array:
 
     def votes(way: Array) -> Array:
         """Each moment has one vote for a velocity (N, 2), however many parts move with it."""
-        apart = np.linalg.norm(way[:, None] - ways, axis=-1) / _width(way)[:, None]
+        apart = np.hypot(*(np.subtract.outer(one, other) for one, other in zip(way.T, ways.T, strict=True)))
+        apart /= _width(way)[:, None]
         return np.asarray(np.maximum.reduceat(weight * np.clip(1 - apart, 0.0, None), first, axis=1).sum(axis=1))
 
     found = votes(ways)
