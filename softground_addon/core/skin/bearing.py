@@ -22,6 +22,8 @@ LEAST_SLIP = 0.15
 BLIP = 0.05
 """What bears no longer than this does not bear [s]; of shots of at most `FEW` samples it is all that is known."""
 FEW = 4
+LANDED = TOUCH / 2
+"""What bears has landed when it is no higher than this over the ground, and over how it mostly stands."""
 HARD_RISE, HARD_SLIP = 2.5, 0.12
 """A hard step: fast, but it hardly slips; over the calm speed, and over the part's fast slip."""
 
@@ -55,7 +57,7 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     # The only calm skin on the ground bears, even where it slides.
     sliding = near & (speed < tracks.calm)
     bears |= sliding & ~bears.any(axis=1, keepdims=True)
-    return _without_blips(bears, round(BLIP * tracks.rate)) if len(bears) > FEW else bears
+    return _landed(_without_blips(bears, round(BLIP * tracks.rate)), height) if len(bears) > FEW else bears
 
 
 def _without_blips(bears: Mask, longest: int) -> Mask:
@@ -66,6 +68,18 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
             least = 1 if first == 0 or last == len(bears) else longest
             lasting[first:last, part] = last - first > least
     return lasting
+
+
+def _landed(bears: Mask, height: Array) -> Mask:
+    """Without the samples at which what bears is still coming down: what is near is not there yet."""
+    landed = bears.copy()
+    for part in np.flatnonzero(bears.any(axis=0)):
+        for first, last in zip(*runs(bears[:, part]), strict=True):
+            over = height[first:last, part]
+            down = np.flatnonzero(over < max(float(np.median(over)), 0.0) + LANDED)
+            if first > 0 and len(down) > 1:
+                landed[first : first + down[0], part] = False
+    return landed
 
 
 def _usual_slip(height: Array, speed: Array, slip: Array, calm: float) -> float:

@@ -125,7 +125,7 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     for start in range(0, count, frames):
         samples = np.arange(start - 1, min(start + frames, count) + 1)  # with the one before and the one after
         around = np.swapaxes(skin.positions, 1, 2)[np.clip(samples, 0, count - 1)]
-        positions = (around if len(used) == around.shape[2] else np.take(around, used, axis=2)) / skin.height
+        positions = np.take(around, used, axis=2) / skin.height
         steps = np.diff(positions, axis=0) * skin.rate
         # The first sample has no step before it and the last none after it: each has its one step on both sides.
         if start == 0:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.skin.contacts import SkinContacts, find_contacts
-from softground_addon.core.skin.skin_motion import SkinMotion
+from softground_addon.core.skin.skin_motion import SkinMotion, track_parts
 
 RATE, PERIOD, FRAMES = 30.0, 30, 90
 LIFT = 0.12
@@ -149,3 +150,24 @@ def test_skin_that_never_comes_to_rest_has_no_contact() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (1, 40, 3)) + rise
     skin = SkinMotion(points, np.repeat([0, 1], 20), np.zeros((2, 2), dtype=bool), 30.0, 1.0)
     assert find_contacts(skin).bears.shape == (30, 0)
+
+
+def test_contacts_are_the_same_in_whatever_order_the_groups_are_numbered() -> None:
+    skin, _ = animal(3, duty=0.6, stride=0.6)
+    groups = np.arange(skin.part.max() + 1)
+    for order in (groups, groups[::-1], np.roll(groups, 1)):
+        tracks, parts = track_parts(skin, order), track_parts(skin)
+        assert (tracks.low[:, order] == parts.low).all()
+        assert (tracks.ways[:, :, order] == parts.ways).all()
+
+
+@given(duty=st.floats(0.5, 0.75), rate=st.sampled_from((24.0, 60.0)))
+def test_what_is_near_the_ground_and_still_comes_down_has_not_landed(duty: float, rate: float) -> None:
+    skin, _ = animal(2, duty=duty, stride=0.6, on_the_spot=True)
+    skin = SkinMotion(skin.positions, skin.part, skin.links, rate, skin.height)
+    found = find_contacts(skin)
+    for leg in range(2):
+        low = skin.positions[:, skin.part == leg, 2].min(axis=1)
+        starts, ends = runs(found.bears[:, found.group[leg]])
+        assert len(starts)
+        assert (low[starts[starts > 0]] < 0.008).all(), (starts, ends)
