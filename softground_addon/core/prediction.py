@@ -1,4 +1,4 @@
-"""How deep a shot's prints will be, without pressing any cell.
+"""How deep a shot's prints will be, without pressing any cell: the typical one, and the deepest.
 
 What the material does not change is gathered once for each contact: how large it is at any sinkage, how high its
 underside is over the ground. Another material then follows all contacts at once, step by step, into the ground under
@@ -37,12 +37,15 @@ from .pressing.sole_points import (
     point_contact,
     sole_points,
 )
+from .record.typical_depth import main_contacts, median_depth
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 FEW = 6
 """Contacts that are followed under all of their soles where an estimate will do, and poses of bodies."""
+TYPICAL = 24
+"""Contacts that tell the depth of the typical one."""
 AT_ONCE = 64
 """Contacts that are followed together: 100 MB at most."""
 KNOTS_PER_TOLERANCE = 4
@@ -55,8 +58,10 @@ STEPS_PER_FIT = 6
 """The pressure is fitted once in so many steps: 20 times a second."""
 COARSE = 1 / 20
 """Side of the parts of a sole that the pressure is fitted to, in sole lengths."""
-MATCH_TOLERANCE = 1e-3
+MATCH_TOLERANCE = 2e-3
 """Relative error of a matched depth."""
+FREE_TRIALS = 6
+"""Guesses of the modulus before it is searched by halving."""
 MOST_TRIALS = 60
 """Halvings of the interval in which the modulus is searched: its logarithm is then known to rounding."""
 POSES = 12
@@ -241,17 +246,23 @@ class _Table:
             reached[:count] += further
         return _Sinking(area, target, sinkage, reached)
 
-    def depth(self, chosen: NDArray[np.intp], sinking: _Sinking, material: GroundMaterial, pressure: Pressure) -> float:
-        """Depth of the deepest print of some contacts [m]: what it adds to those that it lies on."""
-        compression, depth = np.zeros(self._square_count), 0.0
+    def pressing(
+        self, chosen: NDArray[np.intp], sinking: _Sinking, material: GroundMaterial, pressure: Pressure
+    ) -> Slices[Array]:
+        """Depth of each contact [m], 0 of those that are not chosen: what it adds to those that it lies on."""
+        compression, depths = np.zeros(self._square_count), np.zeros(len(self._rows.contacts))
         for together in self._in_turn(chosen):
             for first in range(0, len(together), AT_ONCE):
                 contacts = together[first : first + AT_ONCE]
                 squares = np.concatenate([self._squares[number] for number in contacts])
                 before = compression[squares]
                 compression[squares] = self._pressed(before, contacts, sinking, material, pressure)
-                depth = max(depth, float((compression[squares] - before).max(initial=0.0)))
-        return depth
+                added = np.append(compression[squares] - before, 0.0)
+                counts = [len(self._squares[number]) for number in contacts]
+                deepest = np.maximum.reduceat(added, np.cumsum(counts) - counts)
+                depths[contacts] = np.where(np.array(counts) > 0, deepest, 0.0)
+                yield
+        return depths
 
     def _in_turn(self, chosen: NDArray[np.intp]) -> list[NDArray[np.intp]]:
         """Contacts that share no ground, those before that others lie on."""
@@ -360,6 +371,10 @@ class ContactLoads:
     poses: tuple[tuple[GroundUnder, float], ...]
 
     @cached_property
+    def _impulse(self) -> Array:
+        return np.array([contact.force @ contact.duration for contact in self.soles])
+
+    @cached_property
     def _table(self) -> _Table:
         return _Table(self.soles)
 
@@ -383,7 +398,47 @@ class ContactLoads:
         furthest = furthest[sinking.reached[furthest] > 0]
         if most is not None:
             furthest = self._table.with_those_under(furthest, 2 * most)
-        return max(depth, self._table.depth(furthest, sinking, material, pressure))
+        return max(depth, float(_depths(self._table, furthest, sinking, material, pressure).max()))
+
+    def typical(self, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> float:
+        """Depth of the typical print [m]; see `typical_depth`."""
+        return typical_depth(self, material, pressure)
+
+    def working_out_typical(self, material: GroundMaterial, pressure: Pressure) -> Slices[float]:
+        """See `typical_depth`."""
+        sinking = self._table.sink(material)
+        main = np.flatnonzero(main_contacts(self._impulse))
+        main = main[np.argsort(sinking.reached[main], kind="stable")]
+        beside = max(0, (len(main) - TYPICAL) // 2)
+        chosen = main[beside : len(main) - beside]
+        together = self._table.with_those_under(chosen, 2 * TYPICAL)
+        yield
+        depths = yield from self._table.pressing(together, sinking, material, pressure)
+        return median_depth(depths[chosen])
+
+
+@sliced
+def typical_depth(contacts: ContactLoads, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> Slices[float]:
+    """Depth of the typical print [m]; see `record.typical_depth`. Of bodies alone, that of the deepest.
+
+    Of many contacts, those are looked at into which the ground gives way about as far as into the median one.
+
+    Parameters
+    ----------
+    contacts : ContactLoads
+    material : GroundMaterial
+    pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
+    """
+    if not contacts.soles:
+        return contacts.deepest(material, pressure, most=FEW)
+    return (yield from contacts.working_out_typical(material, pressure))
+
+
+@sliced
+def _depths(
+    table: _Table, chosen: NDArray[np.intp], sinking: _Sinking, material: GroundMaterial, pressure: Pressure
+) -> Slices[Array]:
+    return (yield from table.pressing(chosen, sinking, material, pressure))
 
 
 def _depth_under(under: GroundUnder, force: float, material: GroundMaterial) -> float:
@@ -578,14 +633,14 @@ def _prop_poses(character: CharacterLoads, index: int, cells: UndisturbedCells) 
 def matching_modulus(
     contacts: ContactLoads, material: GroundMaterial, depth: float, pressure: Pressure = "UNIFORM"
 ) -> float:
-    """The modulus [Pa] at which the deepest print gets a depth, everything else being equal.
+    """The modulus [Pa] at which the typical print gets a depth, everything else being equal.
 
     Parameters
     ----------
     contacts : ContactLoads
     material : GroundMaterial
     depth : float
-        Wanted depth of the deepest print [m].
+        Wanted depth of the typical print [m].
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
 
     Raises
@@ -593,20 +648,32 @@ def matching_modulus(
     InputError
         If no modulus gives that depth.
     """
+
+    def reached(modulus: float) -> float:
+        return contacts.typical(replace(material, youngs_modulus=modulus), pressure)
+
+    modulus = material.youngs_modulus
+    for _ in range(FREE_TRIALS):
+        found = reached(modulus)
+        if abs(found - depth) <= MATCH_TOLERANCE * depth:
+            return modulus
+        if not found > 0:
+            break
+        modulus = float(np.clip(modulus * found / depth, SOFTEST, STIFFEST))  # depths are about inverse to it
     low, high = SOFTEST, STIFFEST
-    if not contacts.deepest(replace(material, youngs_modulus=high), pressure) <= depth <= material.layer_depth:
+    if not reached(high) <= depth <= material.layer_depth:
         raise InputError(
             f"No stiffness gives prints of {depth * 100:.3g} cm: choose a depth between 0 and the layer's, "
             f"{material.layer_depth * 100:.3g} cm."
         )
-    if not contacts.deepest(replace(material, youngs_modulus=low), pressure) > 0:
+    if not reached(low) > 0:
         raise InputError(TAKES_NO_PRINT)
     for _ in range(MOST_TRIALS):
         modulus = float(np.sqrt(low * high))
-        reached = contacts.deepest(replace(material, youngs_modulus=modulus), pressure)
-        if abs(reached - depth) <= MATCH_TOLERANCE * depth:
+        found = reached(modulus)
+        if abs(found - depth) <= MATCH_TOLERANCE * depth:
             return modulus
-        low, high = (modulus, high) if reached > depth else (low, modulus)
+        low, high = (modulus, high) if found > depth else (low, modulus)
     raise InputError(
         f"Prints of {depth * 100:.3g} cm cannot be reached with feet that rest so briefly on the ground: shorten the "
         "ground's time, or choose a smaller depth."

@@ -76,7 +76,7 @@ def test_the_depth_to_expect_is_that_of_a_bake(shot):
     bpy.ops.softground.predict_depth()
     expected = analysis.expected_depth(shot)
     bpy.ops.softground.bake()
-    assert shot.softground.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(expected, rel=0.02)
+    assert shot.softground.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(expected, rel=0.02)
 
 
 def test_a_depth_that_is_typed_is_that_of_a_bake(shot):
@@ -89,7 +89,7 @@ def test_a_depth_that_is_typed_is_that_of_a_bake(shot):
     options.depth_cm = 5.0
     assert options.material.youngs_modulus != stiffness
     bpy.ops.softground.bake()
-    assert options.ground.data["softground_summary"]["max_depth_m"] == pytest.approx(0.05, rel=0.02)
+    assert options.ground.data["softground_summary"]["typical_depth_m"] == pytest.approx(0.05, rel=0.02)
     stiffness = options.material.youngs_modulus
     options.depth_cm = 1e5
     assert options.material.youngs_modulus == stiffness, "no ground gives that"
@@ -180,7 +180,7 @@ def test_a_matched_depth_is_met_by_the_bake(scene, motion, depth):
     bpy.ops.softground.add_character()
     bpy.ops.softground.match_depth(depth=depth)
     bpy.ops.softground.bake()
-    reached = scene.softground.ground.data["softground_summary"]["max_depth_m"]
+    reached = scene.softground.ground.data["softground_summary"]["typical_depth_m"]
     assert reached * 100 == pytest.approx(depth, rel=0.02)
 
 

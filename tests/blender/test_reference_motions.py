@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
+from softground_addon.blender.reading import analysis
 from tests.blender import shots
 from tests.blender.responders import source_motion
 
@@ -31,8 +32,15 @@ def bake_of(name):
     shots.import_motion(name)
     scene = bpy.context.scene
     bpy.ops.softground.add_character()
+    bpy.ops.softground.load_preset(name="Snow")
+    analysis.read(scene)
+    predicted[name] = analysis.expected_depth(scene)
     result = jobs.run(bake_job.bake(scene))
     return name, result, source_motion(scene)
+
+
+predicted = {}
+"""Depth of the typical step of each file [m], before it was baked."""
 
 
 @pytest.fixture
@@ -57,6 +65,12 @@ def test_the_steps_are_those_that_one_counts_in_the_motion(baked):
 def test_the_force_is_that_of_somebody_who_walks_runs_or_jumps(baked):
     _, result, _ = baked
     assert FORCES[0] < result.report["totals"]["peak_force_n"] < FORCES[1]
+
+
+@every_file
+def test_the_typical_step_is_as_deep_as_predicted(baked):
+    name, result, _ = baked
+    assert predicted[name] == pytest.approx(result.report["totals"]["typical_depth_m"], rel=0.02)
 
 
 @pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))

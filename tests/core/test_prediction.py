@@ -8,7 +8,8 @@ import pytest
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
-from softground_addon.core.prediction import FEW, contact_loads
+from softground_addon.core.prediction import FEW, TYPICAL, contact_loads
+from softground_addon.core.record.typical_depth import main_contacts
 from softground_addon.core.simulation import simulate
 from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
@@ -37,6 +38,11 @@ class Stripes:
         return np.stack([1.0 + 0.6 * wave, 1.0 - 0.3 * wave, np.ones_like(wave)])
 
 
+def prints_of(loads, material, pressure):
+    results = simulate(loads, SoftGround(FlatTerrain(), material, pressure), CELL)
+    return [print_ for result in results for print_ in result.footprints]
+
+
 def pressed(loads, material, pressure, variation=None):
     results = simulate(loads, SoftGround(FlatTerrain(), material, pressure, variation), CELL)
     return max((print_.max_depth_m for result in results for print_ in result.footprints), default=0.0)
@@ -51,6 +57,20 @@ def test_the_predicted_depth_is_the_pressed_one(options, painted, pressure):
     contacts = contact_loads([loads], FlatTerrain(), CELL, variation)
     expected = pressed([loads], material, pressure, variation)
     assert contacts.deepest(material, pressure) == pytest.approx(expected, rel=0.03, abs=1e-6)
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+def test_the_typical_step_is_the_median_of_those_that_are_pressed(pressure):
+    """Also where it is told from some of them alone."""
+    loads = walk(steps=5)
+    weights = np.linspace(0.5, 1.5, 9)
+    crowd = [replace(loads, forces=replace(loads.forces, forces=weight * loads.forces.forces)) for weight in weights]
+    contacts = contact_loads(crowd, FlatTerrain(), CELL)
+    assert len(contacts.soles) > 1.5 * TYPICAL
+    depths = np.concatenate([[p.max_depth_m for p in prints_of([one], SNOW, pressure)] for one in crowd])
+    impulse = np.concatenate([[p.load_n.sum() for p in prints_of([one], SNOW, pressure)] for one in crowd])
+    expected = np.median(depths[main_contacts(impulse)])
+    assert contacts.typical(SNOW, pressure) == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize("painted", [False, True], ids=["even", "painted"])

@@ -14,6 +14,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.record.edits import without_step
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
+from ...core.record.typical_depth import typical_of
 from .. import settings
 from ..ground import ground_mesh, still_ground
 from ..jobs import STAGES
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 FLOATING = "floating_mm"
 """Entry of a bake's summary: how far feet float above their prints [mm]."""
 
+TYPICAL = "typical_depth_m"
+"""Entry of a bake's summary: how deep its typical step is [m]."""
 LAST_FRAME = "last_frame"
 """Entry of a bake's summary: the frame at which its last contact ends."""
 
@@ -63,7 +66,7 @@ def summary(result: dict[str, Any]) -> dict[str, float]:
     """What the panel shows of a bake."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
-    shown = {key: totals[key] for key in ground_mesh.SHOWN}
+    shown = {key: totals[key] for key in (*ground_mesh.SHOWN, TYPICAL)}
     last = max((step["frame_end"] for step in result["steps"]), default=0.0)
     return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"]), LAST_FRAME: last}
 
@@ -73,6 +76,7 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
     return {
         "steps": len(footprints),
         "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
+        TYPICAL: typical_of(footprints),
         "peak_force_n": max((float(footprint.peak_force_n) for footprint in footprints), default=0.0),
     }
 

@@ -26,15 +26,13 @@ def draw(layout: Any, options: Any, summary: Any) -> None:
 def _result(layout: Any, summary: Any) -> None:
     """What the bake that is on the ground came to."""
     box = layout.box().column(align=True)
-    rows = [
-        ("Steps", f"{summary['steps']:.0f}"),
-        ("Deepest Print", f"{summary['max_depth_m'] * 100:.1f} cm"),
-        ("Peak Force", f"{summary['peak_force_n']:,.0f} N"),
-    ]
-    if "seconds" in summary:  # live mode takes none
-        rows.append(("Bake Time", f"{summary['seconds']:.1f} s"))
+    deepest = summary["max_depth_m"]
+    rows = (
+        ("Steps", f"{summary['steps']:.0f}, up to {summary['peak_force_n']:,.0f} N"),
+        ("Depth", f"{summary.get(bake_report.TYPICAL, deepest) * 100:.1f} cm, up to {deepest * 100:.1f} cm"),
+    )
     for label, value in rows:
-        row = box.split(factor=0.5)
+        row = box.split(factor=0.3)
         row.alignment = "RIGHT"
         row.label(text=label)
         row.alignment = "LEFT"

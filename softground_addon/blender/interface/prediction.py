@@ -6,19 +6,30 @@ knew last.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import bpy
 
 from ...core.errors import InputError
 from ...core.prediction import matching_modulus
-from .. import session, settings
+from .. import jobs, session, settings
 from ..live import live
 from ..reading import analysis
 from ..reading.analysis import Analysis
 
 SOON = 0.03
 """Time from the drawing that finds something changed until it is worked out anew [s]."""
+
+PART = 0.025
+"""What is worked on before Blender has its turn again, beside the step that is being done when it is over [s]."""
+PAUSE = 0.005
+"""Time that Blender has until it is gone on [s]."""
+
+_ENDED = object()
+
+_working: list[jobs.Job[float | None]] = []
+"""Depths that are being worked out."""
 
 _told: dict[int, float] = {}
 """The depth that each scene was told last [m], by session uid."""
@@ -33,7 +44,7 @@ class DepthPrediction:
     analysis : Analysis
         The shot; masses and force models may have changed since.
     depth : float or None
-        Of the deepest print to expect [m], as it was known last.
+        Of the typical print to expect [m], as it was known last.
     is_current : bool
         Whether nothing has changed since.
     """
@@ -64,7 +75,7 @@ def shown_cm(scene: bpy.types.Scene) -> float:
 
 
 def type_cm(scene: bpy.types.Scene, depth: float) -> None:
-    """Set the stiffness so that the deepest print gets a depth [cm]; says why where none gives it."""
+    """Set the stiffness so that the typical print gets a depth [cm]; says why where none gives it."""
     known = analysis.current(scene)
     if known is None or not depth > 0:
         return
@@ -83,9 +94,15 @@ def _work_out() -> float | None:
     """Bring the predictions that are shown up to date, after live mode's prints."""
     if live.is_answering():
         return SOON
-    for scene in {window.scene for window in bpy.context.window_manager.windows}:
-        if analysis.known(scene):
-            analysis.expected_depth(scene)
+    if not _working:
+        scenes = {window.scene for window in bpy.context.window_manager.windows}
+        _working.extend(analysis.working_out_depth(scene) for scene in scenes if analysis.known(scene))
+    until = time.perf_counter() + PART
+    while _working:
+        if next(_working[-1], _ENDED) is _ENDED:
+            _working.pop()
+        elif time.perf_counter() > until and not bpy.app.background:
+            return PAUSE
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
@@ -96,4 +113,5 @@ def unregister() -> None:
     """Work nothing out any more."""
     if bpy.app.timers.is_registered(_work_out):
         bpy.app.timers.unregister(_work_out)
+    _working.clear()
     _told.clear()

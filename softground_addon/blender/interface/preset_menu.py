@@ -91,7 +91,7 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
         depth = analysis.expected_depth(settings.scene_of(context), preset.material)
         if depth is not None:
             who = ", ".join(title_of(c) for c in characters_of(settings.scene_of(context)))
-            lines.append(f"Deepest print to expect for {who}: {depth * 100:.1f} cm")
+            lines.append(f"Depth of the typical step of {who}: {depth * 100:.1f} cm")
         return "\n".join(lines)
 
     @reports_errors
@@ -173,21 +173,22 @@ class SOFTGROUND_OT_predict_depth(OnShot, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         analysis.forget()
-        analysis.read(settings.scene_of(context))
-        depth = analysis.expected_depth(settings.scene_of(context)) or 0.0
-        self.report({"INFO"}, f"Deepest print to expect: {depth * 100:.1f} cm")
+        scene = settings.scene_of(context)
+        depth = analysis.expected_depth(scene) if analysis.read(scene) else None
+        deepest = analysis.deepest(analysis.read(scene), settings.snapshot(scene))
+        self.report({"INFO"}, f"Typical step: {(depth or 0.0) * 100:.1f} cm deep; the deepest: {deepest * 100:.1f} cm")
         return {"FINISHED"}
 
 
 class SOFTGROUND_OT_match_depth(OnShot, bpy.types.Operator):
-    """Set the stiffness of the ground so that the deepest print gets the depth that you type"""
+    """Set the stiffness of the ground so that the typical step is as deep as you type"""
 
     bl_idname = "softground.match_depth"
     bl_label = "Match Depth"
     bl_options = {"REGISTER", "UNDO"}
 
     depth: FloatProperty(
-        name="Depth (cm)", description="Depth of the deepest print", default=5.0, min=0.01, soft_max=30.0, precision=2
+        name="Depth (cm)", description="Depth of the typical step", default=5.0, min=0.01, soft_max=30.0, precision=2
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:

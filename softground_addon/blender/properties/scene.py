@@ -120,7 +120,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     depth_cm: FloatProperty(
         name="Depth (cm)",
-        description="Depth of the deepest print to expect. Type another, and the stiffness of the ground follows",
+        description="Depth of the typical step: half of the main steps print deeper than this, half less deep. Type "
+        "another, and the stiffness of the ground follows",
         get=_shown_depth,
         set=_type_depth,
         min=0.0,

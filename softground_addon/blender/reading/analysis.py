@@ -22,7 +22,8 @@ from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import pressed_area
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_velocity
-from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus
+from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus, typical_depth
+from ...core.record.typical_depth import typical_of
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import jobs, settings
@@ -179,14 +180,26 @@ def _tell_of_changes(scene: bpy.types.Scene) -> None:
 
 
 def expected_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> float | None:
-    """Depth of the deepest print to expect [m] in a material, or the scene's; None where the shot is not known."""
-    analysis = current(scene)
+    """Depth of the typical print to expect [m] in a material, or the scene's; None where the shot is not known."""
+    return jobs.run(working_out_depth(scene, material))
+
+
+def working_out_depth(scene: bpy.types.Scene, material: GroundMaterial | None = None) -> jobs.Job[float | None]:
+    """What `expected_depth` does, in steps. The scene is asked for nothing after the first."""
+    wanted = settings.snapshot(scene)
+    analysis = yield from refreshing(scene)
     if analysis is None:
         return None
-    key = _key(settings.snapshot(scene), analysis, material)
+    key = _key(wanted, analysis, material)
     if key not in _depths:
-        _depths[key] = analysis.contacts.deepest(*key[1:], most=FEW)
+        work = typical_depth.slices(analysis.contacts, *key[1:])
+        _depths[key] = yield from jobs.meanwhile(jobs.Progress("sample", 1.0), work)
     return _depths[key]
+
+
+def deepest(analysis: Analysis, wanted: BakeSettings) -> float:
+    """Depth of the deepest print to expect [m]."""
+    return analysis.contacts.deepest(wanted.material, wanted.pressure, most=FEW)
 
 
 def known_depth(analysis: Analysis, wanted: BakeSettings) -> float | None:
@@ -201,7 +214,7 @@ def _key(
 
 
 def match_depth(scene: bpy.types.Scene, depth: float) -> float:
-    """The modulus [Pa] that gives the deepest print a depth [m] in a bake of the scene.
+    """The modulus [Pa] that gives the typical print a depth [m] in a bake of the scene.
 
     Raises
     ------
@@ -224,7 +237,7 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
 
 def _simulated_depth(wanted: BakeSettings, analysis: Analysis) -> float:
     results = simulate(analysis.loads, ground_of(wanted, analysis.shot), wanted.cell_size_m)
-    return max((footprint.max_depth_m for result in results for footprint in result.footprints), default=0.0)
+    return typical_of([footprint for result in results for footprint in result.footprints])
 
 
 def _keep(

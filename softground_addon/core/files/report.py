@@ -15,6 +15,7 @@ from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
 from ..record.edits import StepEdit, edit_as_json, edits_by_number, step_id
 from ..record.footprints import Footprint
+from ..record.typical_depth import typical_of
 
 SCHEMA_VERSION = 1
 
@@ -73,6 +74,11 @@ def build(
         for number, footprint in enumerate(footprints)
     ]
     counted = [step for step in steps if not step.get("left_out")]
+    shown = [
+        pressed_again.get(number, footprint)
+        for number, footprint in enumerate(footprints)
+        if not steps[number].get("left_out")
+    ]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
@@ -82,6 +88,7 @@ def build(
             "steps": len(counted),
             "peak_force_n": max((step["peak_force_n"] for step in counted), default=0.0),
             "max_depth_m": max((step["max_depth_m"] for step in counted), default=0.0),
+            "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
         },
