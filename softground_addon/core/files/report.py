@@ -74,11 +74,8 @@ def build(
         for number, footprint in enumerate(footprints)
     ]
     counted = [step for step in steps if not step.get("left_out")]
-    shown = [
-        pressed_again.get(number, footprint)
-        for number, footprint in enumerate(footprints)
-        if not steps[number].get("left_out")
-    ]
+    again = [pressed_again.get(number, footprint) for number, footprint in enumerate(footprints)]
+    shown = [printed for printed, step in zip(again, steps, strict=True) if printed and not step.get("left_out")]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
