@@ -24,6 +24,9 @@ from .interface import (
     prediction,
     preset_menu,
     response_panel,
+    step_dragging,
+    step_editing,
+    steps_panel,
 )
 from .live import live
 from .output import event_points, export_formats, force_curves, make_sound
@@ -55,6 +58,9 @@ CLASSES = (
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
     *bake_result.CLASSES,
+    *step_editing.CLASSES,
+    *step_dragging.CLASSES,
+    *steps_panel.CLASSES,
 )
 
 _registered = ExitStack()
@@ -70,7 +76,7 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
-        for part in (handlers, overlay, menus, import_capture):
+        for part in (handlers, overlay, step_dragging, menus, import_capture):
             part.register()
             undo.callback(part.unregister)
         look_followers.append(look.follow)

@@ -65,6 +65,7 @@ class SoftGroundSession(bpy.types.PropertyGroup):
         "current frame, from live mode or the bake",
         default=True,
     )
+    step: StringProperty(name="Step", description="Id of the step of the bake that is chosen")
     is_live: BoolProperty(name="Live", description="The ground gives way while the timeline plays")
 
 

@@ -142,10 +142,10 @@ def bake(
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
     del loads, responses
-    written: _Written | None = None
+    written: Written | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        written = yield from _write(scene, wanted, shot, replace(left, about=about), sole_length)
+        written = yield from write_prints(scene, wanted, shot, replace(left, about=about), sole_length)
         findings += written.findings
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
@@ -170,7 +170,7 @@ def bake(
 
 
 @dataclass(frozen=True)
-class _Written:
+class Written:
     """What was written to the ground, and what carries it."""
 
     ground: bpy.types.Object
@@ -179,13 +179,13 @@ class _Written:
     findings: list[Finding]
 
 
-def _write(
+def write_prints(
     scene: bpy.types.Scene,
     wanted: BakeSettings,
     shot: Shot,
     left: record.BakeRecord,
     sole_length: float,
-) -> Job[_Written]:
+) -> Job[Written]:
     """Put the prints on the ground, all of them in the last step.
 
     Parameters
@@ -218,7 +218,7 @@ def _write(
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
     ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
-    return _Written(ground, published.display_mesh, published.error, findings)
+    return Written(ground, published.display_mesh, published.error, findings)
 
 
 def _created(

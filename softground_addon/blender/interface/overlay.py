@@ -83,10 +83,10 @@ def draw_shapes() -> None:
                 _fill(overlay_shapes.squares(cells, size, known.shot.terrain) * metre, colour)
         if state.show_footfalls:
             for outline in _footfalls(known):
-                _line(_closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
+                draw_line(closed(outline.points) * metre, _faded(SIDES[outline.side], 0.8), LINE)
         if state.show_soles:
             for outline in overlay_shapes.soles(known.loads, frame):
-                _line(_closed(outline.points) * metre, SIDES[outline.side], BOLD_LINE)
+                draw_line(closed(outline.points) * metre, SIDES[outline.side], BOLD_LINE)
         if state.show_forces:
             for arrow in overlay_shapes.arrows(known.loads, frame):
                 _arrow(arrow.start * metre, arrow.end * metre, FORCES[arrow.kind])
@@ -152,7 +152,8 @@ def _baked(ground: bpy.types.Object | None) -> tuple[Sequence[Footprint], float]
     return _bake[key]
 
 
-def _line(points: Array, colour: Colour, width: float) -> None:
+def draw_line(points: Array, colour: Colour, width: float) -> None:
+    """A line through points (N, 3) in the units of the scene, of a width [px]."""
     import gpu  # noqa: PLC0415
     from gpu_extras.batch import batch_for_shader  # noqa: PLC0415
 
@@ -184,14 +185,15 @@ def _arrow(start: Array, end: Array, colour: Colour) -> None:
     along = end - start
     aside = np.cross(along, view)
     length = float(np.linalg.norm(aside))
-    _line(np.stack([start, end]), colour, BOLD_LINE)
+    draw_line(np.stack([start, end]), colour, BOLD_LINE)
     if length > 0:
         base = end - HEAD * along
         wing = aside / length * float(np.linalg.norm(along)) * HEAD / 2
         _fill(np.stack([end, base + wing, base - wing]), colour)
 
 
-def _closed(points: Array) -> Array:
+def closed(points: Array) -> Array:
+    """An outline (N, 3) that ends where it begins."""
     return np.concatenate([points, points[:1]])
 
 

@@ -56,6 +56,18 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
     ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(stamp)
 
 
+def stamp_of(ground: bpy.types.Object) -> str:
+    """What is noted with a ground's bake of what it was made from; empty where nothing is."""
+    return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(FINGERPRINTS, ""))
+
+
+def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str]) -> None:
+    """Note with a ground's bake what an earlier one of the same inputs was made from, from `stamp_of`."""
+    if stamp:
+        renewed = json.loads(stamp) | _of_bake(ground, painted)
+        ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(renewed)
+
+
 def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     """What has changed since the bake on a ground, for the user to read; nothing where there is none.
 

@@ -1,0 +1,130 @@
+"""Edits of single steps of the bake that is on the ground: pressed again and published, and no animation is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.edited_steps import EditedSteps
+from ...core.errors import InputError
+from ...core.ground.material import GroundMaterial
+from ...core.record import record
+from ...core.record.edits import UNCHANGED, StepEdit, edits_by_number
+from ...core.settings import BakeSettings
+from .. import jobs, settings
+from ..ground import baked_ground, ground_mesh, painted_ground
+from ..reading import staleness
+from ..reading.shots import Shot, ground_of
+from . import bake_job, bake_report
+
+AROUND = 2.0
+"""How far around the prints the ground is looked at, for those that are moved [m]."""
+FALLBACK_SOLE = 0.25
+"""Length of a sole, of prints that do not say with what they were pressed [m]."""
+
+
+@dataclass(frozen=True)
+class EditableBake:
+    """A bake as it is on the ground, with all that its steps are pressed again on.
+
+    Attributes
+    ----------
+    left : BakeRecord
+    made_with : BakeSettings
+        The scene's settings, but for what the prints were pressed with.
+    shot : Shot
+        The undisturbed ground; nobody is on it.
+    steps : EditedSteps
+    """
+
+    left: record.BakeRecord
+    made_with: BakeSettings
+    shot: Shot
+    steps: EditedSteps
+
+    def with_edits(self, edits: Mapping[str, StepEdit]) -> record.BakeRecord:
+        """The record with other edits in place of those that it has."""
+        again = self.steps.pressed_again(edits_by_number(self.left.footprints, edits))
+        return replace(self.left, edits=dict(edits), pressed_again=again)
+
+
+def editable(scene: bpy.types.Scene) -> EditableBake:
+    """The bake on the scene's ground, to be edited.
+
+    Raises
+    ------
+    InputError
+        If there is none, or its record does not say what it was made with.
+    """
+    ground = scene.softground.ground
+    left = record.load(bytes(baked_ground.stored_record(ground)))
+    made_with = _made_with(scene, left)
+    names = painted_ground.names_of(ground, made_with.painted)
+    surface = ground_mesh.undisturbed_surface(ground, made_with.unit_scale_m, names)
+    low, high = _extent(left)
+    terrain = ground_mesh.terrain_of(surface, np.stack([low - AROUND, high + AROUND]))
+    shot = Shot((), low, high, None, surface, terrain)
+    return EditableBake(
+        left, made_with, shot, EditedSteps(left.footprints, ground_of(made_with, shot), made_with.cell_size_m)
+    )
+
+
+def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> None:
+    """Show the bake on the scene's ground with other edits; edits that change nothing are dropped.
+
+    Raises
+    ------
+    InputError
+        If a step is to be moved of which the record keeps too little, or the ground cannot be written.
+    """
+    ground = scene.softground.ground
+    left = bake.with_edits({name: edit for name, edit in edits.items() if edit != UNCHANGED})
+    shown, stamp = baked_ground.display_mesh_of(ground), staleness.stamp_of(ground)
+    warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)
+    lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]
+    sole_length = min(lengths, default=FALLBACK_SOLE)
+    written = jobs.run(bake_job.write_prints(scene, bake.made_with, bake.shot, left, sole_length))
+    renewed = summary | bake_report.summary_of_prints(left.edited)
+    ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
+    ground_mesh.note_warnings(written.display_mesh, warnings)
+    staleness.store_again(scene.softground.ground, stamp, bake.made_with.painted)
+
+
+def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
+    """The scene's settings, with what the prints were pressed with."""
+    try:
+        inputs = left.about["inputs"]
+        units = {key: float(inputs[key]) for key in ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m")}
+        first, last = map(int, inputs["frames"])
+        return replace(
+            settings.snapshot(scene),
+            material=GroundMaterial(**inputs["material"]),
+            pressure=inputs["pressure"],
+            painted=tuple(inputs["painted"]),
+            cell_size_m=float(inputs["cell_size_m"]),
+            frames=(first, last),
+            frame_rate=units["frame_rate"],
+            time_stretch=units["time_stretch"],
+            gravity_m_s2=units["gravity_m_s2"],
+            unit_scale_m=units["unit_scale_m"],
+        )
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            "The stored record of the footprints does not say what they were pressed with: bake again, and edit then."
+        ) from None
+
+
+def _extent(left: record.BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper corner of all prints [m]."""
+    boxes = [
+        (np.array(step.window[:2]) * step.cell_size, (np.array(step.window[:2]) + step.window[2:]) * step.cell_size)
+        for step in (*left.footprints, *left.edited)
+    ]
+    if not boxes:
+        raise InputError("The bake has no step that could be edited.")
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)

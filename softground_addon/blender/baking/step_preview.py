@@ -1,0 +1,98 @@
+"""The finished ground while a step is dragged over it: only where it changes is looked up, and nothing is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.ground.heightfield import Window
+from ...core.record.edits import StepEdit
+from ...core.record.footprints import Footprint
+from ...core.record.pressed_ground import sample_at
+from .. import settings
+from ..ground import baked_ground, display_key, ground_mesh, playback
+from .publish import at_the_end
+from .step_edits import EditableBake
+
+Array = NDArray[np.float64]
+REACH = 4.0
+"""How far around a print the display blur spreads it, in its standard deviations."""
+
+
+class StepPreview:
+    """The ground of a bake, finished, as it would be with other edits.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    bake : EditableBake
+    """
+
+    def __init__(self, ground: bpy.types.Object, bake: EditableBake) -> None:
+        shown = baked_ground.display_mesh_of(ground)
+        self._bake, self._name = bake, settings.name_of(shown)
+        unit_scale = bake.made_with.unit_scale_m
+        self._place = ground_mesh.rest_vertices(shown, unit_scale)[:, :2]
+        self._up = ground_mesh.up_of(shown, unit_scale)
+        self._before = ground_mesh.displayed_positions(shown)
+        self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
+        self._changed: list[Window] = []
+        self._hidden = [modifier.name for modifier in shown.modifiers if modifier == playback.modifier_of(shown)]
+        self._show_playback(False)
+
+    def show(self, edits: Mapping[str, StepEdit]) -> None:
+        """Show the ground with these edits."""
+        left = self._bake.with_edits(edits)
+        windows = _windows(self._bake.left.footprints, self._bake.left.pressed_again, left.pressed_again)
+        near = self._within([*windows, *self._changed])
+        self._changed = windows
+        positions = self._before.copy()
+        made_with = self._bake.made_with
+        x, y = self._place[near].T
+        sample = sample_at(left.edited, x, y, **at_the_end(made_with))
+        positions[near] = self._rest[near] + (sample.display[:, None] * self._up).astype(np.float32)
+        self._write(positions)
+
+    def end(self) -> None:
+        """Show the bake as it was."""
+        self._write(self._before)
+        self._show_playback(True)
+
+    def _within(self, windows: list[Window]) -> NDArray[np.intp]:
+        """Vertices that some windows may move."""
+        if not windows:
+            return np.zeros(0, np.intp)
+        size = self._bake.made_with.cell_size_m
+        margin = REACH * self._bake.made_with.material.blur_sigma
+        inside = np.zeros(len(self._place), bool)
+        for window in windows:
+            low = np.array(window[:2]) * size - margin
+            high = (np.array(window[:2]) + window[2:]) * size + margin
+            inside |= ((self._place >= low) & (self._place <= high)).all(axis=1)
+        return np.flatnonzero(inside)
+
+    def _write(self, positions: NDArray[np.float32]) -> None:
+        mesh = ground_mesh.mesh_of(settings.found(self._name))
+        keys = mesh.shape_keys
+        shown = keys.key_blocks.get(display_key.DISPLAY_KEY) if keys else None
+        if shown is not None:
+            shown.points.foreach_set("co", positions.ravel())
+            mesh.update()
+        else:
+            ground_mesh.write_positions(mesh, positions)
+
+    def _show_playback(self, shown: bool) -> None:
+        for name in self._hidden:
+            settings.found(self._name).modifiers[name].show_viewport = shown
+
+
+def _windows(
+    baked: Sequence[Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
+) -> list[Window]:
+    """Where the prints of two sets of edits differ."""
+    numbers = {n for n in {*before, *after} if before.get(n, baked[n]) is not after.get(n, baked[n])}
+    prints = [one for n in sorted(numbers) for one in (before.get(n, baked[n]), after.get(n, baked[n])) if one]
+    return [one.window for one in prints]

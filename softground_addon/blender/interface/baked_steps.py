@@ -1,0 +1,133 @@
+"""The steps of the bake on the ground, as the panel lists them and the viewport draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.numerics.rigid import rotation
+from ...core.record import record
+from ...core.record.edits import UNCHANGED, StepEdit, edits_by_number, step_id
+from ...core.record.footprints import Footprint
+from .. import session
+from ..ground import baked_ground
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BakedStep:
+    """One step.
+
+    Attributes
+    ----------
+    number : int
+        In the order of the bake, from 1.
+    name : str
+        Its id.
+    baked : Footprint
+        As it was baked.
+    left : Footprint or None
+        As it was left; None where nothing of it is.
+    edit : StepEdit
+    """
+
+    number: int
+    name: str
+    baked: Footprint
+    left: Footprint | None
+    edit: StepEdit
+
+    @property
+    def frames(self) -> tuple[int, int]:
+        """First and last frame of the contact."""
+        return int(np.ceil(self.baked.start_frame)), int(self.baked.end_frame)
+
+    @property
+    def side(self) -> str:
+        """ "L", "R" or "" for neither."""
+        made_by = self.baked.pressed_by
+        return made_by.pressing.sole.side if made_by else ""
+
+    @cached_property
+    def depth_cm(self) -> float:
+        """How deep it is now [cm]."""
+        return self.left.max_depth_m * 100 if self.left else 0.0
+
+    @property
+    def height(self) -> float:
+        """Height of the undisturbed ground under it [m]."""
+        return float((self.left or self.baked).position[2])
+
+    def outline(self, edit: StepEdit | None = None) -> Array:
+        """Its sole on the undisturbed ground, where it is or would be with another edit, (N, 3) [m]."""
+        edit = edit or self.edit
+        turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))[:2, :2]
+        outline = (self._baked_outline - self.baked.position[:2]) @ turn.T + self.baked.position[:2] + edit.move_m
+        return np.column_stack([outline, np.full(len(outline), self.height)])
+
+    @cached_property
+    def _baked_outline(self) -> Array:
+        """Seen from above, as it was baked, (N, 2) [m]: of a foot its sole, of other things what they touched."""
+        made_by, step = self.baked.pressed_by, self.baked
+        if made_by is not None and made_by.pressing.sole.prop is None:
+            steps = made_by.steps(step.load_frames)
+            pose = steps.poses[int(step.load_n.argmax()), 0]
+            return np.asarray(made_by.pressing.sole.outline @ pose[:2, :2].T + pose[:2, 3])
+        row, column = np.divmod(step.contact_cells, step.window.columns)
+        low = np.array([column.min(), row.min()]) + step.window[:2]
+        high = np.array([column.max(), row.max()]) + step.window[:2] + 1
+        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])], float)
+        return corners * step.cell_size
+
+
+_known: dict[tuple[int, bytes], Sequence[BakedStep]] = {}
+"""The steps that were shown last, by their mesh and what tells its record from others."""
+
+
+def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
+    """The steps of the bake on the scene's ground, in their order; none where there is no bake that can be read."""
+    ground = scene.softground.ground
+    if ground is None or not baked_ground.is_baked(ground):
+        return ()
+    try:
+        stored = baked_ground.stored_record(ground)
+        key = (baked_ground.display_mesh_of(ground).data.session_uid, bytes(stored[-record.TAIL :]))
+        if key not in _known:
+            steps = _steps(record.load(bytes(stored)))
+            _known.clear()
+            _known[key] = steps
+    except InputError:
+        return ()
+    return _known[key]
+
+
+def _steps(left: record.BakeRecord) -> list[BakedStep]:
+    edits = edits_by_number(left.footprints, left.edits)
+    return [
+        BakedStep(
+            number + 1,
+            step_id(footprint),
+            footprint,
+            left.pressed_again.get(number, footprint),
+            edits.get(number, UNCHANGED),
+        )
+        for number, footprint in enumerate(left.footprints)
+    ]
+
+
+def active(scene: bpy.types.Scene) -> BakedStep | None:
+    """The step that is chosen."""
+    chosen = session.current().step
+    return next((step for step in of(scene) if step.name == chosen), None)
+
+
+def forget() -> None:
+    """Forget the steps that were shown."""
+    _known.clear()

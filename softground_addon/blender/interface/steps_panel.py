@@ -1,0 +1,86 @@
+"""The sidebar's list of steps, with what can be done to the one that is chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.record.edits import UNCHANGED
+from .. import settings
+from ..ground import baked_ground
+from ..live import live
+from . import baked_steps
+from .baked_steps import BakedStep
+from .panel_base import ADVANCED, SidebarPanel
+
+SHOWN = 9
+"""Steps in the list, around the one that is chosen."""
+
+
+class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
+    """Single steps of the bake"""
+
+    bl_label = "Steps"
+    bl_parent_id = ADVANCED
+    bl_options: Any = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether there is a bake that is not about to change."""
+        ground = settings.scene_of(context).softground.ground
+        return ground is not None and not live.is_on() and baked_ground.is_baked(ground)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        layout.use_property_split = False
+        scene = settings.scene_of(context)
+        steps, chosen = baked_steps.of(scene), baked_steps.active(scene)
+        _list(layout, steps, chosen)
+        layout.operator("softground.drag_step", icon="VIEW_PAN")
+        if chosen is not None:
+            _buttons(layout, chosen)
+        if any(step.edit != UNCHANGED for step in steps):
+            layout.operator("softground.reset_steps", icon="LOOP_BACK")
+
+
+def _list(layout: Any, steps: Any, chosen: BakedStep | None) -> None:
+    """Some of the steps, those around the chosen one; with a way to those before and after."""
+    at = chosen.number - 1 if chosen else 0
+    first = max(0, min(at - SHOWN // 2, len(steps) - SHOWN))
+    box = layout.box().column(align=True)
+    for step in steps[first : first + SHOWN]:
+        _row(box, step, is_chosen=step is chosen)
+    row = layout.row(align=True)
+    for text, icon, other in (("Earlier", "TRIA_LEFT", at - 1), ("Later", "TRIA_RIGHT", at + 1)):
+        part = row.row(align=True)
+        part.enabled = 0 <= other < len(steps)
+        name = steps[other].name if part.enabled else ""
+        part.operator("softground.choose_step", text=text, icon=icon).step = name
+
+
+def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
+    """A step as one button: number, side, frames, depth, force."""
+    first, last = step.frames
+    depth = "muted" if step.edit.mute else f"{step.depth_cm:.1f} cm" if step.left else "nothing left"
+    text = f"{step.number} {step.side or step.baked.sole}   {first}-{last}   {depth}   {step.baked.peak_force_n:,.0f} N"
+    icon = "HIDE_ON" if step.edit.mute else "MODIFIER" if step.edit != UNCHANGED else "BLANK1"
+    row = layout.row(align=True)
+    row.alignment = "LEFT"
+    row.operator(
+        "softground.choose_step", text=text, icon=icon, depress=is_chosen, emboss=is_chosen, translate=False
+    ).step = step.name
+
+
+def _buttons(layout: Any, chosen: BakedStep) -> None:
+    """What can be done to a step."""
+    row = layout.row(align=True)
+    is_muted = chosen.edit.mute
+    row.operator("softground.mute_step", depress=is_muted, icon="HIDE_ON" if is_muted else "HIDE_OFF").step = ""
+    row.operator("softground.change_step", text="Change...", icon="MODIFIER").step = ""
+    part = row.row(align=True)
+    part.enabled = chosen.edit != UNCHANGED
+    part.operator("softground.reset_step", text="", icon="LOOP_BACK").step = ""
+
+
+CLASSES = (SOFTGROUND_PT_steps,)

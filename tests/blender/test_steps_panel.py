@@ -1,0 +1,122 @@
+"""Single steps of a bake on the ground: chosen, muted, changed and reset by operators, and listed in the panel."""
+
+from unittest.mock import MagicMock
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import session
+from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender.baking.step_preview import StepPreview
+from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground.display_key import DISPLAY_KEY
+from softground_addon.blender.interface import baked_steps, steps_panel
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit
+from tests.blender import fingerprints, shots
+from tests.blender.grounds import heights, rest
+
+
+@pytest.fixture
+def baked(scene):
+    """A walk, baked once more on the ground that the first bake has made."""
+    shots.walker(scene, frames=60)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    for _ in range(2):
+        bpy.ops.softground.bake()
+    return scene
+
+
+def stored(scene):
+    return bytes(baked_ground.stored_record(scene.softground.ground))
+
+
+def under(scene, place):
+    """How far the finished ground is pressed around a place, at most [m]."""
+    ground = scene.softground.ground
+    near = np.linalg.norm(rest(ground)[:, :2] - np.asarray(place)[:2], axis=1) < 0.06
+    return float((rest(ground)[near, 2] - heights(ground, DISPLAY_KEY)[near, 2]).max())
+
+
+def test_a_step_is_chosen_muted_changed_and_reset(baked):
+    before, shown = stored(baked), heights(baked.softground.ground, DISPLAY_KEY)
+    step = baked_steps.of(baked)[2]
+    assert bpy.ops.softground.choose_step(step=step.name) == {"FINISHED"}
+    assert baked.frame_current == step.frames[0]
+    assert session.current().step == step.name
+    depth = under(baked, step.baked.position)
+    assert depth > 0.01
+    bpy.ops.softground.mute_step()
+    assert baked_steps.active(baked).left is None
+    assert under(baked, step.baked.position) < 2e-3
+    bpy.ops.softground.mute_step()
+    assert stored(baked) == before
+    bpy.ops.softground.change_step(strength=0.5, move=(0.0, 0.4), turn=0.5)
+    there = step.baked.position + np.array([0.0, 0.4, 0.0])
+    assert under(baked, step.baked.position) < 2e-3
+    assert under(baked, there) == pytest.approx(depth / 2, rel=0.3)
+    assert not bake_report.stale_reasons(baked)
+    assert baked_ground.edits_of(baked.softground.ground)[step.name].move_m == (0.0, 0.4)
+    bpy.ops.softground.reset_step()
+    assert stored(baked) == before
+    np.testing.assert_array_equal(heights(baked.softground.ground, DISPLAY_KEY), shown)
+    assert not bake_report.stale_reasons(baked)
+
+
+def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
+    step = baked_steps.of(baked)[1]
+    bpy.ops.softground.change_step(step=step.name, strength=1.3, move=(0.05, 0.07), turn=0.2)
+    edited, ground = stored(baked), baked.softground.ground
+    shown = heights(ground, DISPLAY_KEY)
+    bpy.ops.softground.bake()  # which keeps the edits
+    again, once = record.load(stored(baked)), record.load(edited)
+    assert record.dump(again) == record.dump(once)
+    np.testing.assert_array_equal(heights(baked.softground.ground, DISPLAY_KEY), shown)
+    bpy.ops.softground.reset_steps()
+    assert not record.load(stored(baked)).edits
+
+
+def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
+    ground = baked.softground.ground
+    bpy.context.view_layer.update()
+    before = fingerprints.of_file()
+    step = baked_steps.of(baked)[2]
+    edits = {step.name: StepEdit(move_m=(0.0, 0.3))}
+    preview = StepPreview(ground, step_edits.editable(baked))
+    preview.show({step.name: StepEdit(move_m=(0.1, 0.2))})
+    preview.show(edits)
+    shown = heights(ground, DISPLAY_KEY)
+    preview.end()
+    assert fingerprints.of_file() == before
+    step_edits.edit(baked, step_edits.editable(baked), edits)
+    np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
+
+
+def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
+    steps = baked_steps.of(baked)
+    assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+    assert {step.side for step in steps} == {"L", "R"}
+    bpy.ops.softground.choose_step(step=steps[-1].name)
+    bpy.ops.softground.mute_step()
+    layout = MagicMock()
+    panel = MagicMock(fields=lambda: layout)
+    steps_panel.SOFTGROUND_PT_steps.draw(panel, bpy.context)
+    rows = layout.box().column().row().operator.call_args_list
+    assert len(rows) == min(len(steps), steps_panel.SHOWN)
+    assert "muted" in rows[-1].kwargs["text"]
+    assert f"{steps[-1].baked.peak_force_n:,.0f} N" in rows[-1].kwargs["text"]
+
+
+def test_a_step_that_is_none_is_named(baked):
+    with pytest.raises(RuntimeError, match=r"no step 'Walker/foot.L@999.0': choose one in the list"):
+        bpy.ops.softground.mute_step(step="Walker/foot.L@999.0")
+
+
+def test_without_a_bake_there_is_no_step_to_change(scene):
+    shots.walker(scene, frames=30)
+    assert not baked_steps.of(scene)
+    for name in ("choose_step", "mute_step", "change_step", "reset_step", "reset_steps", "drag_step"):
+        assert not getattr(bpy.ops.softground, name).poll()
+    assert ground_mesh.RECORD

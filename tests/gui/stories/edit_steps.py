@@ -1,0 +1,172 @@
+"""A step of a bake is chosen in the list, muted, dragged in the viewport, undone, redone, saved, and baked again."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Euler, Vector
+
+from tests.blender import fingerprints
+from tests.gui.hand import Hand, Steps
+from tests.gui.shot import open_walk
+from tests.gui.stories.interrupted_bake import differences, reopen, scene, session, with_viewport
+
+MOVES = 30
+"""Moves of the mouse while a print is dragged."""
+
+
+def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
+    open_walk(60)
+    yield from hand.open_sidebar()
+    scene().softground.sink_feet = False
+    with_viewport(hand, bpy.ops.softground.add_character)
+    yield from hand.press_button("softground.bake")
+    yield from hand.wait_for(lambda: session().is_baking, 10)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
+    yield 0.5
+    bpy.ops.ed.undo_push(message="Baked")
+    baked = state()
+
+    show_alone(bpy.types.SOFTGROUND_PT_steps)
+    for _ in range(24):
+        yield from hand.key("WHEELDOWNMOUSE")
+    yield from hand.press_button("softground.choose_step", offset=0.3)
+    yield 0.3
+    facts["chosen"] = session().step
+    facts["frame"] = scene().frame_current, steps()[0].frames[0]
+    yield from look_from_above(hand)
+    yield from hand.picture("panel_steps", of="UI")
+
+    yield from hand.press_button("softground.mute_step", offset=0.25)
+    yield 0.5
+    facts["muted"] = edits()
+    yield from hand.move(*hand.middle())
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    facts["undone"] = edits(), differences(baked, state())
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.5
+    facts["redone"] = edits()
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+
+    # a print is dragged and left as it was
+    yield from hand.press_button("softground.drag_step")
+    yield from drag(hand, facts, dy=0.3, picture="steps_dragged")
+    yield from hand.key("ESC")
+    yield 0.5
+    facts["escaped"] = edits(), differences(baked, state())
+
+    # and dragged for good
+    yield from hand.press_button("softground.drag_step")
+    yield from drag(hand, facts, dy=0.3)
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 1.5
+    facts["dragged"] = edits()
+    dragged = prints()
+    yield from hand.picture("steps_moved", in_docs=False)
+    yield from hand.move(*hand.middle())
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    facts["dragged undone"] = edits(), differences(baked, state())
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.5
+    facts["dragged redone"] = edits(), prints() == dragged
+
+    path = hand.pictures / "edited.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    yield from reopen(hand, path)
+    facts["reloaded"] = edits(), prints() == dragged
+    with_viewport(hand, bpy.ops.softground.bake, "INVOKE_DEFAULT")
+    yield from hand.wait_for(lambda: session().is_baking, 10)
+    yield from hand.wait_for(lambda: not session().is_baking, 120)
+    yield 0.5
+    facts["baked again"] = edits()
+
+
+def show_alone(panel: type) -> None:
+    """Show a panel once more, open and beside the others: what a region has closed stays closed."""
+    kept = {name: getattr(panel, name) for name in ("bl_label", "bl_space_type", "bl_region_type", "bl_category")}
+    shown = {"bl_idname": "TEST_PT_alone", "bl_options": set(), "bl_parent_id": "", "draw": panel.draw}
+    bpy.utils.register_class(type("TEST_PT_alone", panel.__bases__, shown | kept))
+
+
+def module(name: str) -> Any:
+    """A module of the add-on, whatever Blender has named its package."""
+    return next(one for key, one in sys.modules.items() if key.endswith(f"softground_addon.blender.{name}"))
+
+
+def steps() -> Any:
+    return module("interface.baked_steps").of(scene())
+
+
+def edits() -> dict:
+    ground = scene().softground.ground
+    found = module("ground.baked_ground").edits_of(ground)
+    return {name: [edit.mute, *edit.move_m] for name, edit in found.items()}
+
+
+def prints() -> str:
+    ground = module("ground.baked_ground").display_mesh_of(scene().softground.ground)
+    return str(fingerprints.of_mesh(ground.data))
+
+
+def state() -> dict:
+    return {"prints": {"ground": prints()}, "edits": edits()}
+
+
+def look_from_above(hand: Hand) -> Steps:
+    space = hand.area().spaces.active
+    step = steps()[2].baked.position
+    space.region_3d.view_perspective = "PERSP"
+    space.region_3d.view_location = (step[0], step[1], 0.0)
+    space.region_3d.view_distance = 2.5
+    space.region_3d.view_rotation = Euler((0.5, 0.0, 0.0)).to_quaternion()
+    yield 0.7
+
+
+def on_screen(hand: Hand, place: Any) -> tuple[int, int]:
+    region = hand.region("WINDOW")
+    view = hand.area().spaces.active.region_3d
+    point = location_3d_to_region_2d(region, view, Vector(place))
+    return region.x + int(point.x), region.y + int(point.y)
+
+
+def timed(owner: Any, name: str) -> list[float]:
+    """Seconds that each call of a method takes, from now on: what a virtual screen takes to draw is not ours."""
+    took: list[float] = []
+    method = getattr(owner, name)
+
+    def measured(*arguments: Any) -> Any:
+        start = time.perf_counter()
+        try:
+            return method(*arguments)
+        finally:
+            took.append(time.perf_counter() - start)
+
+    setattr(owner, name, measured)
+    return took
+
+
+def drag(hand: Hand, facts: dict, *, dy: float, picture: str = "") -> Steps:
+    """Take hold of the third print and move it, without letting go."""
+    middle = steps()[2].outline().mean(axis=0)
+    yield from hand.move(*on_screen(hand, middle))
+    yield 0.3
+    facts["under the mouse"] = module("interface.step_dragging")._shown.under == steps()[2].name
+    hand.event("LEFTMOUSE", "PRESS")
+    yield 0.5
+    took = timed(module("baking.step_preview").StepPreview, "show")
+    for number in range(1, MOVES + 1):
+        place = (middle[0], middle[1] + dy * number / MOVES, middle[2])
+        hand.place = on_screen(hand, place)
+        hand.event("MOUSEMOVE", "NOTHING")
+        yield 0.0
+    facts["seconds an update"] = sorted(took)
+    yield 0.3
+    if picture:
+        yield from hand.picture(picture)
