@@ -63,7 +63,7 @@ _DAMAGE = (
 )
 """What reading a damaged record may raise."""
 
-TAIL = 2048
+TAIL = 4096
 """Records that differ do so in their last bytes: the archive's directory is there, with a checksum of everything."""
 
 _FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # equal bakes give equal bytes
