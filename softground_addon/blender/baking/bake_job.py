@@ -36,7 +36,6 @@ from ...core.simulation import simulate
 from .. import settings
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
 from ..ground.baked_ground import EVENTS
-from ..ground.camera_reach import near_camera
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
 from ..jobs import Job, Progress, meanwhile
@@ -229,7 +228,11 @@ def _created(
     yield Progress("write", 0.2)
     wide = created_ground.widened(scene, plan, wanted.margin_m)
     layout = created_ground.lay_out(
-        wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach, close_up=_close_up(scene, wanted, plan)
+        wide,
+        wanted.cell_size_m,
+        wanted.unit_scale_m,
+        reach=reach,
+        close_up=created_ground.close_up_of(scene, wanted, plan),
     )
     yield Progress("write", 0.3)
     drafts.enter_context(drafted(wanted.surface))
@@ -251,14 +254,6 @@ def _spacing(wanted: BakeSettings, trail: Trail) -> float:
     while spacing < wanted.cell_size_m and area / spacing**2 > wanted.relief_vertices:
         spacing = min(2.0 * spacing, wanted.cell_size_m)
     return spacing
-
-
-def _close_up(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> created_ground.CloseUp | None:
-    """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
-    if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
-        return None
-    near = near_camera(scene, plan.footfalls, wanted.spacing_m)
-    return created_ground.CloseUp(wanted.spacing_m, near, wanted.relief_vertices)
 
 
 def _given(

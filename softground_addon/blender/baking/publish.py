@@ -16,7 +16,7 @@ from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
-from ...core.relief.steps import StepRelief, all_together
+from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.relief_plan import relief_at, shod_of
 from ...core.settings import BakeSettings
 from .. import settings
@@ -91,6 +91,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             unit_scale=made_with.unit_scale_m,
             shape_keys=made_with.shape_keys,
             marks=marks,
+            water=water_at(relief, len(x)),
         )
         is_draft, error, show = place.is_draft, spans.error, place.publish
         del (

@@ -133,6 +133,7 @@ def write(
     unit_scale: float,
     shape_keys: bool = True,
     marks: Array | None = None,
+    water: Array | None = None,
 ) -> Job[None]:
     """Put a bake on its place: the finished ground, the record, and the playback. It still has to be published.
 
@@ -155,6 +156,8 @@ def write(
         See `ground_mesh.write`.
     marks : (K, 3) float array, optional
         See `ground_mesh.write_soles`.
+    water : (K,) float array, optional
+        See `ground_mesh.write_water`.
     """
     found(table)  # or nothing is written
     ground_checks.check_playable(found(place.display_mesh))
@@ -167,6 +170,7 @@ def write(
         display_mesh = found(place.display_mesh)
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
         ground_mesh.write_soles(display_mesh, place.index, marks)
+        ground_mesh.write_water(display_mesh, place.index, water)
 
 
 @contextmanager

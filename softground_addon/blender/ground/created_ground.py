@@ -16,6 +16,7 @@ from ...core.ground_plan import GroundPlan
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.settings import BakeSettings
 from ..settings import find, name_of
+from .camera_reach import near_camera
 from .ground_mesh import discard, mesh_of, write_positions
 from .materials import EDGE, ensure_material
 
@@ -58,7 +59,9 @@ class Layout:
 def create_ground(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> bpy.types.Object:
     """A new ground with the material of the preset, set as the scene's ground."""
     wide = widened(scene, plan, wanted.margin_m)
-    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach_of(wanted.material))
+    close_up = close_up_of(scene, wanted, plan)
+    reach = reach_of(wanted.material)
+    layout = lay_out(wide, wanted.cell_size_m, wanted.unit_scale_m, reach=reach, close_up=close_up)
     with draft(layout, soft_edge(wanted.margin_m)) as ground:
         publish(scene, ground, wanted.surface)
     return ground
@@ -128,6 +131,14 @@ class CloseUp:
     spacing: float
     near: NDArray[np.bool_]
     vertices: int
+
+
+def close_up_of(scene: bpy.types.Scene, wanted: BakeSettings, plan: GroundPlan) -> CloseUp | None:
+    """Where a created ground is finer than its cells, as its relief is to be seen from close by."""
+    if wanted.relief != "CLOSE_UP" or plan.footfalls is None:
+        return None
+    near = near_camera(scene, plan.footfalls, wanted.spacing_m)
+    return CloseUp(wanted.spacing_m, near, wanted.relief_vertices)
 
 
 def lay_out(

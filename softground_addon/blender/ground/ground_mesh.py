@@ -27,7 +27,7 @@ from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
 from . import display_key, own_data, painted_ground, playback
-from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUMMARY, WARNINGS
+from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUMMARY, WARNINGS, WATER
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -319,6 +319,18 @@ def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -
     whole[index] = marks
     attribute = own_data.attribute(mesh, SOLE, "FLOAT_VECTOR")
     attribute.data.foreach_set("vector", whole.ravel())
+
+
+def write_water(ground: bpy.types.Object, index: Indices, depth: Array | None) -> None:
+    """Say of vertices (K,) how deep the water on them is, (K,) [m], and of all others that there is none."""
+    mesh = mesh_of(ground)
+    if depth is None:
+        own_data.remove(mesh, [WATER])
+        return
+    whole = np.zeros(len(mesh.vertices), dtype=np.float32)
+    whole[index] = depth
+    attribute = own_data.attribute(mesh, WATER, "FLOAT")
+    attribute.data.foreach_set("value", whole)
 
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:

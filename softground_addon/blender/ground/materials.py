@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from .ground_mesh import COMPRESSION, RIM, SOLE
+from .ground_mesh import COMPRESSION, RIM, SOLE, WATER
 
 TREAD_PITCH = 0.017
 """From bar to bar of a tread [m]."""
@@ -81,6 +81,10 @@ class Graph:
     def math(self, operation: str, a: Socket | float, b: Socket | float) -> Socket:
         """a operation b."""
         return self.out(self.node("ShaderNodeMath", {0: a, 1: b}, operation=operation))
+
+    def normal(self) -> Socket:
+        """The smooth normal of the mesh."""
+        return self.out(self.node("ShaderNodeNewGeometry"), 1)
 
     def attribute(self, name: str) -> Socket:
         """A float attribute of the mesh; 0 where the mesh has none."""
@@ -319,11 +323,11 @@ def _snow(graph: Graph, ground: Ground) -> Look:
     return Look(
         drifts + clumps + crystals + broken + ground.tread,
         {
-            "Base Color": graph.mix(ground.pressed, (0.90, 0.92, 0.95), (0.74, 0.84, 0.94)),
+            "Base Color": graph.mix(ground.pressed, (0.915, 0.935, 0.96), (0.80, 0.875, 0.955)),
             "Roughness": graph.blend(ground.pressed, 0.70, 0.45),
-            "Subsurface Weight": 0.5,
-            "Subsurface Radius": (0.7, 0.9, 1.0),
-            "Subsurface Scale": 0.010,
+            "Subsurface Weight": 0.65,
+            "Subsurface Radius": (0.5, 0.8, 1.0),
+            "Subsurface Scale": 0.007,
             "Coat Weight": graph.ramp(random, 0.90, 0.91) * graph.blend(ground.pressed, 1.0, 0.2),
             "Coat Roughness": 0.10,
             "Coat Normal": graph.out(facet),
@@ -377,22 +381,32 @@ def _mud(graph: Graph, ground: Ground) -> Look:
     bits = graph.noise(ground.place, 0.008, 3.0, 0.6)
     squeezed = graph.noise(ground.place, 0.020, 2.0, 0.5) * graph.math("MAXIMUM", ground.risen, ground.edge)
     relief = lumps * graph.blend(ground.pressed, 0.008, 0.003) + bits * graph.blend(ground.pressed, 0.0020, 0.0006)
-    relief = relief + squeezed * 0.008 + ground.tread
+    water = graph.ramp(graph.attribute(WATER), 0.0, 0.004) * ground.deep
+    dry = graph.math("SUBTRACT", 1.0, water)
+    relief = (relief + squeezed * 0.008 + ground.tread) * dry
     damp = graph.ramp(graph.noise(ground.place, 0.11, 2.0), 0.36, 0.62, 0.10, 0.65)
     wet = graph.math("MAXIMUM", ground.pressed, damp)
-    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.105, 0.064, 0.036), (0.170, 0.110, 0.066))
-    colour = graph.mix(wet, colour, (0.062, 0.035, 0.019))
+    colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.128, 0.076, 0.041), (0.205, 0.130, 0.076))
+    colour = graph.mix(wet, colour, (0.080, 0.045, 0.023))
+    colour = graph.mix(water * 0.93, colour, (0.150, 0.100, 0.060))
+    level = graph.node("ShaderNodeMix", {"Factor_Float": water, "A_Vector": graph.normal(), "B_Vector": UP}, **_VECTOR)
     return Look(
         relief,
         {
             "Base Color": colour,
-            "Roughness": graph.blend(wet, 0.68, 0.34),
+            "Roughness": graph.blend(wet, 0.76, 0.42),
             "Specular IOR Level": 0.5,
             "Coat Weight": ground.deep,
-            "Coat Roughness": 0.06,
+            "Coat Roughness": graph.blend(water, 0.08, 0.025),
             "Coat IOR": 1.33,
+            "Coat Normal": graph.out(level, 1),
         },
     )
+
+
+UP = (0.0, 0.0, 1.0)
+"""Where the surface of water faces."""
+_VECTOR = {"data_type": "VECTOR"}
 
 
 def _soil(graph: Graph, ground: Ground) -> Look:

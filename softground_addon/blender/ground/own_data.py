@@ -15,6 +15,8 @@ RIM = "softground_rim"
 AGE = "softground_age"
 SOLE = "softground_sole"
 """Vector attribute for the tread of shoes: place along and across the sole, and depth of the tread there [m]."""
+WATER = "softground_water"
+"""Float attribute for the water that stands in prints: its depth [m]."""
 OF_PLAYBACK = (
     nodes.MOVED,
     nodes.START,
@@ -25,7 +27,7 @@ OF_PLAYBACK = (
     nodes.LAST_CONTACT,
     nodes.PRESSURE,
 )
-ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, *OF_PLAYBACK)
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, *OF_PLAYBACK)
 
 RECORD = "softground_record"
 SUMMARY = "softground_summary"

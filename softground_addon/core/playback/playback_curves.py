@@ -187,7 +187,9 @@ def _relief_of_parts(
         reliefs = [NOTHING] * len(relief)
         for step_number, step in reached[number]:
             there = part_of[step.point] == number
-            reliefs[step_number] = replace(step, point=within[step.point[there]], change=step.change[there])
+            reliefs[step_number] = replace(
+                step, point=within[step.point[there]], change=step.change[there], water=step.water[there]
+            )
         yield reliefs
 
 

@@ -60,6 +60,14 @@ class Tread:
 
 
 @dataclass(frozen=True)
+class Water:
+    """Water that gathers in the deepest part of prints: `above` it [mm], over about a `share` of the floor."""
+
+    above: float
+    share: float = 0.3
+
+
+@dataclass(frozen=True)
 class Amounts:
     """The relief of a ground. Lengths are millimetres.
 
@@ -77,6 +85,7 @@ class Amounts:
     wall : float
         Width of the wall seen from above; 0 keeps the walls that the simulation has.
     tread : Tread or None
+    water : Water or None
     layers : tuple of Layer
     """
 
@@ -87,6 +96,7 @@ class Amounts:
     ledges: tuple[Bend, ...] = ()
     wall: float = 0.0
     tread: Tread | None = None
+    water: Water | None = None
     layers: tuple[Layer, ...] = ()
 
 
@@ -129,7 +139,7 @@ def parse(text: str, origin: str) -> Amounts:
     parts: dict[str, Any] = {}
     for name in ("bends", "ledges"):
         parts[name] = tuple(_made(Bend, one, f"{origin}, {name}") for one in _list(table.pop(name, [])))
-    for name, kind in (("chunks", Chunks), ("tread", Tread)):
+    for name, kind in (("chunks", Chunks), ("tread", Tread), ("water", Water)):
         if name in table:
             parts[name] = _made(kind, table.pop(name), f"{origin}, {name}")
     with_depth = table.pop("bends_with_depth", False) is True

@@ -11,7 +11,7 @@ from ..record.footprints import Footprint
 from .amounts import Amounts, Chunks
 from .lattice_noise import cells, noise, rise, uniform
 from .layers import MM, Around
-from .print_shape import PrintShape, shape_of
+from .print_shape import CORE, PrintShape, shape_of
 from .tread import GROOVE, LENGTH, PATTERNS, Under
 
 Array = NDArray[np.float64]
@@ -20,6 +20,8 @@ SHALLOW = 0.5
 """Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""
 NEARLY = 0.8
 """Sizes down to this part of the vertices' distance are shown."""
+FULL = 0.9
+"""How far ground is pressed where water may stand: within the walls."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
 
@@ -32,12 +34,15 @@ class Relief:
     ----------
     height, compression : array
         Change of the displayed height, and of the displayed compression.
+    water : array
+        Depth of the water that stands on it.
     pressed : array
         From 0 to 1: how far the print wipes out what earlier ones left there.
     """
 
     height: Array
     compression: Array
+    water: Array
     pressed: Array
 
 
@@ -72,13 +77,14 @@ class PrintRelief:
         self._size = (shape.along[1] - shape.along[0]) / LENGTH
         self._tread = tread if GROOVE * self._size > 1.5 * finest else None
         self._tread_strength = tread_strength
-        self._wider, self._deeper = 0.0, 0.0
+        self._wider, self._deeper, self._level = 0.0, 0.0, -np.inf
         x, y = (place.ravel() for place in np.meshgrid(*shape.window.centres(shape.cell_size)))
         places = self._look_up(x, y)
         self._wider = self._widening(places)
         relief = self._relief(places)
         weight = places.fade * relief.pressed * places.floor
         self._deeper = float(np.clip(relief.height.sum() / max(weight.sum(), 1e-12), -MOST_VOLUME, MOST_VOLUME))
+        self._level = self._water_level(places)
 
     @property
     def has_tread(self) -> bool:
@@ -162,7 +168,18 @@ class PrintRelief:
         layers = sum((layer.heights(around) for layer in self._amounts.layers), np.zeros(len(places.x)))
         layers = share * (layers + self._standing(places, around))
         deeper = self._deeper * pressed * places.floor * places.fade
-        return Relief(height + layers * places.fade - deeper, compression + deeper, pressed)
+        height = height + layers * places.fade - deeper
+        water = np.maximum(self._level - (places.rim - places.compression + height), 0.0) * (pressed > FULL)
+        return Relief(height, compression + deeper, water, pressed)
+
+    def _water_level(self, places: _Places) -> float:
+        """Height of the water in the print, from the undisturbed ground [m]."""
+        water, relief = self._amounts.water, self._relief(places)
+        floor = places.inward > CORE * self._shape.fineness
+        if water is None or not floor.any():
+            return -np.inf
+        heights = (places.rim - places.compression + relief.height)[floor]
+        return float(np.percentile(heights, 50.0 * water.share) + water.above * MM * self._shape.fineness)
 
     def _standing(self, places: _Places, around: Around) -> Array:
         """What the tread leaves standing in the print [m]."""

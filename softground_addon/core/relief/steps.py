@@ -34,16 +34,19 @@ class StepRelief:
         The places, each once.
     change : (N, 2) float array
         Of the displayed height and the displayed compression [m].
+    water : (N,) float array
+        Depth of the water that stands there after the step [m].
     tread : bool
         Whether the tread of the sole is in it.
     """
 
     point: Indices
     change: Array
+    water: Array
     tread: bool = False
 
 
-NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)))
+NOTHING = StepRelief(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
 """Of a step that has none."""
 
 
@@ -90,18 +93,23 @@ def relief_of_steps(
         Standard deviation of the display blur [m].
     """
     places = Places(x, y)
-    standing = np.zeros((len(places.x), 2))
+    standing, water = np.zeros((len(places.x), 2)), np.zeros(len(places.x))
     steps = []
     for footprint in footprints:
         yield
-        steps.append(_step(footprint, places, standing, wanted, blur_sigma))
+        steps.append(_step(footprint, places, standing, water, wanted, blur_sigma))
     return steps
 
 
 def _step(
-    footprint: Footprint, places: Places, standing: Array, wanted: ReliefSettings, blur_sigma: float
+    footprint: Footprint,
+    places: Places,
+    standing: Array,
+    water: Array,
+    wanted: ReliefSettings,
+    blur_sigma: float,
 ) -> StepRelief:
-    """What a step adds to the relief that stands at all places (K, 2), which is brought up to date."""
+    """What a step adds to the relief at all places (K, 2), which is brought up to date, as the water (K,) is."""
     margin = len(gaussian_kernel(blur_sigma / footprint.cell_size)) // 2 + 1
     point = places.within(footprint.window.expanded(margin), footprint.cell_size) if len(places.x) else NOTHING.point
     if not len(point):
@@ -123,8 +131,9 @@ def _step(
     change -= relief.pressed[:, None] * standing[point]
     change = np.round(change / QUANTUM) * QUANTUM
     standing[point] += change
+    water[point] = np.maximum(water[point] * (1.0 - relief.pressed), relief.water)
     some = change.any(axis=1)
-    return StepRelief(point[some], change[some], of_print.has_tread)
+    return StepRelief(point[some], change[some], water[point[some]], of_print.has_tread)
 
 
 def _finest(places: Places, point: Indices, cell_size: float) -> float:
@@ -140,3 +149,11 @@ def all_together(steps: Sequence[StepRelief], places: int) -> Array:
     for step in steps:
         total[step.point] += step.change
     return total
+
+
+def water_at(steps: Sequence[StepRelief], places: int) -> Array | None:
+    """Depth of the water at each of the places after all steps, (places,) [m]; None where there is none."""
+    depth = np.zeros(places)
+    for step in steps:
+        depth[step.point] = step.water
+    return depth if depth.any() else None

@@ -12,7 +12,7 @@ from softground_addon.core.playback.ramps import QUANTUM
 from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import sample_at
 from softground_addon.core.relief import amounts
-from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps
+from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, water_at
 from tests.core.walkers import pressed, walk
 
 MATERIALS = {
@@ -90,7 +90,7 @@ def test_a_later_step_in_the_same_place_leaves_its_own_relief_alone_under_it():
     alone = all_together(relief("snow", [later], place), place.shape[1])[:, 0]
     both = all_together(relief("snow", [step, later], place), place.shape[1])[:, 0]
     x, y = place - step.position[:2, None]
-    middle = np.hypot(x, y) < 0.02
+    middle = np.hypot(x, y) < 0.008
     assert np.abs(both - alone)[middle].max() <= 4 * QUANTUM
     assert np.abs(both - alone).max() > 0.002  # around it the earlier one stands
 
@@ -152,3 +152,15 @@ def test_tables_name_what_is_wrong():
     ):
         with pytest.raises(InputError, match=message):
             amounts.parse(text, "Relief 'x'")
+
+
+def test_water_lies_level_in_mud_and_a_later_step_takes_it_along():
+    step = steps_on("mud")[0]
+    place = around([step])
+    found = relief("mud", [step], place)
+    water = water_at(found, place.shape[1])
+    sample = sample_at([step], *place, **SHOWN, blur_sigma=MATERIALS["mud"].blur_sigma)
+    surface = (sample.display + all_together(found, place.shape[1])[:, 0] + water)[water > 0]
+    assert water.max() > 0.004
+    assert np.ptp(surface) <= 4 * QUANTUM
+    assert water_at(relief("soil", [step], place), place.shape[1]) is None
