@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate zoo gui pictures package lint types clean
+.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -64,6 +64,10 @@ validate: $(READY)
 RIGS := ../shared/data/rigs/rigs.json
 zoo: $(READY)
 	$(BIN)/python ../shared/tools/zoo.py $(RIGS) $(CLIPS)
+
+# For each of them a picture: how high its feet are, when they touch, and where its skin rests.
+sheets: $(READY)
+	$(BIN)/python -m tests.validation.contact_sheets $(RIGS) build/contact_sheets $(CLIPS)
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -24,6 +24,8 @@ BLIP = 0.05
 FEW = 4
 LANDED = TOUCH / 2
 """What bears has landed when it is no higher than this over the ground, and over how it mostly stands."""
+DRAGS = 0.004
+"""What stays lower than this between two times of bearing slides on without leaving the ground, in body heights."""
 HARD_RISE, HARD_SLIP = 2.5, 0.12
 """A hard step: fast, but it hardly slips; over the calm speed, and over the part's fast slip."""
 
@@ -57,6 +59,7 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     # The only calm skin on the ground bears, even where it slides.
     sliding = near & (speed < tracks.calm)
     bears |= sliding & ~bears.any(axis=1, keepdims=True)
+    bears = _dragged(bears, (np.abs(height) < DRAGS) & (speed < tracks.calm))
     return _landed(_without_blips(bears, round(BLIP * tracks.rate)), height) if len(bears) > FEW else bears
 
 
@@ -68,6 +71,16 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
             least = 1 if first == 0 or last == len(bears) else longest
             lasting[first:last, part] = last - first > least
     return lasting
+
+
+def _dragged(bears: Mask, lies: Mask) -> Mask:
+    """With what `lies` on the ground from one time of bearing, or an end of the shot, to another, however it slides."""
+    dragged = bears.copy()
+    for part in np.flatnonzero(bears.any(axis=0)):
+        ends = np.pad(bears[:, part], 1, constant_values=True)
+        for first, last in zip(*runs(lies[:, part] & ~bears[:, part]), strict=True):
+            dragged[first:last, part] = ends[first] and ends[last + 1]
+    return dragged
 
 
 def _landed(bears: Mask, height: Array) -> Mask:
