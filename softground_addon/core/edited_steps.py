@@ -36,6 +36,10 @@ Change = tuple[int, StepEdit]
 
 VISIBLE = 5e-5
 """Change of a print that makes those meet it that come later be pressed again [m]: a quarter of what playback keeps."""
+MOST_CELLS = 2**26
+"""Most cells that one step is pressed in: 40 m along each side, where they suit a foot."""
+_DAMAGE = (ArithmeticError, IndexError, MemoryError, ValueError, np.linalg.LinAlgError)
+"""What pressing steps may raise that a stranger's file says: soles of no area, poses that are none."""
 SLIDING = 0.25
 """How far around a step ground may slide into it, where the material has an angle of repose [m]."""
 
@@ -115,7 +119,13 @@ class EditedSteps:
     def _group(self, edits: frozenset[Change]) -> _Group:
         """Steps that were edited, and those that meet them."""
         if edits not in self._known:
-            self._known[edits] = self._pressed(edits)
+            try:
+                with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                    self._known[edits] = self._pressed(edits)
+            except _DAMAGE as error:
+                raise InputError(
+                    f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
+                ) from None
         return self._known[edits]
 
     def _pressed(self, edits: frozenset[Change]) -> _Group:
@@ -246,10 +256,18 @@ class EditedSteps:
         steps = placed(
             kept.steps(footprint.load_frames), edit, footprint.position, self._ground.terrain, _length(kept.pressing)
         )
-        sole = kept.pressing.sole
+        sole, strength = kept.pressing.sole, edit.strength
+        layout: ContactLayout
         if sole.prop is not None:
-            return PropLayout(footprint.character, sole, steps, strength=edit.strength)
-        return SoleLayout(footprint.character, sole, steps, self._points_of(kept.pressing), strength=edit.strength)
+            layout = PropLayout(footprint.character, sole, steps, strength=strength)
+        else:
+            layout = SoleLayout(footprint.character, sole, steps, self._points_of(kept.pressing), strength=strength)
+        if layout.window(self._solver.cells).cells > MOST_CELLS:
+            raise InputError(
+                f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
+                f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
+            )
+        return layout
 
     def _points_of(self, pressing: PressingSole) -> SolePoints:
         if id(pressing) not in self._points:

@@ -25,10 +25,15 @@ from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.interface import panels, response_panel
 from softground_addon.blender.response import response_job
+from softground_addon.core.edited_steps import EditedSteps
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit
 from tests.blender import shots
 
 QUICK = 40
@@ -291,6 +296,25 @@ def test_a_record_forged_by_member_is_read_within_its_bounds_or_refused(count, s
             assert 0.0 <= baked_ground.baked_with(about, "blur_sigma") <= 1.0
 
     each(forged_by_member(stored), count, check)
+
+
+@counts(1000)
+@pytest.mark.timeout(3600)
+def test_steps_of_a_forged_record_are_pressed_again_or_refused(count, stored):
+    with zipfile.ZipFile(io.BytesIO(stored)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    ground = SoftGround(FlatTerrain(), GroundMaterial(0.3e6, 0.3, 0.1), "CENTRE_OF_PRESSURE")
+    made_of = sorted(name for name in members if name.startswith(("contact.", "soles.")))
+    forged = st.sampled_from(made_of).flatmap(
+        lambda name: forged_array(members[name]).map(lambda change: rezipped(stored, name, change))
+    )
+
+    def check(content):
+        with contextlib.suppress(InputError), np.errstate(all="ignore"):
+            footprints = record.load(content).footprints
+            EditedSteps(footprints, ground, footprints[1].cell_size).pressed_again({1: StepEdit(move_m=(0.1, 0.0))})
+
+    each(forged, count, check)
 
 
 @cache

@@ -194,6 +194,8 @@ def _check(footprint: Footprint) -> None:
         raise ValueError("contacts and frames do not match")
     if (made_by := footprint.pressed_by) and made_by.approach + len(footprint.load_frames) != made_by.count:
         raise ValueError("a contact's steps and its loads do not match")
+    if made_by and (np.diff(footprint.load_frames) <= 0).any():
+        raise ValueError("a contact's frames are out of order")
     for changes in (footprint.compression, footprint.rim):
         if len(changes.first) != len(changes.frames) + 1 or len(changes.cells) != len(changes.amounts):
             raise ValueError("changes and frames do not match")
