@@ -1,0 +1,162 @@
+"""What weather needs to know of the places of a bake, from its record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.display_blur import blurred_window, gaussian_kernel
+from ..ground.heightfield import TILE, SparseGrid, Window
+from ..record.footprints import Footprint, recompose
+from . import hollows
+from .weather import SEALING
+from .weathered_ground import KNOTS, SIGMAS, WeatherPlaces
+
+Array = NDArray[np.float64]
+
+NOT_YET = 1e9
+"""Frame of what never comes."""
+LEAST_SHARE = 1e-6
+"""Contact that is blurred to less than this counts for nothing."""
+
+
+def section_of(footprints: Sequence[Footprint]) -> float:
+    """Mean volume of a print over its width [m²], as wind fills it: the width is that of a square of its area."""
+    each = [one.compressed_m3 / np.sqrt(one.area_m2) for one in footprints if one.area_m2 > 0]
+    return float(np.mean(each)) if each else 0.0
+
+
+def weather_places(
+    footprints: Sequence[Footprint],
+    position: Array,
+    relief: Array,
+    started: Array,
+    ended: Array,
+    *,
+    cell_size: float,
+    blur_sigma: float,
+    layer_depth: float,
+    time_stretch: float = 1.0,
+) -> WeatherPlaces:
+    """What weather needs to know of places.
+
+    Parameters
+    ----------
+    footprints : sequence of Footprint
+    position : (K, 3) float array
+        Their undisturbed world positions [m].
+    relief : (K,) float array
+        What the finished bake shows there [m].
+    started, ended : (K,) float arrays
+        Frames of the animation from which on something happens there, and nothing any more; where nothing ever does,
+        far in the future and far in the past.
+    cell_size, blur_sigma, layer_depth : float
+        [m].
+    time_stretch : float
+        Frames of the animation for each frame of the footprints.
+    """
+    places = position[:, :2].T
+    trodden = _contacts(footprints, cell_size)
+    at_sigma = []
+    for sigma in SIGMAS:
+        # The blur of the display is in what is shown already.
+        smooth = _blurred(_pressed(footprints, cell_size), float(np.hypot(sigma, blur_sigma))).sample(*places)
+        at_sigma.append(smooth)
+    heights = [relief, *(rim - compression for compression, rim in at_sigma)]
+    bounds = [_blurred(trodden, sigma).sample(*places) for sigma in SIGMAS]
+    inside = [share for share, *_ in bounds]
+    first, last = (_mean_frame([(one[0], one[k]) for one in bounds]) * time_stretch for k in (1, 2))
+    pool, levels = _pools(footprints, position, relief, cell_size, blur_sigma, layer_depth)
+    return WeatherPlaces(
+        blur=np.diff(heights, axis=0).T,
+        trodden=np.stack([inside[0], inside[1] - inside[0], inside[2] - inside[1]], axis=-1),
+        times=np.stack([np.minimum(first, started), np.maximum(last, ended), at_sigma[0][0]], axis=-1),
+        pool=pool,
+        levels=levels,
+    )
+
+
+def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
+    """Compression and rim of the finished ground."""
+    return recompose(footprints, cell_size=cell_size)
+
+
+def _contacts(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
+    """Which cells were in contact, 1 or 0, and the same times the first and the last frame at which they were."""
+    grid = SparseGrid(cell_size, channels=3)
+    for footprint in footprints:
+        touched, first, last = values = grid.read(footprint.window)
+        cells = footprint.contact_cells[:]
+        start, end = footprint.contact_start[:], footprint.contact_end[:]
+        known = touched.reshape(-1)[cells] > 0
+        first.reshape(-1)[cells] = np.where(known, np.minimum(first.reshape(-1)[cells], start), start)
+        last.reshape(-1)[cells] = np.where(known, np.maximum(last.reshape(-1)[cells], end), end)
+        touched.reshape(-1)[cells] = 1.0
+        grid.write(footprint.window, values)
+    return grid
+
+
+def _blurred(grid: SparseGrid, sigma: float) -> SparseGrid:
+    """The whole of a grid blurred; its sums stay."""
+    result = SparseGrid(grid.cell_size, channels=grid.channels)
+    spread = -(-(len(gaussian_kernel(sigma / grid.cell_size)) // 2) // TILE)
+    around = range(-spread, spread + 1)
+    for column, row in sorted({(column + i, row + j) for column, row in grid.tiles for i in around for j in around}):
+        window = Window(column * TILE, row * TILE, TILE, TILE)
+        result.write(window, blurred_window(grid, window, sigma))
+    return result
+
+
+def _mean_frame(blurs: Sequence[tuple[Array, Array]]) -> Array:
+    """Mean frame of the contacts around, by the narrowest blur that reaches any; never, where none does."""
+    frame = np.full(len(blurs[0][0]), NOT_YET)
+    for share, total in reversed(blurs):
+        near = share > LEAST_SHARE
+        frame[near] = total[near] / share[near]
+    return frame
+
+
+def _pools(
+    footprints: Sequence[Footprint],
+    position: Array,
+    relief: Array,
+    cell_size: float,
+    blur_sigma: float,
+    layer_depth: float,
+) -> tuple[Array, Array]:
+    """`WeatherPlaces.pool` and `levels`: of the latest print whose hollow each place lies in."""
+    pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), KNOTS))
+    ground = recompose(footprints, cell_size=cell_size)
+    row, column = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (1, 0))
+    for footprint in sorted(footprints, key=lambda one: one.end_frame):
+        window = footprint.window.expanded(1)
+        there = np.flatnonzero(
+            (column >= window.column)
+            & (column < window.column + window.columns)
+            & (row >= window.row)
+            & (row < window.row + window.rows)
+        )
+        if not len(there):
+            continue
+        x, y = np.meshgrid(*window.centres(cell_size))
+        rest = _plane_through(position[there], x, y)
+        compression, rim = blurred_window(ground, window, blur_sigma)
+        within = (row[there] - window.row) * window.columns + column[there] - window.column
+        for hollow in hollows.hollows(rest + rim - compression, cell_size**2):
+            wet = there[np.isin(within, hollow.cells)]
+            known = hollow.level(hollow.capacity * (np.arange(KNOTS + 1) / KNOTS) ** 2) - hollow.bottom
+            pressed = compression.ravel()[hollow.cells].mean() / layer_depth
+            pool[wet, 0] = hollow.capacity / hollow.catchment
+            pool[wet, 1] = position[wet, 2] + relief[wet] - hollow.bottom
+            pool[wet, 2] = np.exp(-SEALING * pressed)
+            levels[wet] = np.diff(known)
+    return pool, levels
+
+
+def _plane_through(points: Array, x: Array, y: Array) -> Array:
+    """Heights at x and y of the plane that is nearest to points (N, 3)."""
+    middle = points.mean(axis=0)
+    rise = np.linalg.lstsq(points[:, :2] - middle[:2], points[:, 2] - middle[2], rcond=None)[0]
+    return np.asarray(middle[2] + rise[0] * (x - middle[0]) + rise[1] * (y - middle[1]))

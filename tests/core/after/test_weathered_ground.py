@@ -1,0 +1,120 @@
+"""A track under weather: what each place has kept from its record, and what becomes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from softground_addon.core.after import weather as w
+from softground_addon.core.after.weather_places import section_of, weather_places
+from softground_addon.core.after.weathered_ground import SIGMAS, Weather, matter_of, weathered
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.record.footprints import recompose
+from tests.core.walkers import pressed, walk
+
+CELL, BLUR, RATE = 0.01, 0.005, 30.0
+MATERIAL = GroundMaterial(200e3, 0.3, 0.1, blur_sigma=BLUR)
+HOUR = 3600.0
+
+
+@pytest.fixture(scope="module")
+def track():
+    _, footprints = pressed(walk(steps=3), MATERIAL)
+    x, y = np.meshgrid(np.arange(-0.6, 3.0, CELL) + CELL / 2, np.arange(-0.7, 0.7, CELL) + CELL / 2)
+    return footprints, np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+
+@pytest.fixture(scope="module")
+def left(track):
+    footprints, position = track
+    ground = recompose(footprints)
+    compression, rim = ground.sample(position[..., 0].ravel(), position[..., 1].ravel())
+    raw = (rim - compression).reshape(position.shape[:2])
+    relief = gaussian_filter(raw, BLUR / CELL, mode="constant")
+    never = np.full(relief.size, 1e9)
+    places = weather_places(
+        footprints,
+        position.reshape(-1, 3),
+        relief.ravel(),
+        never,
+        -never,
+        cell_size=CELL,
+        blur_sigma=BLUR,
+        layer_depth=0.3,
+    )
+    return raw, relief, places
+
+
+def at(left, weather, frame, surface="snow", section=0.01):
+    _, relief, places = left
+    matter = matter_of(surface, 0.3, section)
+    result = weathered(places, relief.ravel(), weather, matter, frame=frame, first_frame=1.0, frame_rate=RATE)
+    return replace(result, height=result.height.reshape(relief.shape))
+
+
+def test_the_blurred_relief_is_that_of_scipy(left):
+    raw, relief, places = left
+    known = np.cumsum(np.concatenate([relief.reshape(-1, 1), places.blur], axis=1), axis=1)
+    for sigma, ours in zip(SIGMAS, known.T[1:], strict=True):
+        theirs = gaussian_filter(raw, np.hypot(sigma, BLUR) / CELL, mode="constant", truncate=4.0)
+        assert ours.reshape(raw.shape) == pytest.approx(theirs, abs=1e-3 * np.abs(raw).max())
+        assert ours.sum() == pytest.approx(raw.sum(), rel=1e-4)  # no volume is lost
+
+
+def test_ages_are_those_of_the_contacts(track, left):
+    footprints, position = track
+    _, _, places = left
+    for footprint in footprints:
+        near = np.hypot(*(position.reshape(-1, 3)[:, :2] - footprint.position[:2]).T).argmin()
+        first, last, _ = places.times[near]
+        assert footprint.start_frame - 1 <= first <= last <= footprint.end_frame + 1
+    assert places.times[0, 1] > 1e6  # far from any print nothing has an age
+
+
+def test_no_weather_changes_nothing_and_neither_does_any_before_the_bake(left):
+    heavy = Weather(0.1 / HOUR, 5.0, 12.0, 30e-3 / HOUR, 1e-7, 1e3)
+    for result in (at(left, Weather(time_scale=1e5), 900.0), at(left, heavy, 1.0)):
+        assert not result.height.any()
+        assert not result.fresh.any()
+        assert not result.water.any()
+
+
+def test_a_print_is_gone_under_a_night_of_snow(left):
+    _, relief, places = left
+    snow = Weather(snowfall=0.03 / HOUR, temperature=-5.0, time_scale=2880.0)
+    heights = [relief + at(left, snow, frame).height for frame in (60.0, 150.0, 400.0)]
+    deep = relief < 0.8 * relief.min()
+    away = places.times[:, 1].reshape(relief.shape) > 1e6
+    depths = [float(height[away].mean() - height[deep].mean()) for height in heights]
+    assert depths[0] > depths[1] > depths[2]
+    cover = float(w.snow_cover((400 - 1) / RATE * 2880.0, snow.snowfall, -5.0))
+    assert heights[-1][away] == pytest.approx(cover, rel=1e-9)
+
+
+def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(left):
+    _, relief, _ = left
+    wind = at(left, Weather(wind=9.2, time_scale=100.0), 900.0, "sand")
+    assert np.abs(relief + wind.height).max() < 0.1 * np.abs(relief).max()
+    rain = at(left, Weather(rain=20e-3 / HOUR, time_scale=60.0), 900.0, "sand", 0.01)
+    moved = np.where(rain.water.reshape(relief.shape) > 0, 0.0, rain.height)
+    assert moved.sum() == pytest.approx(0.0, abs=2e-2 * np.abs(relief).sum())
+    assert np.abs(relief + rain.height).max() < np.abs(relief).max()
+
+
+def test_puddles_are_level_and_spill_no_higher_than_their_brim(left):
+    _, relief, places = left
+    rain = at(left, Weather(rain=40e-3 / HOUR, time_scale=240.0), 900.0, "mud")
+    water = rain.water.reshape(relief.shape)
+    assert (water > 0).sum() > 20
+    surface = (relief + rain.height)[water > 0]
+    pools = places.pool[(water > 0).ravel()]
+    for capacity in np.unique(pools[:, 0]):
+        assert np.ptp(surface[pools[:, 0] == capacity]) < 1e-9
+    assert surface.max() < relief.max()
+
+
+def test_a_section_is_that_of_the_prints(track):
+    footprints, _ = track
+    first = footprints[0]
+    assert section_of([first]) == pytest.approx(first.compressed_m3 / first.area_m2**0.5)
