@@ -416,6 +416,22 @@ class ContactLoads:
         depths = yield from self._table.pressing(together, sinking, material, pressure)
         return median_depth(depths[chosen])
 
+    def modulus_for(self, material: GroundMaterial, share: float) -> float:
+        """The modulus [Pa] with which prints are about so many times as deep: by how far the ground gives way under
+        the lowest points alone, which is known at once."""
+        if not self.soles:
+            return material.youngs_modulus / share
+        main = main_contacts(self._impulse)
+
+        def reached(modulus: float) -> float:
+            return float(np.median(self._table.sink(replace(material, youngs_modulus=modulus)).reached[main]))
+
+        modulus = material.youngs_modulus
+        aim = share * reached(modulus)
+        for _ in range(FREE_TRIALS):
+            modulus = float(np.clip(modulus * reached(modulus) / max(aim, NEVER_LANDS), SOFTEST, STIFFEST))
+        return modulus
+
 
 @sliced
 def typical_depth(contacts: ContactLoads, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> Slices[float]:

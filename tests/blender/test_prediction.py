@@ -171,3 +171,29 @@ def test_an_edit_of_the_grounds_mesh_ends_it_and_a_bake_does_not(shot):
     assert not bpy.app.timers.is_registered(handlers.compare_prediction)  # in background nobody looks at it
     handlers.compare_prediction()
     assert prediction.of(shot) is None
+
+
+@pytest.mark.parametrize("depth", [0.03, 0.08])
+def test_a_depth_that_is_typed_or_dragged_is_met_after_a_moment(shot, drawing, depth):
+    analysis.read(shot)
+    drawing(shot)
+    while prediction._work_out() is not None:
+        pass
+    assert drawing(shot).is_current
+    prediction.aim_at(shot, analysis.current(shot), depth)
+    assert prediction.shown_cm(shot) == pytest.approx(100 * depth)
+    while prediction._work_out() is not None:
+        pass
+    assert analysis.expected_depth(shot) == pytest.approx(depth, rel=0.005)
+
+
+def test_what_was_typed_is_forgotten_where_the_stiffness_is_set(shot, drawing):
+    analysis.read(shot)
+    drawing(shot)
+    prediction._work_out()
+    drawing(shot)
+    prediction.aim_at(shot, analysis.current(shot), 0.05)
+    shot.softground.material.youngs_modulus = 1e6
+    while prediction._work_out() is not None:
+        pass
+    assert shot.softground.material.youngs_modulus == 1e6

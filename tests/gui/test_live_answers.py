@@ -16,7 +16,7 @@ def facts(tell):
 
 
 def test_the_newest_steps_follow_while_the_slider_is_dragged(facts):
-    assert facts["mass"][1] > 1.3 * facts["mass"][0]
+    assert facts["depth"][1] > 1.3 * facts["depth"][0]
     newest = [seen[0] for seen in facts["while dragged"]]
     assert len(set(newest)) > 4
     assert min(newest) < 1.2 * facts["before"][0]

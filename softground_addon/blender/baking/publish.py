@@ -20,7 +20,7 @@ from ...core.relief.steps import StepRelief, all_together, water_at
 from ...core.relief_plan import relief_at, shod_of
 from ...core.settings import BakeSettings
 from .. import settings
-from ..ground import baked_ground, ground_mesh, playback
+from ..ground import baked_ground, display_key, ground_mesh, playback
 from ..ground.baked_ground import Place
 from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
@@ -89,7 +89,7 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             table,
             stored,
             unit_scale=made_with.unit_scale_m,
-            shape_keys=made_with.shape_keys,
+            shape_keys=display_key.is_wanted(made_with.shape_keys, settings.found(place.display_mesh)),
             marks=marks,
             water=water_at(relief, len(x)),
         )

@@ -14,6 +14,17 @@ Positions = NDArray[np.float32]
 DISPLAY_KEY = "SoftGround Display"
 
 
+MOST_VERTICES = 250_000
+"""Vertices of a ground up to which shape keys cost nothing that shows; see docs/playback.md."""
+
+
+def is_wanted(choice: str, ground: bpy.types.Object) -> bool:
+    """Whether a ground keeps shape keys by the user's choice: 'ALWAYS', 'NEVER', or 'AUTO' by its size."""
+    if choice == "AUTO":
+        return len(ground.data.vertices) <= MOST_VERTICES
+    return choice == "ALWAYS"
+
+
 def put(ground: bpy.types.Object, raw: Positions, display: Positions) -> None:
     """Raw positions as the basis, and above it the key that shows the blurred ones, as it may be there already."""
     mesh = cast("bpy.types.Mesh", ground.data)

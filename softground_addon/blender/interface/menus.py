@@ -17,6 +17,7 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("softground.add_character", icon="ARMATURE_DATA")
         layout.operator("softground.add_contact", icon="PLUS")
+        layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
         layout.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         layout.operator("softground.use_as_ground", icon="EYEDROPPER")
         layout.separator()
@@ -48,6 +49,11 @@ def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:
     menu.layout.menu("SOFTGROUND_MT_object")
 
 
+def draw_in_armature_menu(menu: Any, _context: bpy.types.Context) -> None:
+    """Append the sample figure to the armatures that can be added."""
+    menu.layout.operator("softground.add_sample_scene", text="SoftGround Walking Figure", icon="OUTLINER_OB_ARMATURE")
+
+
 def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
     """Append the ground to what can be added as a mesh."""
     menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
@@ -57,12 +63,14 @@ def register() -> None:
     """Add the entries."""
     bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
     bpy.types.VIEW3D_MT_mesh_add.append(draw_in_add_menu)
+    bpy.types.VIEW3D_MT_armature_add.append(draw_in_armature_menu)
 
 
 def unregister() -> None:
     """Take the entries away."""
     bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
     bpy.types.VIEW3D_MT_mesh_add.remove(draw_in_add_menu)
+    bpy.types.VIEW3D_MT_armature_add.remove(draw_in_armature_menu)
 
 
 CLASSES = (SOFTGROUND_MT_object,)

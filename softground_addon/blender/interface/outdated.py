@@ -10,7 +10,7 @@ from ..baking import bake_report
 from .prediction import SOON
 
 WAIT = 0.3
-"""Time until it is looked at again where a bake is running [s]."""
+"""Time until it is looked at again where a bake is running, or live mode is on [s]."""
 
 _compared: dict[int, BakeSettings] = {}
 """The settings that each scene's bake was compared with last, by session uid."""
@@ -24,7 +24,7 @@ def watch(scene: bpy.types.Scene) -> None:
 
 def compare_bake() -> float | None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
-    if session.current().is_baking:
+    if session.current().is_baking or session.current().is_live:
         return WAIT
     windows = bpy.context.window_manager.windows
     if windows:

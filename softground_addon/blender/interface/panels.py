@@ -67,6 +67,8 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
             column = layout.column()
             column.scale_y = 1.4
             column.operator("softground.add_character", icon="ARMATURE_DATA")
+            if not context.selected_objects:
+                layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
             return
         row = layout.row()
         row.template_list(

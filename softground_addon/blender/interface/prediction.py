@@ -31,6 +31,22 @@ _ENDED = object()
 _working: list[jobs.Job[float | None]] = []
 """Depths that are being worked out."""
 
+CLOSE_ENOUGH = 0.005
+"""Relative error of a depth that was typed."""
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """A depth that was typed [m], the modulus that was set for it [Pa], and how often it may still be put right."""
+
+    depth: float
+    modulus: float
+    tries: int = 4
+
+
+_aims: dict[int, _Aim] = {}
+"""By session uid of the scene."""
+
 _told: dict[int, float] = {}
 """The depth that each scene was told last [m], by session uid."""
 
@@ -81,13 +97,40 @@ def type_cm(scene: bpy.types.Scene, depth: float) -> None:
         return
     wanted = settings.snapshot(scene)
     try:
-        modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
+        if bpy.app.background or depth / 100 > wanted.material.layer_depth or not _told.get(scene.session_uid):
+            modulus = matching_modulus(known.contacts, wanted.material, depth / 100, wanted.pressure)
+            scene.softground.material.youngs_modulus = modulus
+        else:
+            aim_at(scene, known, depth / 100)
     except InputError as error:
         message = str(error)
         if not bpy.app.background:
             bpy.context.window_manager.popup_menu(lambda menu, _: menu.layout.label(text=message), title="Depth")
-        return
-    scene.softground.material.youngs_modulus = modulus
+
+
+def aim_at(scene: bpy.types.Scene, known: Analysis, depth: float) -> None:
+    """Set the stiffness so that the typical print gets about a depth [m]; it is put right as the depth is worked out.
+
+    So a drag is answered at once.
+    """
+    share = depth / _told[scene.session_uid]
+    material = settings.snapshot(scene).material
+    scene.softground.material.youngs_modulus = known.contacts.modulus_for(material, share)
+    _told[scene.session_uid] = depth
+    _aims[scene.session_uid] = _Aim(depth, scene.softground.material.youngs_modulus)
+
+
+def _put_right(scene: bpy.types.Scene) -> bool:
+    """Bring the stiffness nearer to what gives the depth that was typed last; whether there is more to do."""
+    aim, material = _aims.pop(scene.session_uid, None), scene.softground.material
+    depth = analysis.known_depth(known, settings.snapshot(scene)) if (known := analysis.known(scene)) else None
+    if aim is None or not depth or aim.tries == 0 or material.youngs_modulus != aim.modulus:
+        return False
+    if abs(depth - aim.depth) <= CLOSE_ENOUGH * aim.depth:
+        return False
+    material.youngs_modulus *= depth / aim.depth
+    _aims[scene.session_uid] = _Aim(aim.depth, material.youngs_modulus, aim.tries - 1)
+    return True
 
 
 def _work_out() -> float | None:
@@ -103,10 +146,11 @@ def _work_out() -> float | None:
             _working.pop()
         elif time.perf_counter() > until and not bpy.app.background:
             return PAUSE
+    more = [_put_right(scene) for scene in {window.scene for window in bpy.context.window_manager.windows}]
     session.redraw()
     if session.current().show_overlay:
         session.redraw(region_type="WINDOW")
-    return None
+    return PAUSE if any(more) else None
 
 
 def unregister() -> None:
@@ -114,4 +158,5 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(_work_out):
         bpy.app.timers.unregister(_work_out)
     _working.clear()
+    _aims.clear()
     _told.clear()

@@ -81,13 +81,23 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     cell_size_cm: in_unit(
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
-    shape_keys: BoolProperty(
+    keep_shape_keys: EnumProperty(
         name="Keep Shape Keys",
-        description=(
-            "Keep the raw and the smoothed heights as shape keys, to blend or sculpt. "
-            "Without them a dense ground plays faster, since Blender evaluates them on the whole mesh at each frame"
-        ),
-        default=True,
+        description="Whether the raw and the smoothed heights are kept as shape keys, to blend or sculpt. Blender "
+        "evaluates them on the whole mesh at each frame: without them a dense ground plays faster",
+        items=[
+            ("AUTO", "Automatic", "On grounds of up to 250,000 vertices, where they cost nothing that shows"),
+            ("ALWAYS", "Always", "On every ground"),
+            ("NEVER", "Never", "On no ground"),
+        ],
+        default="AUTO",
+    )
+    shape_keys: BoolProperty(
+        name="Shape Keys",
+        description="Keep Shape Keys as yes or no, for scripts",
+        get=lambda options: options.keep_shape_keys != "NEVER",
+        set=lambda options, value: setattr(options, "keep_shape_keys", "ALWAYS" if value else "NEVER"),
+        options={"SKIP_SAVE", "HIDDEN"},
     )
     ground_margin: FloatProperty(
         name="Margin (m)",

@@ -30,8 +30,8 @@ def tell(hand: Hand, facts: dict) -> Steps:
     newest, oldest = (age >= 0) & (age < 0.4), age > 3.0
     facts["before"] = [float(before[newest].min()), float(before[oldest].min())]
 
-    field = yield from hand.find_field("mass")
-    mass = scene().softground.characters[0].mass
+    field = yield from hand.find_field("depth_cm")
+    depth = scene().softground.depth_cm
     with parts_timed() as parts:
         seen: list[list[float]] = []
         for _ in hand.drag(field, 200, steps=25, seconds=2.5):
@@ -44,12 +44,12 @@ def tell(hand: Hand, facts: dict) -> Steps:
         facts["seconds after letting go"] = time.perf_counter() - let_go
     facts["parts"] = sorted(parts, reverse=True)[:8]
     facts["number of parts"] = len(parts)
-    facts["mass"] = [mass, scene().softground.characters[0].mass]
+    facts["depth"] = [depth, scene().softground.depth_cm]
     facts["after"] = [float(heights()[newest].min()), float(heights()[oldest].min())]
     yield from hand.picture("live_answers", in_docs=False)
 
     yield from hand.press_button("softground.live", offset=0.75)
-    yield 0.5
+    yield 3.0
     ground = scene().softground.ground
     facts["kept"] = "softground_record" in ground.data
     facts["outdated"] = bpy.context.window_manager.softground.stale
