@@ -168,7 +168,8 @@ class BakeSettings(SceneUnits):
         Whether feet are let down where a rig can take it, and are left as they are where not.
     output : 'BOTH', 'PRINTS' or 'RESPONSE'
     detail : 'AUTO', 'ALWAYS' or 'NEVER'
-    shape_keys : 'AUTO', 'ALWAYS' or 'NEVER'
+    shape_keys, dense_shape_keys : bool
+        Whether they are kept, and also where the ground is dense.
     tread_m : float
     tread_pattern : str
         One of `relief.tread.PATTERNS`.
@@ -199,7 +200,8 @@ class BakeSettings(SceneUnits):
     sink_feet: bool = field(metadata=_on(Acts.OUTPUT))
     output: str = field(metadata=_on(Acts.OUTPUT))
     detail: str = field(metadata=_on(Acts.WRITING))
-    shape_keys: str = field(metadata=_on(Acts.WRITING))
+    shape_keys: bool = field(metadata=_on(Acts.WRITING))
+    dense_shape_keys: bool = field(metadata=_on(Acts.WRITING))
     tread_m: float = field(metadata=_on(Acts.WRITING))
     tread_pattern: str = field(metadata=_on(Acts.WRITING))
     relief: str = field(metadata=_on(Acts.WRITING))

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from mathutils import Euler
 
-from softground_addon.blender.ground import created_ground, ground_checks, ground_mesh, still_ground
+from softground_addon.blender.ground import created_ground, display_key, ground_checks, ground_mesh, still_ground
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.record.pressed_ground import GroundSample
-from tests.blender import fingerprints
+from tests.blender import fingerprints, shots
 
 
 def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
@@ -192,3 +192,16 @@ def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is
     assert np.ptp(shown[:, 2]) > 0.1
     wave.show_viewport = False
     assert not still_ground.changes_with_time(ground)
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+@pytest.mark.parametrize("too", [True, False])
+@pytest.mark.parametrize("dense", [True, False])
+def test_dense_grounds_keep_shape_keys_only_where_that_is_asked_for(scene, monkeypatch, wanted, too, dense):
+    shots.walker(scene, frames=20)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.cell_size, options.shape_keys, options.dense_shape_keys = 0.03, wanted, too
+    monkeypatch.setattr(display_key, "MOST_VERTICES", 10 if dense else 10**9)
+    bpy.ops.softground.bake()
+    assert (options.ground.data.shape_keys is not None) == (wanted and (too or not dense))

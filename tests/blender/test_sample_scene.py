@@ -3,9 +3,7 @@
 import json
 
 import bpy
-import pytest
 
-from softground_addon.blender.ground import display_key
 from softground_addon.blender.interface import sample_scene
 from tests.blender import fingerprints
 
@@ -41,22 +39,3 @@ def test_it_comes_to_the_cursor_beside_what_is_there(scene):
 def test_the_file_is_small():
     assert sample_scene.FILE.stat().st_size < 150e3
     assert set(json.loads(sample_scene.FILE.read_text(encoding="utf-8"))) >= {"bones", "vertices", "curves"}
-
-
-@pytest.mark.parametrize("choice", ["AUTO", "ALWAYS", "NEVER"])
-def test_small_grounds_keep_shape_keys_of_themselves_and_large_ones_do_not(choice, monkeypatch):
-    mesh = bpy.data.meshes.new("Ground")
-    mesh.vertices.add(100)
-    ground = bpy.data.objects.new("Ground", mesh)
-    for most, expected in ((100, choice != "NEVER"), (99, choice == "ALWAYS")):
-        monkeypatch.setattr(display_key, "MOST_VERTICES", most)
-        assert display_key.is_wanted(choice, ground) == expected
-
-
-def test_scripts_say_yes_or_no_to_shape_keys_as_before(scene):
-    options = scene.softground
-    assert (options.keep_shape_keys, options.shape_keys) == ("AUTO", True)
-    options.shape_keys = False
-    assert options.keep_shape_keys == "NEVER"
-    options.shape_keys = True
-    assert options.keep_shape_keys == "ALWAYS"

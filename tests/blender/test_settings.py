@@ -39,7 +39,6 @@ def shot(scene):
     bpy.ops.softground.add_character()
     options = scene.softground
     options.ground, options.frame_end = plane(scene), 40
-    options.keep_shape_keys = "ALWAYS"  # what scripts say with yes and no comes back by them
     options.tilt.use = options.grounding.use = True
     bpy.context.view_layer.update()
     return scene

@@ -89,7 +89,8 @@ def publish(left: record.BakeRecord, place: Place, made_with: BakeSettings) -> J
             table,
             stored,
             unit_scale=made_with.unit_scale_m,
-            shape_keys=display_key.is_wanted(made_with.shape_keys, settings.found(place.display_mesh)),
+            shape_keys=made_with.shape_keys
+            and (made_with.dense_shape_keys or not display_key.is_dense(settings.found(place.display_mesh))),
             marks=marks,
             water=water_at(relief, len(x)),
         )

@@ -18,11 +18,9 @@ MOST_VERTICES = 250_000
 """Vertices of a ground up to which shape keys cost nothing that shows; see docs/playback.md."""
 
 
-def is_wanted(choice: str, ground: bpy.types.Object) -> bool:
-    """Whether a ground keeps shape keys by the user's choice: 'ALWAYS', 'NEVER', or 'AUTO' by its size."""
-    if choice == "AUTO":
-        return len(ground.data.vertices) <= MOST_VERTICES
-    return choice == "ALWAYS"
+def is_dense(ground: bpy.types.Object) -> bool:
+    """Whether shape keys would make a ground play slower."""
+    return len(ground.data.vertices) > MOST_VERTICES
 
 
 def put(ground: bpy.types.Object, raw: Positions, display: Positions) -> None:

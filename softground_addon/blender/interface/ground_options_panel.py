@@ -100,7 +100,10 @@ class SOFTGROUND_PT_mesh(_Closed, bpy.types.Panel):
         column.prop(options.material, "blur_sigma_cm")
         column.prop(options, "detail")
         column.prop(options, "ground_margin")
-        column.prop(options, "keep_shape_keys")
+        column.prop(options, "shape_keys")
+        row = column.row()
+        row.active = options.shape_keys
+        row.prop(options, "dense_shape_keys")
         predicted = prediction.of(scene)
         if predicted:
             row = layout.row()

@@ -224,6 +224,7 @@ class LiveMode:
             self._wanted,
             frames=(self._wanted.frames[0], int(self._playhead.frame)),
             shape_keys=now.shape_keys,
+            dense_shape_keys=now.dense_shape_keys,
             tread_m=now.tread_m,
         )
         footprints = self._playhead.footprints()

@@ -81,23 +81,16 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     cell_size_cm: in_unit(
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
-    keep_shape_keys: EnumProperty(
-        name="Keep Shape Keys",
-        description="Whether the raw and the smoothed heights are kept as shape keys, to blend or sculpt. Blender "
-        "evaluates them on the whole mesh at each frame: without them a dense ground plays faster",
-        items=[
-            ("AUTO", "Automatic", "On grounds of up to 250,000 vertices, where they cost nothing that shows"),
-            ("ALWAYS", "Always", "On every ground"),
-            ("NEVER", "Never", "On no ground"),
-        ],
-        default="AUTO",
-    )
     shape_keys: BoolProperty(
-        name="Shape Keys",
-        description="Keep Shape Keys as yes or no, for scripts",
-        get=lambda options: options.keep_shape_keys != "NEVER",
-        set=lambda options, value: setattr(options, "keep_shape_keys", "ALWAYS" if value else "NEVER"),
-        options={"SKIP_SAVE", "HIDDEN"},
+        name="Keep Shape Keys",
+        description="Keep the raw and the smoothed heights as shape keys, to blend or sculpt. Left out on grounds of "
+        "more than 250,000 vertices, which play faster without: Blender evaluates them on the whole mesh at each frame",
+        default=True,
+    )
+    dense_shape_keys: BoolProperty(
+        name="On Dense Grounds Too",
+        description="Keep shape keys on grounds of more than 250,000 vertices too",
+        default=False,
     )
     ground_margin: FloatProperty(
         name="Margin (m)",

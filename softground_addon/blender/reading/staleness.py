@@ -151,7 +151,7 @@ def _as_in_0_1(inputs: Mapping[str, Any]) -> dict[str, str]:
     ]
     return {
         SETTINGS: report.hash_inputs(known),
-        _WRITING: f"{inputs['detail']} {inputs['shape_keys'] != 'NEVER'}",
+        _WRITING: f"{inputs['detail']} {inputs['shape_keys']}",
     }
 
 
