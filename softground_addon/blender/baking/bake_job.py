@@ -42,7 +42,7 @@ from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 from ..response import response_job
-from . import bake_report
+from . import bake_report, debris_job
 from .bake_checks import check_volumes, copy_findings, coverage, coverage_findings, shortest_sole, wants_detail
 from .publish import at_the_end, publish, sign
 
@@ -99,13 +99,14 @@ def bake(
     shot = yield from read_shot(scene, wanted)
     movers = staleness.of_movers(scene, wanted)
     surface = shot.surface
-    vertices = surface.vertices if surface else None
-    shot_hash = yield from meanwhile(Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, vertices))
+    hashing = report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
+    shot_hash = yield from meanwhile(Progress("sample", 1.0), hashing)
     sampled = time.perf_counter()
 
     if edits is None:
         edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
     loads, left, forces, responses = yield from _press(wanted, shot, edits)
+    left, debris = debris_job.thrown(wanted, shot.terrain, loads, left)
     footprints = left.footprints
     simulated = time.perf_counter()
 
@@ -119,10 +120,15 @@ def bake(
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
     ground_name = wanted.ground.name if wanted.ground else "the ground"
     checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
-    findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving]
-    findings += bake_report.edit_findings(left)
+    findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving, *bake_report.edit_findings(left)]
     of_responses = response_job.findings(responses)
-    happened = events(loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
+    happened = events(
+        loads,
+        footprints,
+        surface=wanted.surface,
+        first_frame=wanted.frames[0],
+        thrown=debris.masses if debris else None,
+    )
     build_report = partial(
         report.build,
         inputs=inputs,
@@ -136,6 +142,7 @@ def bake(
         worst_gaps=response_job.worst_gaps(responses),
         suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
         events=happened,
+        thrown_m3=float(debris.volume.sum()) if debris else 0.0,
     )
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
@@ -146,6 +153,7 @@ def bake(
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         written = yield from write_prints(scene, wanted, shot, replace(left, about=about), sole_length)
         findings += written.findings
+        debris_job.put(written.ground, debris, wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()

@@ -20,6 +20,7 @@ from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import GroundSample, Trail
 from ...core.settings import ObjectName
+from ..after import debris_object
 from ..jobs import Job, Progress
 from ..settings import found, name_of
 from . import created_ground, ground_checks, ground_mesh, hidden_ground, playback, trail_detail
@@ -83,6 +84,7 @@ def clear(ground: bpy.types.Object) -> None:
     """
     for obj in dict.fromkeys((ground, display_mesh_of(ground))):
         ground_checks.check_writable(obj)
+    debris_object.remove(ground)
     trail_detail.remove(ground)
     ground_mesh.restore(ground)
 

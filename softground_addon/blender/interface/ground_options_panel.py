@@ -9,6 +9,7 @@ import bpy
 from ...core.loads.cell_limits import BYTES_PER_CELL
 from ...core.settings import spacing_of
 from .. import settings
+from ..after import debris_object
 from ..ground import painted_ground
 from . import prediction
 from .character_editing import active_character
@@ -51,6 +52,9 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
                 row.active = False
                 spacing = spacing_of(settings.typed(options.cell_size), options.relief)
                 row.label(text=vertices(predicted.analysis.area, spacing), icon="INFO", translate=False)
+        layout.prop(options, "debris")
+        if options.debris and options.ground is not None:
+            _wind(layout, options.ground)
         layout.operator("softground.match_depth", icon="DRIVER_DISTANCE")
 
 
@@ -129,6 +133,16 @@ def estimate(area: float, cell_size: float) -> str:
 def rounded(value: float) -> float:
     """A positive number to two digits, at least 1, as estimates are told."""
     return max(1.0, float(f"{value:.2g}"))
+
+
+def _wind(layout: Any, ground: Any) -> None:
+    """What acts on the debris at once, where there is any."""
+    debris = debris_object.of(ground)
+    if debris is None:
+        return
+    for name in ("Wind", "Amount"):
+        if (field := debris_object.field_of(debris, name)) is not None:
+            layout.prop(*field, text=name)
 
 
 CLASSES = (SOFTGROUND_PT_material, SOFTGROUND_PT_layers, SOFTGROUND_PT_painted, SOFTGROUND_PT_mesh)

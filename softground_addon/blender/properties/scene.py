@@ -220,6 +220,12 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     has_layers: BoolProperty(
         name="Response Layers", description="A bake has put layers on armatures", options={"HIDDEN"}
     )
+    debris: BoolProperty(
+        name="Throw Debris",
+        description="Let steps throw snow, sand, mud and soil, as far as their speed and force can: a run in powder a "
+        "plume, a walk on firm sand next to nothing. What flies is missing from the rims of the prints",
+        default=False,
+    )
     keep_forces: BoolProperty(
         name="Forces in Report",
         description="Write the force under each sole at each frame into the report",

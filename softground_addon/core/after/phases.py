@@ -112,6 +112,28 @@ def place_of(loads: CharacterLoads, sole: int, at: int) -> Array:
     return lowest
 
 
+def sole_points_at(loads: CharacterLoads, sole: int, steps: NDArray[np.intp]) -> tuple[Array, Array]:
+    """What of a sole is followed, at some steps, and its velocities there: (K, L, 3) [m] and [m/s]."""
+    first = np.clip(steps, 0, max(0, len(loads.motion.frames) - 2))
+    motion = loads.motion.soles[sole]
+    now, later = (_places(motion, at) for at in (first, np.minimum(first + 1, len(loads.motion.frames) - 1)))
+    lift = loads.contacts.offset[sole] * loads.contacts.normal[first, sole]
+    return now - lift[:, None], (later - now) / loads.motion.time_step
+
+
+def sole_velocity(loads: CharacterLoads, sole: int, step: int) -> Array:
+    """Velocity of the middle of a sole after a step, (3,) [m/s]."""
+    return np.asarray(sole_points_at(loads, sole, np.array([step]))[1][0].mean(axis=0))
+
+
+def _places(motion: SoleMotion, steps: NDArray[np.intp]) -> Array:
+    """Matter of a sole at steps, (K, L, 3) [m]: a foot's landmarks; of a prop, points of its surface."""
+    if motion.sole.prop is None:
+        return motion.landmark_positions()[steps]
+    pose, probes = motion.transforms[steps, 0], motion.sole.prop.probes[:: max(1, len(motion.sole.prop.probes) // 16)]
+    return np.asarray(np.einsum("kij,lj->kli", pose[:, :3, :3], probes) + pose[:, None, :3, 3])
+
+
 def is_foot(motion: SoleMotion) -> bool:
     """Whether a sole has a heel and a ball to roll over."""
     return motion.sole.prop is None and len(motion.sole.landmarks) > 1

@@ -36,6 +36,7 @@ def build(
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
+    thrown_m3: float = 0.0,
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -67,6 +68,8 @@ def build(
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
         From `core.after.events`.
+    thrown_m3 : float
+        What steps have thrown out of their rims.
     """
     changes = edits_by_number(footprints, edits)
     steps = [
@@ -88,6 +91,7 @@ def build(
             "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
+            "thrown_m3": thrown_m3,
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},

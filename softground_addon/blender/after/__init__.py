@@ -1,0 +1,1 @@
+"""What a bake throws, as native data that plays without the add-on."""

@@ -1,0 +1,137 @@
+"""The object `SoftGround Debris`: what the steps of a ground's bake throw, put there and taken away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.after.debris import Debris
+from .. import compat
+from . import debris_nodes as nodes
+from . import debris_shapes
+
+NAME = "SoftGround Debris"
+MODIFIER = "SoftGround Debris"
+
+_AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0}
+
+
+def put(
+    ground: bpy.types.Object,
+    debris: Debris | None,
+    *,
+    surface: str,
+    frame_rate: float,
+    time_stretch: float,
+    gravity: float,
+    unit_scale: float,
+) -> bpy.types.Object | None:
+    """Let a ground have debris in place of what it may have; None takes that away.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    debris : Debris or None
+    surface : str
+        See `core.ground.presets.SURFACES`.
+    frame_rate : float
+        Scene frames per second [Hz].
+    time_stretch : float
+        Frames of the animation, which nodes count, per frame of the scene.
+    gravity : float
+        [m/s²]
+    unit_scale : float
+        Metres per Blender unit.
+    """
+    older = of(ground)
+    kept = _settings_of(older) if older else {}
+    remove(ground)
+    if debris is None or not len(debris.birth):
+        return None
+    points = _points(debris, time_stretch, unit_scale)
+    obj = bpy.data.objects.new(NAME, points)
+    obj[nodes.MARK] = True
+    for collection in ground.users_collection:
+        collection.objects.link(obj)
+    obj.parent = ground
+    obj.matrix_parent_inverse = ground.matrix_world.inverted()
+    material = ground.active_material
+    shapes = debris_shapes.collection_of(surface, material)
+    group = nodes.build(frame_rate=frame_rate * time_stretch, gravity=gravity, unit_scale=unit_scale, shapes=shapes)
+    modifier: Any = obj.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = group
+    for name, value in (_AT_FIRST | kept).items():
+        compat.write_input(modifier, socket_of(group, name), value)
+    return obj
+
+
+def of(ground: bpy.types.Object) -> bpy.types.Object | None:
+    """The debris of a ground's bake."""
+    return next((obj for obj in ground.children if obj.get(nodes.MARK)), None)
+
+
+def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
+    """An input of the debris as `layout.prop` takes it: its modifier and the path of the property."""
+    for modifier in obj.modifiers:
+        group = getattr(modifier, "node_group", None)
+        if group is not None and group.get(nodes.MARK):
+            return compat.input_field(modifier, socket_of(group, name))
+    return None
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take a ground's debris away; nothing happens where there is none."""
+    while obj := of(ground):
+        groups = [modifier.node_group for modifier in obj.modifiers if modifier.type == "NODES" and modifier.node_group]
+        mesh: Any = obj.data
+        bpy.data.objects.remove(obj)
+        if mesh is not None and not mesh.users:
+            bpy.data.meshes.remove(mesh)
+        for group in groups:
+            if group.get(nodes.MARK) and not group.users:
+                bpy.data.node_groups.remove(group)
+        for shapes in [one for one in bpy.data.collections if one.get(nodes.MARK) and not one.users]:
+            debris_shapes.remove(shapes)
+
+
+def _settings_of(obj: bpy.types.Object) -> dict[str, Any]:
+    """What the artist set of the older debris: wind, amount, and shapes of their own."""
+    for modifier in obj.modifiers:
+        group = getattr(modifier, "node_group", None)
+        if group is not None and group.get(nodes.MARK):
+            values = {
+                name: compat.read_input(modifier, socket_of(group, name)) for name in ("Wind", "Amount", "Shapes")
+            }
+            if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):
+                values["Shapes"] = None
+            # Vectors belong to the modifier, and go with it.
+            values["Wind"] = None if values["Wind"] is None else tuple(values["Wind"])
+            return {name: value for name, value in values.items() if value is not None}
+    return {}
+
+
+def socket_of(group: Any, name: str) -> str:
+    """The modifier's key of a group's input."""
+    items = group.interface.items_tree
+    return next(str(item.identifier) for item in items if item.name == name and item.in_out == "INPUT")
+
+
+def _points(debris: Debris, time_stretch: float, unit_scale: float) -> bpy.types.Mesh:
+    points = bpy.data.meshes.new(NAME)
+    points.vertices.add(len(debris.birth))
+    points.vertices.foreach_set("co", (debris.start / unit_scale).astype(np.float32).ravel())
+    columns: tuple[tuple[str, Any, str, Any], ...] = (
+        (nodes.BIRTH, "FLOAT", "value", debris.birth * time_stretch),
+        (nodes.FLIGHT, "FLOAT", "value", debris.time),
+        (nodes.DRAG, "FLOAT", "value", debris.drag_time),
+        (nodes.RADIUS, "FLOAT", "value", debris.radius / unit_scale),
+        (nodes.LAUNCH, "FLOAT_VECTOR", "vector", debris.velocity / unit_scale),
+        (nodes.KIND, "INT", "value", debris.kind),
+        (nodes.STEP, "INT", "value", debris.step),
+    )
+    for name, kind, field, values in columns:
+        attribute: Any = points.attributes.new(name, kind, "POINT")
+        attribute.data.foreach_set(field, values.astype(np.int32 if kind == "INT" else np.float32).ravel())
+    return points

@@ -1,0 +1,184 @@
+"""Debris in Blender: it flies by its node group alone, in any order of frames, and Clear takes all of it away."""
+
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+
+from sample_scenes.body import Body
+from sample_scenes.character import create_character
+from sample_scenes.keys import write_action
+from sample_scenes.run import Run, run
+from softground_addon.blender import compat, jobs
+from softground_addon.blender.after import debris_object
+from softground_addon.blender.baking import bake_job
+from softground_addon.core.after import flight
+from tests.blender import fingerprints, shots
+
+
+def runner(scene):
+    """A run on dry sand, with quick settings."""
+    body = Body()
+    armature = create_character("Runner", body, scene.collection, shots.COARSE)
+    write_action(armature, run(body, Run(), 24, 24), "Run")
+    scene.render.fps = 24
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.softground.add_character()
+    shots.coarse(scene)
+    options = scene.softground
+    options.material.preset, options.material.surface = "Dry Sand", "sand"
+    options.material.youngs_modulus, options.material.poisson_ratio = 9e5, 0.5
+    options.cell_size = 0.03
+    return armature
+
+
+@pytest.fixture(scope="module")
+def baked(addon, tmp_path_factory):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    runner(scene)
+    without = jobs.run(bake_job.bake(scene, write=False)).report
+    scene.softground.debris = True
+    result = jobs.run(bake_job.bake(scene))
+    path = tmp_path_factory.mktemp("debris") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path, result.report, without["totals"]
+
+
+@pytest.fixture
+def scene(baked):
+    bpy.ops.wm.open_mainfile(filepath=str(baked[0]))
+    return bpy.context.scene
+
+
+def set_input(modifier, name, value):
+    compat.write_input(modifier, debris_object.socket_of(modifier.node_group, name), value)
+
+
+def get_input(modifier, name):
+    return compat.read_input(modifier, debris_object.socket_of(modifier.node_group, name))
+
+
+def values(obj, name, field="value", size=1):
+    out = np.empty(len(obj.data.vertices) * size, np.float32)
+    obj.data.attributes[name].data.foreach_get(field, out)
+    return out.reshape(-1, size) if size > 1 else out
+
+
+def shown(obj):
+    """Places of all instances, by place."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    ours = (one for one in graph.object_instances if one.is_instance and one.parent and one.parent.original == obj)
+    places = [tuple(one.matrix_world.translation) for one in ours]  # each lives for its turn only
+    return np.array(sorted(places)).reshape(-1, 3)
+
+
+def wanted(obj, frame, wind=(0.0, 0.0, 0.0)):
+    """The same by the closed form of the core."""
+    start = np.empty(3 * len(obj.data.vertices), np.float32)
+    obj.data.vertices.foreach_get("co", start)
+    since = (frame - values(obj, "softground_birth")) / 24.0
+    born = since >= 0
+    drag, time = values(obj, "softground_drag")[born], np.minimum(since, values(obj, "softground_flight"))[born]
+    launch = values(obj, "softground_launch", "vector", 3)[born]
+    place = flight.position(start.reshape(-1, 3)[born].astype(float), launch, drag, time, 9.81)
+    place += np.outer(time + drag * np.expm1(-time / drag), wind)
+    return np.array(sorted(map(tuple, place.tolist()))).reshape(-1, 3)
+
+
+def test_debris_flies_as_the_closed_form_says_in_any_order_of_frames(scene):
+    (obj,) = [one for one in scene.objects if one.name.startswith("SoftGround Debris")]
+    counts = []
+    for frame in (24, 3, 12, 24, 9):
+        scene.frame_set(frame)
+        places = shown(obj)
+        expected = wanted(obj, frame)
+        counts.append(len(places))
+        assert len(places) == len(expected)
+        if len(places):
+            assert np.abs(np.sort(places, axis=0) - np.sort(expected, axis=0)).max() < 1e-4
+    assert counts[0] == counts[3] == len(obj.data.vertices) or counts[0] == counts[3] > counts[4]
+    assert counts[1] < counts[0]
+
+
+def test_wind_and_amount_act_at_once(scene):
+    obj = debris_object.of(scene.softground.ground)
+    modifier = obj.modifiers[0]
+    set_input(modifier, "Wind", (2.0, 0.0, 0.0))
+    obj.update_tag()
+    scene.frame_set(20)
+    assert np.abs(np.sort(shown(obj), axis=0) - np.sort(wanted(obj, 20, (2, 0, 0)), axis=0)).max() < 1e-4
+    set_input(modifier, "Amount", 0.25)
+    obj.update_tag()
+    bpy.context.view_layer.update()
+    assert 0.15 < len(shown(obj)) / len(wanted(obj, 20)) < 0.35
+
+
+def test_the_report_says_how_much_was_thrown_and_the_rims_lack_it(baked, scene):
+    totals = baked[1]["totals"]
+    thrown = totals["thrown_m3"]
+    assert thrown > 1e-5
+    radius = values(debris_object.of(scene.softground.ground), "radius").astype(float)
+    assert (4 / 3 * np.pi * radius**3).sum() == pytest.approx(thrown, rel=1e-4)
+    without = baked[2]
+    assert without["thrown_m3"] == 0
+    assert without["rim_m3"] == pytest.approx(totals["rim_m3"] + thrown, rel=1e-6)
+    assert sum(row["thrown_kg"] for row in baked[1]["events"]) == pytest.approx(thrown * 1500, rel=1e-3)
+
+
+def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.material.surface, scene.softground.cell_size = "wet_sand", 0.03
+    bpy.ops.softground.create_ground()
+    before = {name: len(getattr(bpy.data, name)) for name in ("objects", "meshes", "node_groups", "collections")}
+    ground = fingerprints.of_mesh(scene.softground.ground.data)
+    scene.softground.debris = True
+    for _ in range(2):  # the second takes the place of the first
+        assert bpy.ops.softground.bake() == {"FINISHED"}
+        assert sum(one.name.startswith("SoftGround Debris") for one in scene.objects) == 1
+    bpy.ops.softground.clear_bake()
+    assert {name: len(getattr(bpy.data, name)) for name in before} == before
+    assert fingerprints.of_mesh(scene.softground.ground.data) == ground
+
+
+def test_off_costs_nothing_and_takes_the_older_away(scene):
+    scene.softground.debris = False
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    assert debris_object.of(scene.softground.ground) is None
+    assert not [one for one in bpy.data.node_groups if one.name.startswith("SoftGround Debris")]
+    assert not [one for one in bpy.data.collections if one.name.startswith("SoftGround")]
+
+
+def test_an_artists_own_shapes_and_wind_stay_with_the_next_bake(scene):
+    own = bpy.data.collections.new("Leaves")
+    own.objects.link(bpy.data.objects.new("Leaf", bpy.data.meshes.new("Leaf")))
+    obj = debris_object.of(scene.softground.ground)
+    modifier = obj.modifiers[0]
+    set_input(modifier, "Shapes", own)
+    set_input(modifier, "Wind", (1.0, 2.0, 0.0))
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    modifier = debris_object.of(scene.softground.ground).modifiers[0]
+    assert get_input(modifier, "Shapes") == own
+    assert list(get_input(modifier, "Wind")) == [1.0, 2.0, 0.0]
+    bpy.ops.softground.clear_bake()
+    assert own.name in bpy.data.collections
+
+
+COUNT = """
+import bpy, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[-1], use_scripts=False)
+bpy.context.scene.frame_set(20)
+graph = bpy.context.evaluated_depsgraph_get()
+print("shown", sum(one.is_instance for one in graph.object_instances))
+"""
+
+
+def test_it_plays_without_the_add_on_and_without_scripts(baked, scene):
+    scene.frame_set(20)
+    ran = subprocess.run([sys.executable, "-c", COUNT, str(baked[0])], capture_output=True, text=True, check=True)
+    assert f"shown {len(shown(debris_object.of(scene.softground.ground)))}" in ran.stdout
