@@ -225,7 +225,7 @@ def relief_of_print(
     tread: str | None = None,
     tread_strength: float = 1.0,
 ) -> PrintRelief | None:
-    """The relief of a footprint; None where it pressed nothing. See `PrintRelief`."""
+    """The relief of a footprint; None where it pressed next to nothing. See `PrintRelief`."""
     shape = shape_of(footprint, blur_sigma)
     if shape is None or not shape.depth > 0:
         return None

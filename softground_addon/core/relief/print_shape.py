@@ -28,6 +28,8 @@ TOUCHED = 0.05
 """Compression, in parts of nearly the deepest, from which a cell belongs to the print: walls slide further."""
 NEARLY = 90
 """Percentile of the compressed cells' depths that counts as the deepest."""
+NARROW = 1.0
+"""Half the width of a print from which it has a shape [cells]."""
 SHARP = 0.02
 """Half the width of a print from which lengths of the ground's grain are whole; in smaller ones they are less [m]."""
 
@@ -91,7 +93,7 @@ class PrintShape:
 
 
 def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
-    """The shape of a footprint as it is displayed with some blur [m]; None where it pressed nothing."""
+    """The shape of a footprint as it is displayed with some blur [m]; None where it pressed next to nothing."""
     size = footprint.cell_size
     kernel = gaussian_kernel(blur_sigma / size)
     margin = len(kernel) // 2 + 2
@@ -102,43 +104,50 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
         return None
     inside = compression > TOUCHED * np.percentile(pressed, NEARLY)
     far = min(int(np.ceil(REACH / size)), MOST_CELLS)
-    to_print, _ = nearest(inside, far)
-    to_ground, _ = nearest(~inside, far)
-    outline = _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0)) * size
+    outline = _outline(inside, far) * size
+    if outline.max() < NARROW * size:
+        return None
     fineness = float(min(1.0, outline.max() / SHARP))
     core = outline > CORE * fineness
     core = core if core.any() else inside
     even = gaussian_kernel(min(EVEN * fineness / size, float(far)))
     floor = _blurred(compression.ravel()[nearest(core, far)[1]].reshape(inside.shape), even)
-    displayed, risen = (_blurred(values, kernel) for values in (compression, rim))
-    outside = _blurred((~inside).astype(np.float64), kernel)
-    continued = np.where(outside > 0.2, risen / np.maximum(outside, 0.2), risen)
-    moved = (displayed > MOVED) | (risen > MOVED)
-    to_end, _ = nearest(~moved, far)
-    uphill = np.gradient(_blurred(outline, gaussian_kernel(1.5)), size)
-    x, y = np.meshgrid(*window.centres(size))
+    inward = np.gradient(_blurred(outline, gaussian_kernel(1.5)), size)[::-1]
     heading = np.array([np.cos(footprint.heading), np.sin(footprint.heading)])
-    along = (x[inside] - footprint.position[0]) * heading[0] + (y[inside] - footprint.position[1]) * heading[1]
     return PrintShape(
         window,
         size,
-        np.stack(
-            [
-                outline,
-                floor,
-                displayed,
-                risen,
-                continued,
-                np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0),
-                *uphill[::-1],
-            ]
-        ),
+        np.stack([outline, floor, *_displayed(compression, rim, inside, kernel, size, far), *inward]),
         float(compression[core].mean()),
         fineness,
         footprint.position[:2],
         heading,
-        (float(along.min()), float(along.max())),
+        _ends(window, size, inside, footprint.position[:2], heading),
     )
+
+
+def _outline(inside: Mask, far: int) -> Array:
+    """Distance of cells to the outline of a print, positive inside, up to `far` [cells]."""
+    to_print, to_ground = nearest(inside, far)[0], nearest(~inside, far)[0]
+    return _blurred(np.where(inside, to_ground - 0.5, 0.5 - to_print), gaussian_kernel(1.0))
+
+
+def _displayed(
+    compression: Array, rim: Array, inside: Mask, kernel: Array, size: float, far: int
+) -> tuple[Array, Array, Array, Array]:
+    """The third to the sixth of `PrintShape.fields`."""
+    displayed, risen = (_blurred(values, kernel) for values in (compression, rim))
+    outside = _blurred((~inside).astype(np.float64), kernel)
+    continued = np.where(outside > 0.2, risen / np.maximum(outside, 0.2), risen)
+    to_end, _ = nearest((displayed <= MOVED) & (risen <= MOVED), far)
+    return displayed, risen, continued, np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0)
+
+
+def _ends(window: Window, size: float, inside: Mask, position: Array, heading: Array) -> tuple[float, float]:
+    """See `PrintShape.along`."""
+    x, y = np.meshgrid(*window.centres(size))
+    along = (x[inside] - position[0]) * heading[0] + (y[inside] - position[1]) * heading[1]
+    return float(along.min()), float(along.max())
 
 
 def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:

@@ -6,7 +6,7 @@ from scipy.ndimage import distance_transform_edt
 
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.relief.print_shape import nearest, shape_of
-from tests.core.walkers import pressed, walk
+from tests.core.walkers import pressed, sphere_sole, standing, walk
 
 SNOW = GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005)
 
@@ -34,3 +34,13 @@ def test_the_floor_is_as_deep_as_the_record_says_and_goes_on_beyond_the_outline(
     assert floor[outline > 0.012].mean() == pytest.approx(shape.depth, rel=0.05)
     assert floor[np.abs(outline) < 0.02].min() > 0.5 * shape.depth
     assert shape.depth < step.max_depth_m
+
+
+@pytest.mark.parametrize(("radius", "has_shape"), [(0.3, True), (0.05, True), (0.004, False)])
+def test_balls_have_a_shape_down_to_a_few_cells(radius, has_shape):
+    step = pressed(standing(sphere_sole(radius), [(0.0, 0.0, 0.0)], 400.0 * radius), SNOW, 0.005)[1][0]
+    shape = shape_of(step, SNOW.blur_sigma)
+    assert (shape is not None) == has_shape
+    if shape:
+        assert np.isfinite(shape.fields).all()
+        assert 0 < shape.fineness <= 1
