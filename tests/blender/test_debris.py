@@ -13,8 +13,9 @@ from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
 from softground_addon.blender import compat, jobs
 from softground_addon.blender.after import debris_object
-from softground_addon.blender.baking import bake_job
+from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.core.after import flight
+from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
 
 
@@ -114,6 +115,20 @@ def test_wind_and_amount_act_at_once(scene):
     obj.update_tag()
     bpy.context.view_layer.update()
     assert 0.15 < len(shown(obj)) / len(wanted(obj, 20)) < 0.35
+
+
+def test_what_a_muted_step_threw_is_not_seen_until_it_is_back(scene):
+    ground = scene.softground.ground
+    scene.frame_set(24)
+    bake = step_edits.editable(scene)
+    numbers = values(debris_object.of(ground), "step")
+    number = int(numbers[0])
+    everything = len(shown(debris_object.of(ground)))
+    step_edits.edit(scene, bake, {step_id(bake.left.footprints[number]): StepEdit(mute=True)})
+    born = values(debris_object.of(ground), "softground_birth") <= 24
+    assert len(shown(debris_object.of(ground))) == (born & (numbers != number)).sum() < everything
+    step_edits.edit(scene, bake, {})
+    assert len(shown(debris_object.of(ground))) == everything
 
 
 def test_the_report_says_how_much_was_thrown_and_the_rims_lack_it(baked, scene):

@@ -16,6 +16,8 @@ MARK = "softground_debris"
 
 BIRTH, FLIGHT, DRAG = "softground_birth", "softground_flight", "softground_drag"
 """Of a point: frame of its birth, time in the air [s], settling speed over gravity [s]."""
+LEFT_OUT = "softground_left_out"
+"""Whether its step was changed, so that it is not seen."""
 LAUNCH = "softground_launch"
 """Its first speed [Blender units/s]."""
 RADIUS, VELOCITY, AGE, KIND, STEP = "radius", "velocity", "age", "kind", "step"
@@ -44,6 +46,7 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
     since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
     unborn = graph.compare(since, 0.0)
     geometry = graph.without(geometry, unborn)
+    geometry = graph.without(geometry, graph.attribute(LEFT_OUT, "BOOLEAN"))
     geometry = graph.without(geometry, graph.compare(amount, graph.random(0.0, 1.0, 1)))
 
     flight, drag = graph.attribute(FLIGHT), graph.attribute(DRAG)

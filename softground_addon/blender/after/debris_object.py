@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import bpy
@@ -79,6 +80,19 @@ def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
         if group is not None and group.get(nodes.MARK):
             return compat.input_field(modifier, socket_of(group, name))
     return None
+
+
+def leave_out(ground: bpy.types.Object, steps: Collection[int]) -> None:
+    """Show a ground's debris but for that of some steps, by their numbers."""
+    obj = of(ground)
+    if obj is None:
+        return
+    points: Any = obj.data
+    step = np.empty(len(points.vertices), np.int32)
+    points.attributes[nodes.STEP].data.foreach_get("value", step)
+    left_out: Any = points.attributes.get(nodes.LEFT_OUT) or points.attributes.new(nodes.LEFT_OUT, "BOOLEAN", "POINT")
+    left_out.data.foreach_set("value", np.isin(step, list(steps)))
+    points.update()
 
 
 def remove(ground: bpy.types.Object) -> None:

@@ -37,10 +37,15 @@ def thrown(
         compression, rim = ground.sample(x, y)
         return np.asarray(terrain.heights(x, y) + rim - compression)
 
-    changed = {*edits_by_number(left.footprints, left.edits), *left.pressed_again}
+    changed = changed_steps(left)
     debris = core.throw(loads, left.footprints, surface=wanted.surface, height=height, without=changed)
     pairs = zip(left.footprints, debris.volume.tolist(), strict=True)
     return replace(left, footprints=[core.booked(one, volume) for one, volume in pairs]), debris
+
+
+def changed_steps(left: BakeRecord) -> set[int]:
+    """Numbers of the steps that the artist has changed."""
+    return {*edits_by_number(left.footprints, left.edits), *left.pressed_again}
 
 
 def put(ground: bpy.types.Object, debris: Debris | None, wanted: BakeSettings) -> None:

@@ -16,10 +16,11 @@ from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, edits_by_number
 from ...core.settings import BakeSettings
 from .. import jobs, settings
+from ..after import debris_object
 from ..ground import baked_ground, ground_mesh, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
-from . import bake_job, bake_report
+from . import bake_job, bake_report, debris_job
 
 AROUND = 2.0
 """How far around the prints the ground is looked at, for those that are moved [m]."""
@@ -88,6 +89,7 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
     lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]
     sole_length = min(lengths, default=FALLBACK_SOLE)
     written = jobs.run(bake_job.write_prints(scene, bake.made_with, bake.shot, left, sole_length))
+    debris_object.leave_out(ground, debris_job.changed_steps(left))
     renewed = summary | bake_report.summary_of_prints(left.edited)
     ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
     ground_mesh.note_warnings(written.display_mesh, warnings)
