@@ -20,6 +20,7 @@ class _Shown:
     is_baking: bool = False
     progress: float = 0.0
     status: str = ""
+    is_previewing: bool = False
 
 
 _shown = _Shown()
@@ -87,6 +88,16 @@ def show_no_bake() -> None:
     """Let the panel show that no bake runs."""
     _shown.is_baking, _shown.progress, _shown.status = False, 0.0, ""
     redraw()
+
+
+def show_preview(is_shown: bool) -> None:
+    """Note whether the ground shows for a moment what it does not hold."""
+    _shown.is_previewing = is_shown
+
+
+def is_previewing() -> bool:
+    """Whether the ground shows for a moment what it does not hold, as while a step is dragged."""
+    return _shown.is_previewing
 
 
 def is_rendering() -> bool:

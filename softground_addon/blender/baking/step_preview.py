@@ -12,7 +12,7 @@ from ...core.ground.heightfield import Window
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
-from .. import settings
+from .. import session, settings
 from ..ground import baked_ground, display_key, ground_mesh, playback
 from .publish import at_the_end
 from .step_edits import EditableBake
@@ -42,6 +42,7 @@ class StepPreview:
         self._changed: list[Window] = []
         self._hidden = [modifier.name for modifier in shown.modifiers if modifier == playback.modifier_of(shown)]
         self._show_playback(False)
+        session.show_preview(True)
 
     def show(self, edits: Mapping[str, StepEdit]) -> None:
         """Show the ground with these edits."""
@@ -58,6 +59,7 @@ class StepPreview:
 
     def end(self) -> None:
         """Show the bake as it was."""
+        session.show_preview(False)
         self._write(self._before)
         self._show_playback(True)
 

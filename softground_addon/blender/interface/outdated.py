@@ -10,7 +10,7 @@ from ..baking import bake_report
 from .prediction import SOON
 
 WAIT = 0.3
-"""Time until it is looked at again where a bake is running, or live mode is on [s]."""
+"""Time until it is looked at again where a bake is running, live mode is on, or a step is dragged [s]."""
 
 _compared: dict[int, BakeSettings] = {}
 """The settings that each scene's bake was compared with last, by session uid."""
@@ -24,13 +24,14 @@ def watch(scene: bpy.types.Scene) -> None:
 
 def compare_bake() -> float | None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
-    if session.current().is_baking or session.current().is_live:
+    state = session.current()
+    if state.is_baking or state.is_live or session.is_previewing():
         return WAIT
     windows = bpy.context.window_manager.windows
     if windows:
         scene = windows[0].scene
         _compared[scene.session_uid] = settings.snapshot(scene)
-        state, reasons = session.current(), "\n".join(bake_report.stale_reasons(scene))
+        reasons = "\n".join(bake_report.stale_reasons(scene))
         if state.stale != reasons:
             state.stale = reasons
             session.redraw()
