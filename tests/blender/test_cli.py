@@ -241,7 +241,7 @@ def test_progress_comes_in_the_asked_style(shot, capfd, style):
             ["--frames=-1048574-1048574", "--dry-run"],
             "2,097,149 frames from -1048574 to 1048574",
         ),
-        (["--save=a\udcff.blend"], "no UTF-8 text"),
+        (["--save=a\udcff.blend"], "not UTF-8 text"),
         (["--cell-size=0.0001", "--dry-run"], "GB of memory and"),
     ],
 )

@@ -99,11 +99,11 @@ def test_an_edit_without_a_step_is_kept_and_named(shot):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "are no JSON"),
+        ("{", "are not valid JSON"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"depth": 1}}}', "unknown field 'depth'"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"strength": NaN}}}', "'strength' is nan"),
         ('{"schema_version": 9, "steps": {}}', "version 9"),
-        ("[" * 100_000, "are no JSON"),
+        ("[" * 100_000, "are not valid JSON"),
     ],
 )
 def test_a_bad_file_of_edits_gets_one_clear_line(shot, capsys, text, said):

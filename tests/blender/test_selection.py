@@ -55,7 +55,7 @@ def test_the_first_cube_of_an_empty_scene_is_added_with_what_it_lacks(scene, cub
 def test_a_camera_without_any_rig_and_several_rigs_unselected_are_told_what_to_do(scene):
     camera = new_object("Camera", bpy.data.cameras.new("Camera"))
     select(camera)
-    with pytest.raises(RuntimeError, match="'Camera' is no armature but of type Camera: select the character"):
+    with pytest.raises(RuntimeError, match="'Camera' is not an armature but of type Camera: select the character"):
         bpy.ops.softground.add_character()
     shots.walker(scene)
     shots.walker(scene)

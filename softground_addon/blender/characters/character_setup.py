@@ -161,7 +161,7 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
 def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     if thing.type != "MESH":
         raise InputError(
-            f"'{thing.name}' is no mesh but of type {thing.type.title()}: select an animated armature, or mesh objects "
+            f"'{thing.name}' is not a mesh but of type {thing.type.title()}: select an animated armature, or mesh objects "
             "that fall or roll."
         )
     if thing == scene.softground.ground:

@@ -78,7 +78,7 @@ def _exit_code(arguments: Sequence[str], *, standalone: bool) -> int:
     try:
         for argument in arguments:
             if not _is_text(argument):
-                raise InputError(f"{argument!r} is no UTF-8 text: rename the file, or give another name.")
+                raise InputError(f"{argument!r} is not UTF-8 text: rename the file, or give another name.")
         options = cli_arguments.parse(arguments, standalone=standalone)
         if options.command == "batch":
             return _batch_code(command.bake_batch(options, program.made_by(), program.worker_command))
@@ -262,7 +262,7 @@ def _edits(path: Path) -> dict[str, StepEdit]:
     except OSError as error:
         raise InputError(f"The edits '{path}' cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"The edits '{path}' are no JSON: {error}.") from None
+        raise InputError(f"The edits '{path}' are not valid JSON: {error}.") from None
     return from_json(content, f"The edits '{path}'")
 
 

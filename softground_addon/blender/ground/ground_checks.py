@@ -12,7 +12,7 @@ def check_writable(ground: bpy.types.Object) -> None:
     """Raise InputError, naming the object and the remedy, if this ground cannot be changed at the moment."""
     name = ground.name
     if ground.type != "MESH":
-        raise InputError(f"Ground '{name}' is no mesh: choose a mesh object, or press Create Ground.")
+        raise InputError(f"Ground '{name}' is not a mesh: choose a mesh object, or press Create Ground.")
     if ground.library or ground_mesh.mesh_of(ground).library or ground.override_library:
         raise InputError(
             f"Ground '{name}' is linked from another file and cannot be changed here: make it local "

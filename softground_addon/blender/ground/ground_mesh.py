@@ -145,7 +145,7 @@ def rest_vertices(ground: bpy.types.Object, unit_scale: float) -> Array:
     """
     vertices = _transform(to_world_of(ground, unit_scale), rest_positions(mesh_of(ground)))
     if not np.isfinite(vertices).all():
-        raise InputError(f"Ground '{ground.name}' has vertices whose position is no number: delete them first.")
+        raise InputError(f"Ground '{ground.name}' has vertices without a valid position (NaN): delete them first.")
     return vertices
 
 

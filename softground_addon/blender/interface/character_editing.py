@@ -167,14 +167,14 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
         if posed is not None:
             character = next((one for one in scene.softground.characters if one.armature == posed), None)
             if character is None:
-                raise InputError(f"'{posed.name}' is no character yet: press Add Character first.")
+                raise InputError(f"'{posed.name}' is not a character yet: press Add Character first.")
             bones = [bone.name for bone in context.selected_pose_bones_from_active_object or ()]
             added = character_setup.add_bone_contacts(character, bones)
         elif context.mode == "EDIT_MESH" and context.object is not None:
             rig = context.object.find_armature()
             character = next((one for one in scene.softground.characters if rig and one.armature == rig), None)
             if character is None:
-                raise InputError(f"'{context.object.name}' is the skin of no character: press Add Character first.")
+                raise InputError(f"'{context.object.name}' is not the skin of a character: press Add Character first.")
             added = character_setup.add_vertex_contacts(character, context.object)
         else:
             characters = scene.softground.characters

@@ -214,7 +214,7 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is a ground."""
-        cls.poll_message_set("Choose a ground, or bake one, first")
+        cls.poll_message_set("Choose a ground first, or bake one")
         return settings.exists(settings.scene_of(context).softground.ground)
 
     @reports_errors

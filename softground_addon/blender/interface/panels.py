@@ -80,7 +80,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         character = active_character(settings.scene_of(context))
         if character:
             if not is_set_up(character):
-                layout.label(text="Was deleted: undo that, or take it out with -", icon="ERROR")
+                layout.label(text="Its rig was deleted: undo that, or remove it with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             _scale(layout, character)

@@ -19,7 +19,7 @@ _SHOWN = 5
 
 
 class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
-    """Set how bodies swing to values that are known"""
+    """Choose a known set of values for how bodies swing"""
 
     bl_idname = "softground.tilt_preset"
     bl_label = "Tilt Preset"
@@ -78,7 +78,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a bake has told the speed."""
-        cls.poll_message_set("Bake with Grounding first: it tells the speed")
+        cls.poll_message_set("Bake with Grounding on first: the bake suggests a speed")
         character = active_character(settings.scene_of(context))
         return bool(character and character.armature and nla_layer.has_layer(character.armature))
 

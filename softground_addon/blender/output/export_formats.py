@@ -160,12 +160,14 @@ def export(scene: bpy.types.Scene, options: Options) -> list[Path]:
     """
     ground = _ground(scene, outdated=options.outdated)
     if options.end < options.start:
-        raise InputError(f"The frames {options.start} to {options.end} are none: give the first one first.")
+        raise InputError(
+            f"The frames {options.start} to {options.end} leave nothing to write: set the first frame before the last."
+        )
     path = options.path
     if not path.parent.is_dir():
         raise InputError(f"There is no folder '{path.parent}': create it first, or choose another.")
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"Nothing may be written to the folder '{path.parent}': choose another.")
+        raise InputError(f"The folder '{path.parent}' cannot be written to: choose another.")
     is_open = scene == bpy.context.scene  # the one that Blender's exporters write
     there = nullcontext() if is_open else bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
     with there:
