@@ -161,8 +161,8 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
 def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     if thing.type != "MESH":
         raise InputError(
-            f"'{thing.name}' is not a mesh but of type {thing.type.title()}: select an animated armature, or mesh objects "
-            "that fall or roll."
+            f"'{thing.name}' is not a mesh but of type {thing.type.title()}: select an animated armature, or mesh "
+            "objects that fall or roll."
         )
     if thing == scene.softground.ground:
         raise InputError(f"'{thing.name}' is the ground: select what moves on it.")

@@ -158,7 +158,8 @@ def require_armature(armature: bpy.types.Object | None) -> None:
         )
     if armature.type != "ARMATURE":
         raise InputError(
-            f"'{armature.name}' is not an armature but of type {armature.type.title()}: select the character's armature."
+            f"'{armature.name}' is not an armature but of type {armature.type.title()}: select the character's "
+            "armature."
         )
     if not armature.data.bones:
         raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")

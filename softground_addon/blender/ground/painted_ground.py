@@ -36,8 +36,8 @@ def _name(ground: bpy.types.Object, name: str, setting: str) -> str:
     attribute = ground.data.attributes.get(name) if name else None
     if attribute and (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
         raise InputError(
-            f"Attribute '{name}' of ground '{ground.name}' is not a float attribute on vertices: convert it in Object Data "
-            "Properties > Attributes (domain Vertex, type Float)."
+            f"Attribute '{name}' of ground '{ground.name}' is not a float attribute on vertices: convert it in Object "
+            "Data Properties > Attributes (domain Vertex, type Float)."
         )
     if is_there(ground, name):
         return name
