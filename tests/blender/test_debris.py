@@ -150,7 +150,9 @@ def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
     bpy.ops.softground.add_character()
     scene.softground.material.surface, scene.softground.cell_size = "wet_sand", 0.03
     bpy.ops.softground.create_ground()
-    before = {name: len(getattr(bpy.data, name)) for name in ("objects", "meshes", "node_groups", "collections")}
+    before = {
+        name: len(getattr(bpy.data, name)) for name in ("objects", "meshes", "node_groups", "collections", "materials")
+    }
     ground = fingerprints.of_mesh(scene.softground.ground.data)
     scene.softground.debris = True
     for _ in range(2):  # the second takes the place of the first

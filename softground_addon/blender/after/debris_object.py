@@ -58,8 +58,7 @@ def put(
         collection.objects.link(obj)
     obj.parent = ground
     obj.matrix_parent_inverse = ground.matrix_world.inverted()
-    material = ground.active_material
-    shapes = debris_shapes.collection_of(surface, material)
+    shapes = debris_shapes.collection_of(surface)
     group = nodes.build(frame_rate=frame_rate * time_stretch, gravity=gravity, unit_scale=unit_scale, shapes=shapes)
     modifier: Any = obj.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group

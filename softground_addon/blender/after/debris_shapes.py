@@ -17,18 +17,26 @@ ROUGHNESS = {"snow": 0.35, "sand": 0.25, "wet_sand": 0.3, "mud": 0.15, "soil": 0
 STRETCH = {"snow": (1.0, 1.0, 0.6), "mud": (0.8, 0.8, 1.5)}
 """Broken crust is flat, drops of mud are long."""
 
-UNTOUCHED = ("softground_age", -1.0)
-"""As the ground's material knows what no foot has touched: it shows trodden ground darker."""
+COLOURS = {
+    "snow": (0.87, 0.90, 0.94, 1.0),
+    "sand": (0.66, 0.48, 0.29, 1.0),
+    "wet_sand": (0.24, 0.16, 0.09, 1.0),
+    "mud": (0.10, 0.065, 0.04, 1.0),
+    "soil": (0.16, 0.10, 0.06, 1.0),
+}
+"""Of pieces: the grain and the waves of a ground's look are too coarse for them."""
+GLOSSY = ("wet_sand", "mud")
+"""Surfaces whose pieces shine."""
 
 
-def collection_of(surface: str, material: bpy.types.Material | None) -> bpy.types.Collection:
+def collection_of(surface: str) -> bpy.types.Collection:
     """A new collection of a surface's shapes, in no scene."""
+    material = _material(surface)
     shapes = bpy.data.collections.new(f"SoftGround {surface.replace('_', ' ').title()} Pieces")
     shapes[MARK] = True
     for number in range(COUNT):
         mesh = _shape(f"{shapes.name} {number + 1}", surface, number)
-        if material is not None:
-            mesh.materials.append(material)
+        mesh.materials.append(material)
         shapes.objects.link(bpy.data.objects.new(mesh.name, mesh))
     return shapes
 
@@ -37,10 +45,25 @@ def remove(shapes: bpy.types.Collection) -> None:
     """Take a collection from `collection_of` away with what is in it."""
     for obj in list(shapes.objects):
         mesh: Any = obj.data
+        material: Any = obj.active_material
         bpy.data.objects.remove(obj)
         if mesh is not None and not mesh.users:
             bpy.data.meshes.remove(mesh)
+        if material is not None and material.get(MARK) and not material.users:
+            bpy.data.materials.remove(material)
     bpy.data.collections.remove(shapes)
+
+
+def _material(surface: str) -> bpy.types.Material:
+    """A plain material in the colour of a surface."""
+    material: Any = bpy.data.materials.new(f"SoftGround {surface.replace('_', ' ').title()} Pieces")
+    material[MARK] = True
+    if material.node_tree is None:  # before 5.0
+        material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = material.diffuse_color = COLOURS[surface]
+    shader.inputs["Roughness"].default_value = 0.3 if surface in GLOSSY else 0.9
+    return material
 
 
 def _shape(name: str, surface: str, number: int) -> bpy.types.Mesh:
@@ -55,6 +78,5 @@ def _shape(name: str, surface: str, number: int) -> bpy.types.Mesh:
         vertex.co = [vertex.co[axis] * size * stretch[axis] for axis in range(3)]
     lump.to_mesh(mesh)
     lump.free()
-    age: Any = mesh.attributes.new(UNTOUCHED[0], "FLOAT", "POINT")
-    age.data.foreach_set("value", np.full(len(mesh.vertices), UNTOUCHED[1], np.float32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
     return mesh
