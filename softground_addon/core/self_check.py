@@ -14,7 +14,7 @@ from .ground.heightfield import Terrain
 from .loads.estimate import CharacterLoads
 from .loads.missed_steps import advice, missed_steps
 from .loads.sliding import treadmill_speed
-from .motion.motion import CharacterMotion, LowSkin
+from .motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin
 from .numerics.slices import Slices, sliced
 from .pressing.sole_points import places, sole_points
 from .record.footprints import Footprint
@@ -45,8 +45,6 @@ PERSON_MASS, PERSON_LEG = 77.5, 0.87
 LEG_OF_STATURE = 0.491
 MASS_RANGE = 4.0
 """Ratio of mass to that of the body's skin, or of a person of the same leg length, beyond which it is asked about."""
-TALLEST, SMALLEST = 20.0, 0.05
-"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
 APART = 0.02
 """Difference of the offsets of one character's feet that is no error of a pose, up to an adult's size [m]; of a larger
 one, it grows with the legs."""

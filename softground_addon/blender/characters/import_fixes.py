@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.self_check import SMALLEST, TALLEST
+from ...core.motion.motion import SMALLEST, TALLEST
 from ..compat import action_curves
 from ..settings import frame_rate_of, time_stretch_of
 from .frame_ranges import ancestors

@@ -30,6 +30,9 @@ STILL = 1e-6
 ADULT_LEG = 0.9
 """Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
 
+TALLEST, SMALLEST = 20.0, 0.05
+"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
+
 _LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
 
 JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
@@ -248,6 +251,11 @@ class CharacterMotion:
     def time_step(self) -> float:
         """Time between samples [s]."""
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
+
+    @property
+    def is_of_other_units(self) -> bool:
+        """Whether its skin has a size at which gravity does not set the pace of legs."""
+        return self.skin is not None and not SMALLEST < self.skin.height < TALLEST
 
     @property
     def stands_still(self) -> bool:
