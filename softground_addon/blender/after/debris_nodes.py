@@ -44,10 +44,9 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
     geometry, wind, amount, collection = graph.inputs(shapes)
     frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
     since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
-    unborn = graph.compare(since, 0.0)
-    geometry = graph.without(geometry, unborn)
-    geometry = graph.without(geometry, graph.attribute(LEFT_OUT, "BOOLEAN"))
-    geometry = graph.without(geometry, graph.compare(amount, graph.random(0.0, 1.0, 1)))
+    unseen = graph.either(graph.compare(since, 0.0), graph.attribute(LEFT_OUT, "BOOLEAN"))
+    unseen = graph.either(unseen, graph.compare(amount, graph.random(0.0, 1.0, 1)))
+    geometry = graph.without(geometry, unseen)
 
     flight, drag = graph.attribute(FLIGHT), graph.attribute(DRAG)
     time = graph.math("MINIMUM", since, flight)
@@ -160,6 +159,13 @@ class _Graph:
         self.link(first, node.inputs["A"])
         self.link(second, node.inputs["B"])
         return node.outputs["Result"]
+
+    def either(self, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeBooleanMath")
+        node.operation = "OR"
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Boolean"]
 
     def random(self, low: Any, high: Any, seed: int, kind: str = "FLOAT") -> Any:
         node = self.node("FunctionNodeRandomValue")
