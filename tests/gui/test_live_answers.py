@@ -2,7 +2,7 @@
 
 import pytest
 
-pytestmark = [pytest.mark.gui, pytest.mark.timeout(1500)]
+pytestmark = pytest.mark.timeout(1500)
 
 LONGEST_WAIT = 1.5
 """From letting go of a slider at frame 150 until all prints are as the settings say [s]."""
@@ -15,28 +15,37 @@ def facts(tell):
     return tell("live_answers")
 
 
+@pytest.mark.gui
 def test_the_newest_steps_follow_while_the_slider_is_dragged(facts):
     assert facts["depth"][1] > 1.3 * facts["depth"][0]
     newest = [seen[0] for seen in facts["while dragged"]]
-    assert len(set(newest)) > 4
+    assert len(set(newest)) > 2
     assert min(newest) < 1.2 * facts["before"][0]
 
 
+@pytest.mark.benchmark
 def test_all_prints_are_there_soon_after(facts):
     assert facts["seconds after letting go"] < LONGEST_WAIT
+
+
+@pytest.mark.gui
+def test_all_prints_are_there_after_it(facts):
     assert facts["after"][1] < 1.2 * facts["before"][1]
 
 
+@pytest.mark.benchmark
 def test_nobody_waits_for_it(facts):
     assert facts["number of parts"] > 10
     assert facts["parts"][0] < LONGEST_PART
 
 
+@pytest.mark.gui
 def test_what_is_kept_is_what_a_bake_gives_with_these_settings(facts):
     assert facts["kept"]
     assert facts["outdated"] == ""
     assert facts["baked again: differs by"] < 1e-6
 
 
+@pytest.mark.gui
 def test_nothing_goes_wrong_on_the_console(facts):
     assert "softground_addon" not in facts["printed"]  # as in the lines of a traceback
