@@ -76,6 +76,21 @@ def node_inputs(modifier: Any) -> list[tuple[str, Any]]:
     return [(name, modifier[name]) for name in names if name in modifier.keys()]  # noqa: SIM118  (no mapping)
 
 
+def set_node_input(modifier: Any, identifier: str, value: float) -> None:
+    """Set an input of a Geometry Nodes modifier."""
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+
+
+def node_input_property(modifier: Any, identifier: str) -> tuple[Any, str]:
+    """Where an input of a Geometry Nodes modifier is, for a panel: its owner and the path in it."""
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier), "value"
+    return modifier, f'["{identifier}"]'
+
+
 def remove_scene(scene: bpy.types.Scene) -> None:
     """Remove a scene. `bpy.data.scenes.remove` crashes Blender where it has no window: in `--background --command`."""
     bpy.data.batch_remove([scene])

@@ -28,9 +28,10 @@ from .interface import (
     step_dragging,
     step_editing,
     steps_panel,
+    weather_panel,
 )
 from .live import live
-from .output import event_points, export_formats, force_curves, make_sound
+from .output import add_weather, event_points, export_formats, force_curves, make_sound
 from .properties.material import look_followers
 from .properties.scene import depth_field
 
@@ -53,12 +54,14 @@ CLASSES = (
     *force_curves.CLASSES,
     *event_points.CLASSES,
     *make_sound.CLASSES,
+    *add_weather.CLASSES,
     *export_formats.CLASSES,
     *menus.CLASSES,
     *import_capture.CLASSES,
     *panels.CLASSES,
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
+    *weather_panel.CLASSES,
     *bake_result.CLASSES,
     *step_editing.CLASSES,
     *step_dragging.CLASSES,

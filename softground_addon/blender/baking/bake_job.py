@@ -34,7 +34,7 @@ from ...core.self_check import self_check
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
 from .. import settings
-from ..ground import baked_ground, created_ground, ground_mesh, trail_detail
+from ..ground import baked_ground, created_ground, ground_mesh, trail_detail, weather
 from ..ground.baked_ground import EVENTS
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
@@ -206,6 +206,7 @@ def write_prints(
     sole_length : float
         Of the shortest sole [m].
     """
+    weather_before = weather.values_of(settings.found(wanted.ground)) if wanted.ground else {}
     with ExitStack() as drafts:  # what is made and does not get into the scene is taken away
         # The pressed ground takes as much memory as its mesh, and is soon made again.
         pressing = PressedGround.at.slices(left.edited, **at_the_end(wanted))
@@ -225,6 +226,7 @@ def write_prints(
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
     ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
+    weather.renew(ground, weather_before)
     return Written(ground, published.display_mesh, published.error, findings)
 
 

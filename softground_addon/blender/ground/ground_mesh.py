@@ -26,7 +26,7 @@ from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
-from . import display_key, own_data, painted_ground, playback
+from . import display_key, own_data, painted_ground, playback, weather_modifier
 from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUMMARY, WARNINGS, WATER
 
 Array = NDArray[np.float64]
@@ -102,9 +102,9 @@ def mesh_of(ground: bpy.types.Object) -> bpy.types.Mesh:
 
 
 def users_modifiers(ground: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers of the ground that play no bake."""
-    own = playback.modifier_of(ground)
-    return [item for item in ground.modifiers if item != own]
+    """The modifiers of the ground that play no bake and no weather over it."""
+    own = (playback.modifier_of(ground), weather_modifier.modifier_of(ground))
+    return [item for item in ground.modifiers if item not in own]
 
 
 def is_baked(ground: bpy.types.Object) -> bool:
@@ -221,8 +221,9 @@ def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> It
             copy.modifiers.clear()
         else:
             copy.data = mesh
-            if own := playback.modifier_of(copy):
-                copy.modifiers.remove(own)
+            for own in (playback.modifier_of(copy), weather_modifier.modifier_of(copy)):
+                if own:
+                    copy.modifiers.remove(own)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
         layer.update()
@@ -358,6 +359,7 @@ def restore(ground: bpy.types.Object) -> None:
         return
     mesh = mesh_of(ground)
     rest = rest_positions(mesh)
+    weather_modifier.remove(ground)
     playback.remove(ground)
     display_key.take_off(ground, rest)
     own_data.remove(mesh, own_data.ATTRIBUTES)
@@ -370,6 +372,7 @@ def discard(ground: bpy.types.Object) -> None:
     """Remove a ground that the add-on made, with its mesh and playback, unless another object has taken those over."""
     mesh = mesh_of(ground)
     if mesh.users - mesh.use_fake_user == 1:
+        weather_modifier.remove(ground)
         playback.remove(ground)
     bpy.data.objects.remove(ground)
     if not mesh.users:

@@ -8,6 +8,7 @@ from typing import Any, cast
 import bpy
 
 from . import playback_nodes as nodes
+from .weather_nodes import OF_WEATHER
 
 REST = "softground_rest"
 COMPRESSION = "softground_compression"
@@ -27,7 +28,7 @@ OF_PLAYBACK = (
     nodes.LAST_CONTACT,
     nodes.PRESSURE,
 )
-ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, *OF_PLAYBACK)
+ATTRIBUTES = (REST, COMPRESSION, RIM, AGE, SOLE, WATER, *OF_PLAYBACK, *OF_WEATHER)
 
 RECORD = "softground_record"
 SUMMARY = "softground_summary"

@@ -16,6 +16,7 @@ import bpy
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
+from .node_graph import NodeGraph, new_group
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"
@@ -34,9 +35,6 @@ COMPRESSION, RIM, AGE, PRESSURE = "softground_compression", "softground_rim", "s
 
 CONTACT = "softground_contact"
 """Of a spline's points; see `core.playback.playback_curves.PlaybackCurves`, which says what their positions hold."""
-
-COLUMN, ROW = 180.0, 160.0
-"""Spacing of the nodes in the editor."""
 
 
 def build(
@@ -62,7 +60,7 @@ def build(
     settled : bool
         Whether the positions that the group is given are those at which vertices come to rest, whatever the user does.
     """
-    graph = _Graph(GROUP)
+    graph = _Graph()
     geometry, frame = graph.inputs(up)
     start, end = graph.attribute(START), graph.attribute(END)
     waiting = graph.compare("LESS_THAN", frame, start)
@@ -144,14 +142,11 @@ class _KeyframeTables:
         return node.outputs["Value"]
 
 
-class _Graph:
-    """A node group while it is built, laid out in rows."""
+class _Graph(NodeGraph):
+    """The playback's group, while it is built."""
 
-    def __init__(self, name: str) -> None:
-        self.tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
-        self.tree.is_modifier = True
-        self.tree[MARK] = True
-        self._place = [0.0, 0.0]
+    def __init__(self) -> None:
+        super().__init__(new_group(GROUP, MARK))
 
     def inputs(self, up: Sequence[float]) -> tuple[Any, Any]:
         """The group's geometry and the scene's frame, with its fraction."""
@@ -167,105 +162,3 @@ class _Graph:
         group = self.node("NodeGroupInput")
         self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
         return group.outputs["Geometry"], self.node("GeometryNodeInputSceneTime").outputs["Frame"]
-
-    def finish(self, geometry: Any) -> None:
-        node = self.node("NodeGroupOutput")
-        self.link(geometry, node.inputs["Geometry"])
-
-    def next_row(self) -> None:
-        self._place = [2 * COLUMN, self._place[1] - ROW]
-
-    def node(self, kind: str) -> Any:
-        node = self.tree.nodes.new(kind)
-        node.location = self._place
-        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
-        self._place[0] += COLUMN
-        return node
-
-    def link(self, source: Any, socket: Any) -> None:
-        """Connect an output, or set a number or vector."""
-        if isinstance(source, bpy.types.NodeSocket):
-            self.tree.links.new(source, socket)
-        else:
-            socket.default_value = source
-
-    def attribute(self, name: str, kind: str = "FLOAT") -> Any:
-        node = self.node("GeometryNodeInputNamedAttribute")
-        node.data_type = kind
-        node.inputs["Name"].default_value = name
-        return node.outputs["Attribute"]
-
-    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
-        """Put the selected vertices elsewhere."""
-        node = self.node("GeometryNodeSetPosition")
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        self.link(position, node.inputs["Position"])
-        self.link(offset, node.inputs["Offset"])
-        return node.outputs["Geometry"]
-
-    def store(self, geometry: Any, name: str, value: Any, selection: Any) -> Any:
-        """Give the selected vertices another number of that name."""
-        node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = "FLOAT", "POINT"
-        node.inputs["Name"].default_value = name
-        self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        self.link(value, node.inputs["Value"])
-        return node.outputs["Geometry"]
-
-    def math(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("ShaderNodeMath")
-        node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
-        return node.outputs["Value"]
-
-    def both(self, first: Any, second: Any) -> Any:
-        return self._logic("AND", first, second)
-
-    def either(self, first: Any, second: Any) -> Any:
-        return self._logic("OR", first, second)
-
-    def _logic(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("FunctionNodeBooleanMath")
-        node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
-        return node.outputs["Boolean"]
-
-    def compare(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("FunctionNodeCompare")
-        node.data_type, node.operation = "FLOAT", operation
-        self.link(first, node.inputs["A"])
-        self.link(second, node.inputs["B"])
-        return node.outputs["Result"]
-
-    def scaled(self, vector: Any, factor: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = "SCALE"
-        self.link(vector, node.inputs[0])
-        self.link(factor, node.inputs["Scale"])
-        return node.outputs["Vector"]
-
-    def separated(self, vector: Any) -> list[Any]:
-        node = self.node("ShaderNodeSeparateXYZ")
-        self.link(vector, node.inputs["Vector"])
-        return list(node.outputs)
-
-    def sample(self, splines: Any, number: Any, length: Any) -> Any:
-        """A node that looks at one of the splines, at a length along it."""
-        node = self.node("GeometryNodeSampleCurve")
-        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
-        self.link(splines, node.inputs["Curves"])
-        self.link(length, node.inputs["Length"])
-        self.link(number, node.inputs["Curve Index"])
-        return node
-
-    def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
-        node = self.node("GeometryNodeSwitch")
-        node.input_type = kind
-        self.link(switch, node.inputs["Switch"])
-        self.link(when_false, node.inputs["False"])
-        self.link(when_true, node.inputs["True"])
-        return node.outputs["Output"]

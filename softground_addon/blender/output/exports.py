@@ -124,7 +124,7 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     mesh = ground_mesh.mesh_of(display_mesh).copy()
     display_key.drop_all(mesh)
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(display_mesh))
-    own_data.remove(mesh, (own_data.REST, *own_data.OF_PLAYBACK))  # those for shading stay
+    own_data.remove(mesh, (own_data.REST, *own_data.OF_PLAYBACK, *own_data.OF_WEATHER))  # those for shading stay
     if any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
         with ground_mesh.stand_in(display_mesh, mesh) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)

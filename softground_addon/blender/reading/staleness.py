@@ -18,7 +18,7 @@ from ..characters.frame_ranges import ancestors, leaders
 from ..characters.rig_sampling import object_named
 from ..characters.skin_sampling import meshes_on
 from ..compat import SERIES
-from ..ground import ground_mesh, painted_ground, playback
+from ..ground import ground_mesh, painted_ground, playback, weather_modifier
 from ..ground.baked_ground import display_mesh_of
 from ..ground.own_data import FINGERPRINTS
 from . import input_hashes
@@ -179,9 +179,9 @@ def _of_standing(ground: bpy.types.Object) -> str:
 
 
 def _modifiers_of(ground: bpy.types.Object) -> list[str]:
-    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown."""
-    played = playback.modifier_of(ground)
-    return [item.type for item in ground.modifiers if item == played or item.show_viewport]
+    """The kinds of the ground's modifiers; the playback's counts whether or not it is shown, weather never does."""
+    played, weather = playback.modifier_of(ground), weather_modifier.modifier_of(ground)
+    return [one.type for one in ground.modifiers if one == played or (one.show_viewport and one != weather)]
 
 
 def _of_surface(ground: bpy.types.Object, painted: Sequence[str]) -> str:

@@ -63,7 +63,7 @@ HALO = 2.0
 SEALING = 5.0
 """How much less ground takes up the more it is compressed: exp(-5·compression/layer depth)."""
 
-_GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
+GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
 """Places and weights of the Gauss-Legendre rule of three points, over 0 to 1."""
 
 
@@ -132,7 +132,7 @@ def settled_density(age: Any, temperature: Any, density: Any) -> Array:
 def snow_cover(age: Any, rate: Any, temperature: Any) -> Array:
     """Depth of what has fallen over a time [s] at a rate [m/s of new snow], each layer settled by its own age [m]."""
     age, density = np.asarray(age, dtype=np.float64), new_snow_density(temperature)
-    kept = sum(weight * density / settled_density(at * age, temperature, density) for at, weight in _GAUSS)
+    kept = sum(weight * density / settled_density(at * age, temperature, density) for at, weight in GAUSS)
     return np.asarray(rate * age * kept)
 
 

@@ -153,8 +153,9 @@ def weathered(
     of_all = np.full_like(age, max(frame - first_frame, 0.0) * pace)
     fall = {"rate": weather.snowfall, "temperature": weather.temperature}
 
-    cover = w.snow_cover(age, **fall)
-    variance = w.drape_variance(cover) + w.rain_variance(age, weather.rain)
+    around = w.level_of_snow(of_all, **fall, depth=matter.snow_depth)
+    within = w.level_of_snow(age, **fall, depth=matter.snow_depth, compression=compression)
+    variance = w.drape_variance(within) + w.rain_variance(age, weather.rain)
     gone = np.zeros_like(age)
     if matter.blown:
         variance = variance + w.blown_variance(age, weather.wind, matter.blown)
@@ -164,8 +165,6 @@ def weathered(
 
     inside = places.trodden[:, 0] + (places.trodden[:, 1:] * share[:, 1:]).sum(axis=-1)
     inside = np.where(frame >= pressed, np.clip(inside, 0.0, 1.0), 0.0)
-    around = w.level_of_snow(of_all, **fall, depth=matter.snow_depth)
-    within = w.level_of_snow(age, **fall, depth=matter.snow_depth, compression=compression)
     level = (1.0 - inside) * around + inside * within
 
     water = _standing(places, softened + level, weather, matter, age)

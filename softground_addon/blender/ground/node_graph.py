@@ -1,0 +1,197 @@
+"""Geometry nodes from Python: a group while it is built, and arithmetic with what its nodes give."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+COLUMN, ROW = 180.0, 160.0
+"""Spacing of the nodes in the editor."""
+
+
+def new_group(name: str, mark: str) -> Any:
+    """A new, empty group for a modifier, with a custom property by which it is known whatever the user calls it."""
+    tree: Any = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.is_modifier = True
+    tree[mark] = True
+    return tree
+
+
+class NodeGraph:
+    """A node group while it is built, laid out in rows."""
+
+    def __init__(self, tree: Any) -> None:
+        self.tree = tree
+        self._place = [0.0, 0.0]
+
+    def finish(self, geometry: Any) -> None:
+        node = self.node("NodeGroupOutput")
+        self.link(geometry, node.inputs["Geometry"])
+
+    def next_row(self) -> None:
+        self._place = [2 * COLUMN, self._place[1] - ROW]
+
+    def node(self, kind: str) -> Any:
+        node = self.tree.nodes.new(kind)
+        node.location = self._place
+        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
+        self._place[0] += COLUMN
+        return node
+
+    def link(self, source: Any, socket: Any) -> None:
+        """Connect an output, or set a number or vector."""
+        if isinstance(source, bpy.types.NodeSocket):
+            self.tree.links.new(source, socket)
+        else:
+            socket.default_value = source
+
+    def attribute(self, name: str, kind: str = "FLOAT") -> Any:
+        node = self.node("GeometryNodeInputNamedAttribute")
+        node.data_type = kind
+        node.inputs["Name"].default_value = name
+        return node.outputs["Attribute"]
+
+    def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Put the selected vertices elsewhere."""
+        node = self.node("GeometryNodeSetPosition")
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(position, node.inputs["Position"])
+        self.link(offset, node.inputs["Offset"])
+        return node.outputs["Geometry"]
+
+    def store(self, geometry: Any, name: str, value: Any, selection: Any) -> Any:
+        """Give the selected vertices another number of that name."""
+        node = self.node("GeometryNodeStoreNamedAttribute")
+        node.data_type, node.domain = "FLOAT", "POINT"
+        node.inputs["Name"].default_value = name
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(value, node.inputs["Value"])
+        return node.outputs["Geometry"]
+
+    def math(self, operation: str, first: Any, second: Any) -> Any:
+        node = self.node("ShaderNodeMath")
+        node.operation = operation
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Value"]
+
+    def both(self, first: Any, second: Any) -> Any:
+        return self._logic("AND", first, second)
+
+    def either(self, first: Any, second: Any) -> Any:
+        return self._logic("OR", first, second)
+
+    def _logic(self, operation: str, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeBooleanMath")
+        node.operation = operation
+        self.link(first, node.inputs[0])
+        self.link(second, node.inputs[1])
+        return node.outputs["Boolean"]
+
+    def compare(self, operation: str, first: Any, second: Any) -> Any:
+        node = self.node("FunctionNodeCompare")
+        node.data_type, node.operation = "FLOAT", operation
+        self.link(first, node.inputs["A"])
+        self.link(second, node.inputs["B"])
+        return node.outputs["Result"]
+
+    def scaled(self, vector: Any, factor: Any) -> Any:
+        node = self.node("ShaderNodeVectorMath")
+        node.operation = "SCALE"
+        self.link(vector, node.inputs[0])
+        self.link(factor, node.inputs["Scale"])
+        return node.outputs["Vector"]
+
+    def separated(self, vector: Any) -> list[Any]:
+        node = self.node("ShaderNodeSeparateXYZ")
+        self.link(vector, node.inputs["Vector"])
+        return list(node.outputs)
+
+    def sample(self, splines: Any, number: Any, length: Any) -> Any:
+        """A node that looks at one of the splines, at a length along it."""
+        node = self.node("GeometryNodeSampleCurve")
+        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
+        self.link(splines, node.inputs["Curves"])
+        self.link(length, node.inputs["Length"])
+        self.link(number, node.inputs["Curve Index"])
+        return node
+
+    def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
+        node = self.node("GeometryNodeSwitch")
+        node.input_type = kind
+        self.link(switch, node.inputs["Switch"])
+        self.link(when_false, node.inputs["False"])
+        self.link(when_true, node.inputs["True"])
+        return node.outputs["Output"]
+
+    def vector(self, operation: str, *vectors: Any, output: str = "Vector") -> Any:
+        """An operation on vectors."""
+        node = self.node("ShaderNodeVectorMath")
+        node.operation = operation
+        for vector, socket in zip(vectors, node.inputs, strict=False):
+            self.link(vector, socket)
+        return node.outputs[output]
+
+    def dot(self, first: Any, second: Any) -> Any:
+        return self.vector("DOT_PRODUCT", first, second, output="Value")
+
+    def number(self, source: Any) -> Number:
+        """An output, or a number, to calculate with."""
+        return Number(self, source)
+
+
+@dataclass(frozen=True)
+class Number:
+    """An output of a group's node, with arithmetic; what is divided by nothing is nothing."""
+
+    graph: NodeGraph
+    socket: Any
+
+    def __add__(self, other: Number | float) -> Number:
+        return self._with("ADD", other)
+
+    def __sub__(self, other: Number | float) -> Number:
+        return self._with("SUBTRACT", other)
+
+    def __mul__(self, other: Number | float) -> Number:
+        return self._with("MULTIPLY", other)
+
+    def __truediv__(self, other: Number | float) -> Number:
+        return self._with("DIVIDE", other)
+
+    def __rsub__(self, other: float) -> Number:
+        return Number(self.graph, self.graph.math("SUBTRACT", other, self.socket))
+
+    def above(self, other: Number | float) -> Number:
+        """1 where it is more than another, else 0."""
+        return self._with("GREATER_THAN", other)
+
+    def at_least(self, other: Number | float) -> Number:
+        """The larger of two."""
+        return self._with("MAXIMUM", other)
+
+    def at_most(self, other: Number | float) -> Number:
+        """The smaller of two."""
+        return self._with("MINIMUM", other)
+
+    def within_one(self) -> Number:
+        """No less than 0, no more than 1."""
+        return self.at_least(0.0).at_most(1.0)
+
+    def exp(self) -> Number:
+        return self._with("EXPONENT", 0.0)
+
+    def log(self) -> Number:
+        return self._with("LOGARITHM", math.e)
+
+    def root(self) -> Number:
+        return self._with("SQRT", 0.0)
+
+    def _with(self, operation: str, other: Number | float) -> Number:
+        value = other.socket if isinstance(other, Number) else other
+        return Number(self.graph, self.graph.math(operation, self.socket, value))

@@ -1,0 +1,153 @@
+"""Weather over a bake: put on the ground that carries it, made to fit the record, set from presets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.after.weather_places import section_of, weather_places
+from ...core.after.weathered_ground import matter_of
+from ...core.errors import InputError
+from ...core.playback.keyframe_tables import NO_CONTACT
+from ...core.record.footprints import Footprint
+from .. import compat
+from . import baked_ground, ground_mesh, own_data, weather_modifier
+from . import playback_nodes as played
+from . import weather_nodes as nodes
+
+Array = NDArray[np.float64]
+
+PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "SNOWFALL": (
+        "Snowfall",
+        {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
+    ),
+    "THAW": ("Thaw", {"Temperature": 6.0, "Time Scale": 20_000.0}),
+    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 120.0}),
+    "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
+    "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),
+}
+"""Title of each preset, and its inputs where they are not as in a new group. Ten seconds show a night of snow, two days
+of thaw, twenty minutes of wind, half an hour of rain, eight hours of sun."""
+
+
+def add(ground: bpy.types.Object) -> Any:
+    """Put weather on a ground with a bake, or renew what there is; the modifier.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record does not say what is needed.
+    """
+    display_mesh = baked_ground.display_mesh_of(ground)
+    there: Any = weather_modifier.modifier_of(display_mesh)
+    _check_names(display_mesh)
+    tree = there.node_group if there else nodes.new()
+    try:
+        _fit(ground, display_mesh, tree)
+    except BaseException:
+        weather_modifier.remove_unused()
+        raise
+    return there or weather_modifier.put(display_mesh, tree)
+
+
+def values_of(ground: bpy.types.Object) -> dict[str, float]:
+    """What the sliders of a ground's weather are at; nothing where there is none."""
+    modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    if modifier is None:
+        return {}
+    values = dict(compat.node_inputs(modifier))
+    return {name: values[key] for name, key in inputs_of(modifier).items() if key in values}
+
+
+def renew(ground: bpy.types.Object, values: Mapping[str, float]) -> None:
+    """Fit weather to the bake that a ground has now, with the values that it had before it; nothing if it had none."""
+    there = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
+    if there is None and not values:
+        return
+    modifier = add(ground)
+    if there is None:
+        _set(modifier, values)
+
+
+def set_preset(modifier: Any, preset: str) -> None:
+    """Set all inputs of a weather modifier as one of `PRESETS` has them."""
+    _set(modifier, {**{name: value for name, value, *_ in nodes.INPUTS}, **PRESETS[preset][1]})
+
+
+def _set(modifier: Any, values: Mapping[str, float]) -> None:
+    for name, identifier in inputs_of(modifier).items():
+        if name in values:
+            compat.set_node_input(modifier, identifier, float(values[name]))
+    modifier.id_data.update_tag()
+
+
+def inputs_of(modifier: Any) -> dict[str, str]:
+    """Identifier of each of the inputs that set the weather, by its name."""
+    sockets = [one for one in modifier.node_group.interface.items_tree if one.item_type == "SOCKET"]
+    known = {name for name, *_ in nodes.INPUTS}
+    return {one.name: one.identifier for one in sockets if one.in_out == "INPUT" and one.name in known}
+
+
+def _check_names(display_mesh: bpy.types.Object) -> None:
+    mesh = ground_mesh.mesh_of(display_mesh)
+    taken = [one for one in nodes.OF_WEATHER if one in mesh.attributes and one not in own_data.made(mesh)]
+    if taken:
+        raise InputError(f"'{display_mesh.name}' has an attribute '{taken[0]}' of yours: rename it, weather needs it.")
+
+
+def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) -> None:
+    """Write what the group reads, and fill it."""
+    footprints, about = baked_ground.load(ground)
+    try:
+        inputs = about["inputs"]
+        material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
+        stretch, rate = float(inputs["time_stretch"]), float(inputs["frame_rate"])
+        first, surface = float(inputs["frames"][0]), str(inputs["surface"])
+        cell_size, unit_scale = float(inputs["cell_size_m"]), float(inputs["unit_scale_m"])
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
+    up = ground_mesh.up_of(display_mesh, unit_scale)
+    _write(display_mesh, footprints, up, stretch, cell_size=cell_size, unit_scale=unit_scale, **material)
+    matter = matter_of(surface, material["layer_depth"], section_of(footprints))
+    nodes.build(tree, matter=matter, up=up.tolist(), first_frame=first * stretch, frame_rate=rate * stretch)
+
+
+def _write(
+    display_mesh: bpy.types.Object,
+    footprints: list[Footprint],
+    up: Array,
+    time_stretch: float,
+    *,
+    unit_scale: float,
+    **of_bake: float,
+) -> None:
+    mesh = ground_mesh.mesh_of(display_mesh)
+    position = ground_mesh.undisturbed_surface(display_mesh, unit_scale).vertices
+    rest = ground_mesh.rest_positions(mesh).astype(np.float64)
+    relief = (ground_mesh.displayed_positions(display_mesh) - rest) @ up / (up @ up)
+    start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))
+    last[last >= NO_CONTACT] = -NO_CONTACT
+    start[start <= -NO_CONTACT] = NO_CONTACT
+    places = weather_places(
+        footprints, position, relief, start, np.maximum(end, last), time_stretch=time_stretch, **of_bake
+    )
+    halves = np.split(places.levels, 2, axis=1)
+    vectors = (places.blur, places.trodden, places.times, places.pool, *halves)
+    for name, values in zip(nodes.OF_WEATHER, vectors, strict=True):
+        attribute = own_data.attribute(mesh, name, "FLOAT_VECTOR")
+        attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
+    mesh.update()
+
+
+def _values(mesh: bpy.types.Mesh, name: str) -> Array:
+    attribute: Any = mesh.attributes.get(name)
+    if attribute is None:
+        raise InputError("The bake has lost its playback: bake again.")
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.float64)

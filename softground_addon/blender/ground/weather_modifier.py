@@ -1,0 +1,52 @@
+"""The modifier that plays weather over a bake, and the attributes that are its own."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import bpy
+
+from . import own_data, playback
+from . import weather_nodes as nodes
+
+MODIFIER = "SoftGround Weather"
+
+
+def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The ground's weather, whatever the names of the modifier and its node group have become."""
+    for modifier in ground.modifiers:
+        group = getattr(modifier, "node_group", None)
+        if group is not None and nodes.is_weather(group):
+            return modifier
+    return None
+
+
+def put(ground: bpy.types.Object, tree: bpy.types.NodeTree) -> Any:
+    """Have weather act on an object, right behind its playback; the modifier that is active stays so."""
+    active = ground.modifiers.active
+    modifier: Any = ground.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = tree
+    modifier.show_in_editmode = False
+    before = playback.modifier_of(ground)
+    place = list(ground.modifiers).index(before) + 1 if before else 0
+    ground.modifiers.move(len(ground.modifiers) - 1, place)
+    if active:
+        ground.modifiers.active = active
+    return modifier
+
+
+def remove(ground: bpy.types.Object) -> None:
+    """Take weather off a ground and copies of it with the same mesh; nothing happens where there is none."""
+    mesh = cast("bpy.types.Mesh", ground.data)
+    copies = [obj for obj in bpy.data.objects if obj.data == mesh] if mesh.users > 1 else []
+    for shown in {ground, *copies}:
+        while modifier := modifier_of(shown):
+            shown.modifiers.remove(modifier)
+    remove_unused()
+    own_data.remove(mesh, nodes.OF_WEATHER)
+
+
+def remove_unused() -> None:
+    """Remove the groups that no modifier has any more."""
+    for group in [one for one in bpy.data.node_groups if nodes.is_weather(one) and not (one.users or one.library)]:
+        bpy.data.node_groups.remove(group)

@@ -1,0 +1,46 @@
+"""The panel of weather over a bake: its sliders where the modifier has them."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import compat, settings
+from ..ground import baked_ground, weather, weather_modifier
+from .panel_base import ADVANCED, SidebarPanel
+
+
+class SOFTGROUND_MT_weather(bpy.types.Menu):
+    """Weather to begin with"""
+
+    bl_label = "Weather Presets"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for key, (title, _) in weather.PRESETS.items():
+            self.layout.operator("softground.add_weather", text=title).preset = key
+
+
+class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
+    """Weather over what is baked"""
+
+    bl_label = "Weather"
+    bl_parent_id = ADVANCED
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.fields()
+        ground = settings.scene_of(context).softground.ground
+        modifier = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
+        row = layout.row(align=True)
+        if modifier is None:
+            row.operator("softground.add_weather", icon="OUTLINER_OB_FORCE_FIELD").preset = "NONE"
+            row.menu("SOFTGROUND_MT_weather", text="", icon="DOWNARROW_HLT")
+            return
+        row.menu("SOFTGROUND_MT_weather", text="Presets")
+        row.operator("softground.remove_weather", text="", icon="X")
+        column = layout.column(align=True)
+        for name, identifier in weather.inputs_of(modifier).items():
+            holder, path = compat.node_input_property(modifier, identifier)
+            column.prop(holder, path, text=name)
+
+
+CLASSES = (SOFTGROUND_MT_weather, SOFTGROUND_PT_weather)
