@@ -28,6 +28,7 @@ def run(command):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_copied_command_bakes_what_the_button_bakes_whatever_the_names(scene, tmp_path):
     name = 'it\'s "$HOME" `x` %s\n❄'
     shots.walker(scene, frames=40)

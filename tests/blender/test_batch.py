@@ -62,6 +62,7 @@ def results(folder):
     return found
 
 
+@pytest.mark.slow
 def test_shots_baked_side_by_side_are_those_baked_one_by_one(night, capfd):
     manifest = night(2)
     done = run(manifest, "--jobs", 2)

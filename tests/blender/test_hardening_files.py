@@ -149,6 +149,7 @@ def test_a_disk_that_fills_up_while_the_report_is_written_leaves_no_trace(shot, 
     assert not target.exists()
 
 
+@pytest.mark.slow
 @posix
 def test_a_limit_on_the_size_of_files_leaves_the_old_one(shot):
     old = shot.read_bytes()

@@ -79,7 +79,7 @@ def assert_poses_equal_evaluated_ones(scene, armature):
             )
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1))
 def test_poses_of_random_rigs_are_those_that_blender_evaluates(addon, seed):
     bpy.ops.wm.read_factory_settings(use_empty=True)

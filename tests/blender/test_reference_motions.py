@@ -14,6 +14,8 @@ from softground_addon.blender.reading import analysis
 from tests.blender import shots
 from tests.blender.responders import source_motion
 
+pytestmark = pytest.mark.slow
+
 STEPS = {"walk": 6, "run": 15, "jumping": 6, "jumping_jacks": 14}
 """Contacts counted in the motion: heel and toe markers for walk and run, by eye for the others."""
 

@@ -61,6 +61,7 @@ def test_a_walk_of_120_frames_a_second_in_a_scene_of_25_is_slow_motion(scene):
     assert codes(bake(scene).report) == {"slow_motion"}
 
 
+@pytest.mark.slow
 def test_a_capture_of_120_frames_a_second_that_says_25_is_slow_motion(scene):
     path = shots.SHARED / "rigs" / "cmu_05_01.bvh"
     if not path.is_file():

@@ -89,6 +89,7 @@ def test_the_modifier_that_the_user_works_at_stays_active(short_walk):
     assert fingerprints.of_file() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", playback.NEED_THE_MESH)
 def test_a_fine_ground_whose_modifier_none_may_precede_gets_a_copy(short_walk, kind):
     ground = field(short_walk, **FINE)

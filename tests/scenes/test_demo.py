@@ -11,6 +11,8 @@ import pytest
 from sample_scenes.body import Body
 from sample_scenes.gait import Gait, walk
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PRESETS = ("Snow", "Dry Sand", "Mud", "Soil")
 PICTURES = ("overview", "snow", "dry_sand", "mud", "soil")

@@ -163,6 +163,7 @@ def test_the_poses_do_not_depend_on_the_frame_rate():
     step_width=st.floats(0.0, 0.25),
     toe_out=st.floats(-5, 25),
 )
+@pytest.mark.slow
 def test_any_sensible_walk_keeps_its_legs_within_reach(speed, stature, step_width, toe_out):
     body = Body(stature=stature, foot=Foot(0.157 * stature, 0.055 * stature))
     gait = Gait(

@@ -103,6 +103,7 @@ def test_hips_advance_at_the_gaits_speed_and_repeat_every_stride():
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(speed=st.floats(2.2, 6.0), stature=st.floats(1.0, 2.5), long_foot=st.floats(0.8, 1.5))
 def test_any_sensible_run_keeps_its_feet_down_and_its_knees_bent(speed, stature, long_foot):

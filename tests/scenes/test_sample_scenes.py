@@ -8,6 +8,8 @@ import pytest
 from sample_scenes.make_all import SCENES
 from sample_scenes.publish import LARGEST, publish
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 EVERY_OPTION = {

@@ -15,8 +15,9 @@ from .skin_sampling import meshes_on
 
 
 def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
-    """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog."""
-    heads = np.array([bone.head_local for bone in armature.data.bones]).reshape(-1, 3)
+    """Largest extent of a rig's joints at rest [m]: the height of a body, or the length of a dog; 0 without bones."""
+    bones = armature.data.bones if armature.data else ()  # a linked rig whose library is gone has no data
+    heads = np.array([bone.head_local for bone in bones]).reshape(-1, 3)
     in_world = heads @ np.array(armature.matrix_world)[:3, :3].T * scene.unit_settings.scale_length
     return float(np.ptp(in_world, axis=0).max()) if len(heads) else 0.0
 
