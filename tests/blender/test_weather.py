@@ -161,7 +161,21 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     bpy.ops.softground.add_weather()  # renews, and leaves the sliders alone
     assert [one.name for one in ground.modifiers] == ["SoftGround Playback", "SoftGround Weather", "Mine"]
     assert ground.modifiers.active == mine
-    assert weather.values_of(scene.softground.ground)["Snowfall"] == pytest.approx(3.0)
+    values = weather.values_of(scene.softground.ground)
+    assert values["Snowfall"] == pytest.approx(3.0)
+    modifier = weather_modifier.modifier_of(ground)
+    for name, identifier in weather.inputs_of(modifier).items():  # as the panel shows them
+        holder, path = compat.node_input_property(modifier, identifier)
+        assert holder.path_resolve(path) == values[name]
+
+
+def test_a_beach_turns_pale_as_it_dries(opened):
+    scene = opened("wet_sand")
+    bpy.ops.softground.add_weather(preset="DRYING_BEACH")
+    pale = [read(shown(scene, frame), nodes.DRIED) for frame in (1, 100, 300)]
+    assert pale[0].max() == 0.0
+    assert (pale[0] < pale[1]).all()
+    assert (pale[1] < pale[2]).all()
 
 
 @pytest.mark.parametrize("preset", weather.PRESETS)

@@ -15,6 +15,8 @@ import numpy as np
 
 from ...core.errors import InputError
 from .ground_mesh import COMPRESSION, RIM, SOLE, WATER
+from .weather_look import bare, under_weather
+from .weather_nodes import FRESH
 
 TREAD_PITCH = 0.017
 """From bar to bar of a tread [m]."""
@@ -173,7 +175,7 @@ def ensure_material(surface: str) -> bpy.types.Material:
         If there is no such surface.
     """
     name = surface.replace("_", " ").title()
-    return _material(surface, name, (surface,), lambda graph: _shaded(graph, _looks(surface)[0](graph, _ground(graph))))
+    return _material(surface, name, (surface,), lambda graph: _shaded(graph, _look(graph, surface, _ground(graph))))
 
 
 @contextmanager
@@ -201,9 +203,7 @@ def ensure_blend(surface: str, other: str) -> bpy.types.Material:
 
     def build(graph: Graph) -> tuple[Socket, Socket]:
         ground = _ground(graph)
-        shaders, reliefs = zip(
-            *(_shaded(graph, _looks(name)[0](graph, ground)) for name in (surface, other)), strict=True
-        )
+        shaders, reliefs = zip(*(_shaded(graph, _look(graph, name, ground)) for name in (surface, other)), strict=True)
         drift = graph.noise(ground.place, 0.35, 4.0, 0.6) * 0.5  # no border is drawn with a ruler
         factor = graph.ramp(graph.attribute(BLEND) + drift, 0.70, 0.80)
         mixed = graph.node("ShaderNodeMixShader", {0: factor, 1: shaders[0], 2: shaders[1]})
@@ -222,7 +222,7 @@ def ensure_over(theirs: bpy.types.Material, surface: str) -> bpy.types.Material:
         If there is no such surface.
     """
     mark = f"{surface} over"
-    look = _looks(surface)[0]
+    _looks(surface)  # or it is none
     for material in bpy.data.materials:
         if material.get(MARK) == mark and material.get(OVER) == theirs and material.library is None:
             return material
@@ -234,8 +234,8 @@ def ensure_over(theirs: bpy.types.Material, surface: str) -> bpy.types.Material:
     output: Any = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
     graph = Graph(tree)
     ground = _ground(graph)
-    shader, height = _shaded(graph, look(graph, ground))
-    share = graph.math("MAXIMUM", ground.pressed, ground.risen)
+    shader, height = _shaded(graph, _look(graph, surface, ground))
+    share = graph.math("MAXIMUM", graph.math("MAXIMUM", ground.pressed, ground.risen), graph.attribute(FRESH))
     mixed = graph.node("ShaderNodeMixShader", {0: share, 2: shader})
     relief = graph.node("ShaderNodeDisplacement", {"Height": height * share, "Midlevel": 0.0, "Scale": 1.0})
     both = graph.node("ShaderNodeVectorMath", {0: graph.out(relief)}, operation="ADD")
@@ -277,14 +277,22 @@ def _material(
     return material
 
 
+def _look(graph: Graph, surface: str, ground: Ground) -> Look:
+    """What a surface hands to the shader, with what weather has made of it."""
+    look = _looks(surface)[0](graph, ground)
+    inputs, relief = under_weather(graph, surface, look.inputs, look.relief)
+    return Look(relief, inputs)
+
+
 def _ground(graph: Graph) -> Ground:
-    compression = graph.attribute(COMPRESSION)
+    shows = bare(graph)
+    compression = graph.attribute(COMPRESSION) * shows
     pressed = graph.ramp(compression, 0.0004, 0.004)
     return Ground(
         place=graph.out(graph.node("ShaderNodeNewGeometry")),
         pressed=pressed,
         deep=graph.ramp(compression, 0.006, 0.020),
-        risen=graph.ramp(graph.attribute(RIM), 0.0002, 0.005),
+        risen=graph.ramp(graph.attribute(RIM) * shows, 0.0002, 0.005),
         tread=_tread(graph, pressed),
     )
 

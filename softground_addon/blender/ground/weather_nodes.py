@@ -27,8 +27,9 @@ LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
 """Vectors; see `core.after.weathered_ground.WeatherPlaces`. The levels are three and three."""
 OF_WEATHER = (BLUR, TRODDEN, TIMES, POOL, *LEVELS)
 
-WETNESS, FRESH, WATER = "softground_wetness", "softground_fresh", "softground_water"
-"""What the group stores for materials; see `core.after.weathered_ground.Weathered`."""
+WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
+"""What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
+was wet is 0 to 1."""
 
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
 
@@ -129,7 +130,8 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
     graph.next_row()
     geometry = changed = group.outputs["Geometry"]
     water = graph.number(graph.attribute(WATER)).at_least(water) if water else None  # the bake's own stays
-    for name, value in ((WETNESS, wetness), (FRESH, fresh), (WATER, water)):
+    dried = 1.0 - wetness if matter.wet else None
+    for name, value in ((WETNESS, wetness), (FRESH, fresh), (WATER, water), (DRIED, dried)):
         if value:  # before anything moves: all of it follows from where the playback has the vertices
             changed = graph.store(changed, name, value.socket, True)
     node = graph.node("GeometryNodeSetPosition")

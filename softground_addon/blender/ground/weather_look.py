@@ -1,0 +1,60 @@
+"""How weather shows on the add-on's materials: new snow over all, rain dark, sun pale, and water level and smooth.
+
+Where a mesh has no weather its attributes are 0, and every surface is as without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from .weather_nodes import DRIED, FRESH, WATER, WETNESS
+
+if TYPE_CHECKING:
+    from .materials import Graph, Socket
+
+NEW_SNOW = (0.915, 0.935, 0.96)
+SOAKED = (0.42, 0.38, 0.34)
+"""What is left of a dry ground's colour when it is wet (Lekner and Dorf 1988, doi:10.1364/AO.27.001278: about half)."""
+PALE = (2.0, 2.0, 2.0)
+"""Wet ground's colour when it is dry, over what it was."""
+FULL = 0.004
+"""Water that hides the grain of the ground [m]."""
+
+
+def bare(graph: Graph) -> Socket:
+    """How much of the ground new snow has not covered, 1 to 0."""
+    return graph.math("SUBTRACT", 1.0, graph.attribute(FRESH))
+
+
+def under_weather(graph: Graph, surface: str, inputs: Mapping[str, Any], relief: Socket) -> tuple[Any, Socket]:
+    """A surface's shader inputs and relief [m] under weather."""
+    shown, fresh = dict(inputs), graph.attribute(FRESH)
+    if surface != "snow":
+        shown["Base Color"], relief = _wet(graph, surface, shown, relief)
+        shown["Base Color"] = graph.mix(fresh, shown["Base Color"], NEW_SNOW)
+    shown["Roughness"] = graph.blend(fresh, shown["Roughness"], 0.70)
+    return shown, relief
+
+
+def _wet(graph: Graph, surface: str, shown: dict[str, Any], relief: Socket) -> tuple[Any, Socket]:
+    """Colour and relief of wet or dried ground; its gloss is set."""
+    colour = shown["Base Color"]
+    if surface in ("wet_sand", "mud"):  # which are wet to begin with
+        dried = graph.attribute(DRIED)
+        pale = _times(graph, colour, PALE)
+        shown["Roughness"] = graph.blend(dried, shown["Roughness"], 0.95)
+        if "Coat Weight" in shown:
+            shown["Coat Weight"] = shown["Coat Weight"] * graph.math("SUBTRACT", 1.0, dried)
+        return graph.mix(dried, colour, pale), relief
+    wet, water = graph.attribute(WETNESS), graph.ramp(graph.attribute(WATER), 0.0, FULL)
+    dark = _times(graph, colour, SOAKED)
+    shown["Roughness"] = graph.blend(water, graph.blend(wet, shown["Roughness"], 0.45), 0.04)
+    shown["Specular IOR Level"] = graph.blend(wet, shown.get("Specular IOR Level", 0.5), 0.5)
+    return graph.mix(wet, colour, dark), relief * graph.math("SUBTRACT", 1.0, water)
+
+
+def _times(graph: Graph, colour: Socket, factor: tuple[float, float, float]) -> Socket:
+    """A colour times another."""
+    inputs = {"Factor_Float": 1.0, "A_Color": colour, "B_Color": (*factor, 1.0)}
+    return graph.out(graph.node("ShaderNodeMix", inputs, data_type="RGBA", blend_type="MULTIPLY"), 2)
