@@ -26,7 +26,7 @@ PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
         "Snowfall",
         {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
     ),
-    "THAW": ("Thaw", {"Temperature": 6.0, "Time Scale": 20_000.0}),
+    "THAW": ("Thaw", {"Temperature": 3.0, "Time Scale": 20_000.0}),
     "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 120.0}),
     "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
     "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),

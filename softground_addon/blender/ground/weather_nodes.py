@@ -101,9 +101,7 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
     of_all = (frame - first_frame).at_least(0.0) * pace
     pressed, since, compression = (graph.number(part) for part in graph.separated(_vector(graph, TIMES)))
     age = (frame - since).at_least(0.0) * pace
-    left = matter.snow_depth - compression if matter.snow_depth else None
-    around, cover_around = sky.level(of_all, matter, None)
-    within, cover_within = sky.level(age, matter, left.at_least(0.0) if left else None)
+    cover_around, cover_within = sky.cover(of_all), sky.cover(age)
 
     graph.next_row()
     share = _shares(graph, sky.variance(age, cover_within, matter))
@@ -116,6 +114,12 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
     inside = inside.within_one() * (1.0 - pressed.above(frame))
 
     graph.next_row()
+    around, within = cover_around, cover_within
+    if matter.snow_depth:
+        left = (blurred + matter.snow_depth).at_least(0.0)
+        ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
+        around = around - sky.thawed(of_all).at_most(left)
+        within = within - (sky.thawed(age) * ratio * ratio).at_most(left)
     level = around + (within - around) * inside
     height = blurred - relief + level
     fresh = ((cover_around + (cover_within - cover_around) * inside) * (1.0 / COVERED)).within_one()
@@ -175,18 +179,13 @@ class _Sky:
         assert kept is not None
         return age * self.snowfall * kept
 
-    def level(self, age: Number, matter: Matter, left: Number | None) -> tuple[Number, Number]:
-        """As `weather.level_of_snow`, and the new snow of it; `left` of the ground's depth, all where there is none."""
-        unmelted = (1.0 - self._melting / self._falling).within_one()
-        cover = self._fallen(age) * unmelted
-        if not matter.snow_depth:
-            return cover, cover
-        rate = (self._melting - self._falling).at_least(0.0) * (w.WATER_DENSITY / w.SNOW.bulk_density)
-        below = age * rate
-        if left is not None:
-            ratio = left * (1.0 / matter.snow_depth)
-            below = below * ratio * ratio
-        return cover - below.at_most(matter.snow_depth if left is None else left), cover
+    def cover(self, age: Number) -> Number:
+        """New snow that has not melted."""
+        return self._fallen(age) * (1.0 - self._melting / self._falling).within_one()
+
+    def thawed(self, age: Number) -> Number:
+        """As `weather.thawed_depth`."""
+        return age * (self._melting - self._falling).at_least(0.0) * (w.WATER_DENSITY / w.SNOW.bulk_density)
 
     def flux(self, blown: w.Blown) -> Number:
         """As `weather.blown_flux`."""
@@ -198,7 +197,8 @@ class _Sky:
         spread = self.rain * w.RAIN_ROUNDING
         if matter.blown:
             spread = spread + self.flux(matter.blown) * (2.0 * w.HOP / matter.blown.bulk_density)
-        return cover * w.DRAPE + spread * age
+        under = cover + self.thawed(age) if matter.snow_depth else cover
+        return under * w.DRAPE + spread * age
 
     def wetness(self, of_all: Number, exposed: Number, matter: Matter) -> Number:
         """How wet the ground looks where no water stands on it."""

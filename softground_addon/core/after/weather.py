@@ -146,8 +146,14 @@ def melted_water(age: Any, temperature: Any) -> Array:
     return np.asarray(DEGREE_DAY * np.maximum(temperature, 0.0) * np.asarray(age))
 
 
+def thawed_depth(age: Any, rate: Any, temperature: Any, density: float = SNOW.bulk_density) -> Array:
+    """Depth of untrodden ground that melts once the new snow is gone [m], were it deep enough."""
+    over = melted_water(age, temperature) - snow_water(age, rate, temperature)
+    return np.asarray(np.maximum(over, 0.0) * WATER_DENSITY / density)
+
+
 def level_of_snow(
-    age: Any, rate: Any, temperature: Any, *, depth: Any, density: float = SNOW.bulk_density, compression: Any = 0.0
+    age: Any, rate: Any, temperature: Any, *, depth: Any, compression: Any = 0.0, left: Any = None
 ) -> Array:
     """Change of a surface's height by what falls on it and what melts [m]: new snow first, then the ground's own.
 
@@ -159,19 +165,19 @@ def level_of_snow(
         Of new snow [m/s], and of the air [°C].
     depth : array
         Depth of the snow that the ground is made of [m], 0 where it is something else.
-    density : float
-        Of that, untrodden [kg/m³].
     compression : array
         What was trodden down of it [m]. It melts the less the denser it is, as fewer of its grains are open to the
         air, and stands up in the end. That this goes with 1/density is by the pictures it gives.
+    left : array, optional
+        What there is to melt [m]; by default the depth without the compression.
     """
     fallen, water = snow_cover(age, rate, temperature), snow_water(age, rate, temperature)
     melted = melted_water(age, temperature)
     share = np.clip(1.0 - np.divide(melted, water, out=np.ones_like(melted), where=water > 0), 0.0, 1.0)
-    left = np.maximum(depth - np.asarray(compression), 0.0)
-    ratio = np.divide(left, depth, out=np.ones_like(left * 1.0), where=np.asarray(depth) > 0)
-    below = np.maximum(melted - water, 0.0) * WATER_DENSITY / density * ratio**2
-    return np.asarray(fallen * share - np.minimum(below, left))
+    trodden = np.maximum(depth - np.asarray(compression, dtype=np.float64), 0.0)
+    ratio = np.divide(trodden, depth, out=np.ones_like(trodden), where=np.asarray(depth) > 0)
+    below = thawed_depth(age, rate, temperature) * ratio**2
+    return np.asarray(fallen * share - np.minimum(below, trodden if left is None else left))
 
 
 def friction_velocity(wind: Any) -> Array:
@@ -197,7 +203,7 @@ def blown_variance(age: Any, wind: Any, blown: Blown) -> Array:
 
 
 def drape_variance(cover: Any) -> Array:
-    """Variance by which edges are blurred under a depth of new snow [m] [m²]."""
+    """Variance by which edges are blurred under a depth of new snow, or by the melt of one [m] [m²]."""
     return np.asarray(DRAPE * np.maximum(cover, 0.0))
 
 

@@ -7,6 +7,7 @@ from the start, and in a print that of its own age; relief and bounds of prints 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,23 +154,26 @@ def weathered(
     of_all = np.full_like(age, max(frame - first_frame, 0.0) * pace)
     fall = {"rate": weather.snowfall, "temperature": weather.temperature}
 
-    around = w.level_of_snow(of_all, **fall, depth=matter.snow_depth)
-    within = w.level_of_snow(age, **fall, depth=matter.snow_depth, compression=compression)
-    variance = w.drape_variance(within) + w.rain_variance(age, weather.rain)
+    cover = np.maximum(w.level_of_snow(age, **fall, depth=0.0), 0.0)
+    thawed = w.thawed_depth(age, **fall) if matter.snow_depth else 0.0
+    variance = w.drape_variance(cover + thawed) + w.rain_variance(age, weather.rain)
     gone = np.zeros_like(age)
     if matter.blown:
         variance = variance + w.blown_variance(age, weather.wind, matter.blown)
         gone = w.filled_share(age, weather.wind, matter.section, matter.blown)
     share = shares(variance)
-    softened = (1.0 - gone) * (relief + (places.blur * share).sum(axis=-1)) - relief
+    soft = (1.0 - gone) * (relief + (places.blur * share).sum(axis=-1))
 
     inside = places.trodden[:, 0] + (places.trodden[:, 1:] * share[:, 1:]).sum(axis=-1)
     inside = np.where(frame >= pressed, np.clip(inside, 0.0, 1.0), 0.0)
-    level = (1.0 - inside) * around + inside * within
+    left = np.maximum(matter.snow_depth + soft, 0.0) if matter.snow_depth else 0.0
+    snow: dict[str, Any] = {**fall, "depth": matter.snow_depth, "left": left}
+    around = w.level_of_snow(of_all, **snow)
+    level = (1.0 - inside) * around + inside * w.level_of_snow(age, **snow, compression=compression)
 
-    water = _standing(places, softened + level, weather, matter, age)
+    water = _standing(places, soft - relief + level, weather, matter, age)
     return Weathered(
-        height=softened + level + water,
+        height=soft - relief + level + water,
         wetness=np.where(water > 0, 1.0, _wetness(weather, matter, of_all, (1.0 - inside) * of_all + inside * age)),
         fresh=np.clip(level / COVERED, 0.0, 1.0),
         water=water,
