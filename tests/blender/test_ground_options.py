@@ -162,7 +162,7 @@ def test_a_name_that_is_not_there_or_of_another_kind_is_refused_with_the_remedy(
     with pytest.raises(InputError, match="no vertex group or attribute 'gone'"):
         bake(walk)
     ground.data.attributes.new("gone", "FLOAT_COLOR", "CORNER")
-    with pytest.raises(InputError, match="no float on vertices"):
+    with pytest.raises(InputError, match="not a float attribute on vertices"):
         bake(walk)
     walk.softground.painted.stiffness = ""
     bake(walk)

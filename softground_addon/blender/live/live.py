@@ -6,6 +6,7 @@ every other tool go on working. While live mode is on, the ground carries what a
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import bpy
@@ -24,7 +25,9 @@ LOOK = 0.1
 PAUSE = 0.005
 """Time that is left to everything else between two parts of an answer [s]."""
 PART = 0.025
-"""What a part of an answer may take, beside the frame that is being pressed when it is over [s]."""
+"""What a part of an answer takes, beside the frame that is being pressed when it is over [s]."""
+LONGEST_PART = 0.05
+"""What it may take where drawing between two parts takes as long [s]."""
 
 _mode: LiveMode | None = None
 """Live mode if it is on: Blender's handlers are functions, so that what they follow lives here."""
@@ -65,15 +68,20 @@ def after_undo() -> None:
         forget()
 
 
-def answer(seconds: float = PART) -> float | None:
-    """Press again what the settings of the moment ask for, for a little while; for a timer."""
+def answer(seconds: float | None = None) -> float | None:
+    """Press again what the settings of the moment ask for, for a little while; for a timer.
+
+    As long as what else was done since, such as drawing, within `PART` and `LONGEST_PART`: where a picture takes a
+    second the answer would take a minute otherwise.
+    """
     scene = _scene()
     if _mode is None or scene is None:
         return None
     if _mode.rendering or session.current().is_baking:
         return LOOK
     try:
-        return PAUSE if _mode.answer(scene, seconds) else LOOK
+        part = min(max(time.perf_counter() - _mode.answered_at, PART), LONGEST_PART) if seconds is None else seconds
+        return PAUSE if _mode.answer(scene, part) else LOOK
     except InputError:
         forget()
     return None

@@ -66,6 +66,7 @@ class LiveMode:
         assert wanted.ground is not None
         self.scene = scene.session_uid
         self.rendering = False
+        self.answered_at = 0.0  # on the clock of `time.perf_counter`
         self._answering: Generator[None] | None = None
         self._asked: BakeSettings | None = None
         self._can_start_over = True
@@ -123,10 +124,16 @@ class LiveMode:
         InputError
             If the shot cannot be read any more.
         """
-        until, asked = time.perf_counter() + seconds, settings.snapshot(scene)
+        try:
+            return self._answer(scene, time.perf_counter() + seconds)
+        finally:
+            self.answered_at = time.perf_counter()
+
+    def _answer(self, scene: bpy.types.Scene, until: float) -> bool:
+        asked = settings.snapshot(scene)
         if self._can_start_over and self._is_another(scene, asked):
             if analysis.known(scene, asked) is None:
-                if self._asked != asked and np.isfinite(seconds):  # to be read as a whole, but not while it is dragged
+                if self._asked != asked and np.isfinite(until):  # to be read as a whole, but not while it is dragged
                     self._asked = asked
                     return False
                 analysis.read(scene)
