@@ -27,12 +27,12 @@ PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
         {"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 2880.0},
     ),
     "THAW": ("Thaw", {"Temperature": 3.0, "Time Scale": 20_000.0}),
-    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 120.0}),
+    "WINDY_DUNES": ("Windy Dunes", {"Wind": 9.0, "Time Scale": 60.0}),
     "SHOWER": ("Shower", {"Rain": 40.0, "Time Scale": 180.0}),
     "DRYING_BEACH": ("Drying Beach", {"Drying": 0.5, "Time Scale": 2880.0}),
 }
 """Title of each preset, and its inputs where they are not as in a new group. Ten seconds show a night of snow, two days
-of thaw, twenty minutes of wind, half an hour of rain, eight hours of sun."""
+of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
 def add(ground: bpy.types.Object) -> Any:
@@ -114,6 +114,8 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     up = ground_mesh.up_of(display_mesh, unit_scale)
     _write(display_mesh, footprints, up, stretch, cell_size=cell_size, unit_scale=unit_scale, **material)
     matter = matter_of(surface, material["layer_depth"], section_of(footprints))
+    if matter.soaking is None:  # no water stands there
+        own_data.remove(ground_mesh.mesh_of(display_mesh), nodes.OF_HOLLOWS)
     nodes.build(tree, matter=matter, up=up.tolist(), first_frame=first * stretch, frame_rate=rate * stretch)
 
 

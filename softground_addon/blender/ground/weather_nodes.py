@@ -6,7 +6,7 @@ vertex, from what `core.after.weather_places` found and the group's own inputs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +15,7 @@ import bpy
 from ...core.after import weather as w
 from ...core.after.weathered_ground import BOUNDS, COVERED, KNOTS, Matter
 from .node_graph import NodeGraph, Number, new_group
-from .playback_nodes import MOVED, REST
+from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 
 GROUP = "SoftGround Weather"
 MARK = "softground_weather"
@@ -25,7 +25,8 @@ BLUR, TRODDEN = "softground_weather_blur", "softground_weather_trodden"
 TIMES, POOL = "softground_weather_times", "softground_weather_pool"
 LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
 """Vectors; see `core.after.weathered_ground.WeatherPlaces`. The levels are three and three."""
-OF_WEATHER = (BLUR, TRODDEN, TIMES, POOL, *LEVELS)
+OF_HOLLOWS = (POOL, *LEVELS)
+OF_WEATHER = (BLUR, TRODDEN, TIMES, *OF_HOLLOWS)
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
 """What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
@@ -107,22 +108,23 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
     share = _shares(graph, sky.variance(age, cover_within, matter))
     relief = _relief(graph, up)
     blurred = relief + graph.number(graph.dot(_vector(graph, BLUR), share))
+    kept = None
     if matter.blown:
         rate = sky.flux(matter.blown) * (1.0 / (max(matter.section, 1e-9) * matter.blown.bulk_density))
-        blurred = blurred * (age * rate * -1.0).exp()
+        kept = (age * rate * -1.0).exp()
+        blurred = blurred * kept
     inside = graph.number(graph.dot(_vector(graph, TRODDEN), graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0))))
     inside = inside.within_one() * (1.0 - pressed.above(frame))
 
     graph.next_row()
-    around, within = cover_around, cover_within
+    cover = cover_around + (cover_within - cover_around) * inside
+    height = blurred - relief + cover
     if matter.snow_depth:
         left = (blurred + matter.snow_depth).at_least(0.0)
         ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
-        around = around - sky.thawed(of_all).at_most(left)
-        within = within - (sky.thawed(age) * ratio * ratio).at_most(left)
-    level = around + (within - around) * inside
-    height = blurred - relief + level
-    fresh = ((cover_around + (cover_within - cover_around) * inside) * (1.0 / COVERED)).within_one()
+        around, within = sky.thawed(of_all).at_most(left), (sky.thawed(age) * ratio * ratio).at_most(left)
+        height = height - around - (within - around) * inside
+    fresh = (cover * (1.0 / COVERED)).within_one()
     wetness = sky.wetness(of_all, of_all + (age - of_all) * inside, matter)
     water = None
     if matter.soaking:
@@ -132,17 +134,37 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
         wetness = wetness.at_least(water.above(0.0))
 
     graph.next_row()
-    geometry = changed = group.outputs["Geometry"]
-    water = graph.number(graph.attribute(WATER)).at_least(water) if water else None  # the bake's own stays
-    dried = 1.0 - wetness if matter.wet else None
-    for name, value in ((WETNESS, wetness), (FRESH, fresh), (WATER, water), (DRIED, dried)):
-        if value:  # before anything moves: all of it follows from where the playback has the vertices
-            changed = graph.store(changed, name, value.socket, True)
-    node = graph.node("GeometryNodeSetPosition")
-    graph.link(changed, node.inputs["Geometry"])
-    graph.link(graph.scaled(tuple(up), height.socket), node.inputs["Offset"])
-    changed = node.outputs["Geometry"]
+    geometry = group.outputs["Geometry"]
+    stored = {WETNESS: wetness, FRESH: fresh} | ({WATER: water} if water else {})
+    # Before anything moves: all of it follows from where the playback has the vertices.
+    changed = _moved(graph, _with(graph, geometry, _seen(graph, stored, kept, matter)), up, height)
     graph.finish(graph.choose("GEOMETRY", sky.is_any().above(0.0).socket, geometry, changed))
+
+
+def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:
+    """What is stored for materials; `kept` is the share of the prints that is not blown full."""
+    if WATER in stored:
+        stored[WATER] = graph.number(graph.attribute(WATER)).at_least(stored[WATER])  # the bake's own stays
+    if matter.wet:
+        stored[DRIED] = 1.0 - stored[WETNESS]
+    if kept:  # what is blown full looks trodden no more
+        stored |= {name: graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM)}
+    return stored
+
+
+def _with(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> Any:
+    """A geometry with numbers of these names."""
+    for name, value in values.items():
+        geometry = graph.store(geometry, name, value.socket, True)
+    return geometry
+
+
+def _moved(graph: NodeGraph, geometry: Any, up: Sequence[float], height: Number) -> Any:
+    """A geometry that is higher by so much."""
+    node = graph.node("GeometryNodeSetPosition")
+    graph.link(geometry, node.inputs["Geometry"])
+    graph.link(graph.scaled(tuple(up), height.socket), node.inputs["Offset"])
+    return node.outputs["Geometry"]
 
 
 class _Sky:
