@@ -134,6 +134,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
             assert moved == pytest.approx(wanted.height, abs=1e-5 * scale + 1e-8), (values, frame)
             assert read(now, nodes.WETNESS) == pytest.approx(wanted.wetness, abs=1e-3)
             assert read(now, nodes.FRESH) == pytest.approx(wanted.fresh, abs=1e-3)
+            assert not set(nodes.NOW) & set(now.attributes.keys())
             if matter.soaking and not about["inputs"].get("relief_look"):
                 assert read(now, nodes.WATER) == pytest.approx(wanted.water, abs=1e-5)
 

@@ -63,10 +63,10 @@ class NodeGraph:
         self.link(offset, node.inputs["Offset"])
         return node.outputs["Geometry"]
 
-    def store(self, geometry: Any, name: str, value: Any, selection: Any) -> Any:
-        """Give the selected vertices another number of that name."""
+    def store(self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT") -> Any:
+        """Give the selected vertices another value of that name."""
         node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = "FLOAT", "POINT"
+        node.data_type, node.domain = kind, "POINT"
         node.inputs["Name"].default_value = name
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])

@@ -32,6 +32,9 @@ WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softgr
 """What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
 was wet is 0 to 1."""
 
+NOW = ("softground_weather_now_1", "softground_weather_now_2")
+"""Vectors that are there only while the group works."""
+
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
 
 INPUTS = (
@@ -135,10 +138,38 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
 
     graph.next_row()
     geometry = group.outputs["Geometry"]
-    stored = {WETNESS: wetness, FRESH: fresh} | ({WATER: water} if water else {})
+    seen = [height, wetness, fresh, *filter(None, (water, kept))]
+    changed, (height, wetness, fresh, *more) = _worked_out(graph, geometry, seen)
+    stored = {WETNESS: wetness, FRESH: fresh} | ({WATER: more.pop(0)} if water else {})
     # Before anything moves: all of it follows from where the playback has the vertices.
-    changed = _moved(graph, _with(graph, geometry, _seen(graph, stored, kept, matter)), up, height)
+    changed = _with(graph, changed, _seen(graph, stored, more.pop() if kept else None, matter))
+    changed = _forgotten(graph, _moved(graph, changed, up, height), NOW[: 1 + (len(seen) > 3)])
     graph.finish(graph.choose("GEOMETRY", sky.is_any().above(0.0).socket, geometry, changed))
+
+
+def _worked_out(graph: NodeGraph, geometry: Any, values: Sequence[Number]) -> tuple[Any, list[Number]]:
+    """A geometry that keeps some numbers, and these as they are kept: who asks for one does not work it out again."""
+    kept = []
+    for number, name in enumerate(NOW):
+        together = values[3 * number : 3 * number + 3]
+        if not together:
+            break
+        pack = graph.node("ShaderNodeCombineXYZ")
+        for value, socket in zip(together, pack.inputs, strict=False):
+            graph.link(value.socket, socket)
+        geometry = graph.store(geometry, name, pack.outputs["Vector"], True, "FLOAT_VECTOR")
+        kept += [graph.number(part) for part in graph.separated(_vector(graph, name))][: len(together)]
+    return geometry, kept
+
+
+def _forgotten(graph: NodeGraph, geometry: Any, names: Sequence[str]) -> Any:
+    """A geometry without what was kept while it was worked out."""
+    for name in names:
+        node = graph.node("GeometryNodeRemoveAttribute")
+        graph.link(geometry, node.inputs["Geometry"])
+        node.inputs["Name"].default_value = name
+        geometry = node.outputs["Geometry"]
+    return geometry
 
 
 def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:
