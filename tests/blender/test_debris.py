@@ -6,6 +6,7 @@ import sys
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
@@ -68,23 +69,35 @@ def values(obj, name, field="value", size=1):
     return out.reshape(-1, size) if size > 1 else out
 
 
-def shown(obj):
-    """Places of all instances, by place."""
+def pieces(obj):
+    """Places of all shapes and of all round points that are seen."""
     graph = bpy.context.evaluated_depsgraph_get()
-    ours = (one for one in graph.object_instances if one.is_instance and one.parent and one.parent.original == obj)
-    places = [tuple(one.matrix_world.translation) for one in ours]  # each lives for its turn only
-    return np.array(sorted(places)).reshape(-1, 3)
+    shapes, points = [], []
+    for one in graph.object_instances:  # each lives for its turn only
+        if one.is_instance and one.parent and one.parent.original == obj:
+            if one.object.type == "POINTCLOUD":
+                at = np.empty(3 * len(one.object.data.points), np.float32)
+                one.object.data.attributes["position"].data.foreach_get("vector", at)
+                points += [tuple(one.matrix_world @ Vector(place)) for place in at.reshape(-1, 3)]
+            else:
+                shapes.append(tuple(one.matrix_world.translation))
+    return shapes, points
+
+
+def shown(obj):
+    """Places of all pieces, by place."""
+    shapes, points = pieces(obj)
+    return np.array(sorted(shapes + points)).reshape(-1, 3)
 
 
 def wanted(obj, frame, wind=(0.0, 0.0, 0.0)):
     """The same by the closed form of the core."""
-    start = np.empty(3 * len(obj.data.vertices), np.float32)
-    obj.data.vertices.foreach_get("co", start)
+    start = values(obj, "softground_start", "vector", 3)
     since = (frame - values(obj, "softground_birth")) / 24.0
     born = since >= 0
     drag, time = values(obj, "softground_drag")[born], np.minimum(since, values(obj, "softground_flight"))[born]
     launch = values(obj, "softground_launch", "vector", 3)[born]
-    place = flight.position(start.reshape(-1, 3)[born].astype(float), launch, drag, time, 9.81)
+    place = flight.position(start[born].astype(float), launch, drag, time, 9.81)
     place += np.outer(time + drag * np.expm1(-time / drag), wind)
     return np.array(sorted(map(tuple, place.tolist()))).reshape(-1, 3)
 
@@ -186,12 +199,34 @@ def test_an_artists_own_shapes_and_wind_stay_with_the_next_bake(scene):
     assert own.name in bpy.data.collections
 
 
+def test_only_the_largest_have_a_shape_and_the_rest_are_round(scene):
+    obj = debris_object.of(scene.softground.ground)
+    scene.frame_set(24)
+    everything = shown(obj)
+    for count in (0, 40, 10**6):
+        set_input(obj.modifiers[0], "Shaped", count)
+        obj.update_tag()
+        bpy.context.view_layer.update()
+        shapes, _ = pieces(obj)
+        born = values(obj, "softground_birth") <= 24
+        assert len(shapes) == (values(obj, "softground_rank")[born] < count).sum()
+        assert np.abs(shown(obj) - everything).max() < 1e-6
+
+
+def test_points_lie_where_they_come_to_rest(scene):
+    obj = debris_object.of(scene.softground.ground)
+    rest = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", rest.ravel())
+    assert np.abs(np.array(sorted(map(tuple, rest.tolist()))) - wanted(obj, 1e4)).max() < 1e-4
+
+
 COUNT = """
 import bpy, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[-1], use_scripts=False)
 bpy.context.scene.frame_set(20)
 graph = bpy.context.evaluated_depsgraph_get()
-print("shown", sum(one.is_instance for one in graph.object_instances))
+ours = (one.object for one in graph.object_instances if one.is_instance)
+print("shown", sum(len(obj.data.points) if obj.type == "POINTCLOUD" else 1 for obj in ours))
 """
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.after import flight
 from ...core.after.debris import Debris
 from .. import compat
 from . import debris_nodes as nodes
@@ -16,7 +17,7 @@ from . import debris_shapes
 NAME = "SoftGround Debris"
 MODIFIER = "SoftGround Debris"
 
-_AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0}
+_AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0, "Shaped": nodes.SHAPED}
 
 
 def put(
@@ -51,7 +52,7 @@ def put(
     remove(ground)
     if debris is None or not len(debris.birth):
         return None
-    points = _points(debris, time_stretch, unit_scale)
+    points = _points(debris, time_stretch, gravity, unit_scale)
     obj = bpy.data.objects.new(NAME, points)
     obj[nodes.MARK] = True
     for collection in ground.users_collection:
@@ -59,7 +60,13 @@ def put(
     obj.parent = ground
     obj.matrix_parent_inverse = ground.matrix_world.inverted()
     shapes = debris_shapes.collection_of(surface)
-    group = nodes.build(frame_rate=frame_rate * time_stretch, gravity=gravity, unit_scale=unit_scale, shapes=shapes)
+    group = nodes.build(
+        frame_rate=frame_rate * time_stretch,
+        gravity=gravity,
+        unit_scale=unit_scale,
+        shapes=shapes,
+        material=debris_shapes.material_of(shapes),
+    )
     modifier: Any = obj.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
     for name, value in (_AT_FIRST | kept).items():
@@ -110,13 +117,11 @@ def remove(ground: bpy.types.Object) -> None:
 
 
 def _settings_of(obj: bpy.types.Object) -> dict[str, Any]:
-    """What the artist set of the older debris: wind, amount, and shapes of their own."""
+    """What the artist set of the older debris: wind, amount, how many are shaped, and shapes of their own."""
     for modifier in obj.modifiers:
         group = getattr(modifier, "node_group", None)
         if group is not None and group.get(nodes.MARK):
-            values = {
-                name: compat.read_input(modifier, socket_of(group, name)) for name in ("Wind", "Amount", "Shapes")
-            }
+            values = {name: compat.read_input(modifier, socket_of(group, name)) for name in (*_AT_FIRST, "Shapes")}
             if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):
                 values["Shapes"] = None
             # Vectors belong to the modifier, and go with it.
@@ -131,20 +136,27 @@ def socket_of(group: Any, name: str) -> str:
     return next(str(item.identifier) for item in items if item.name == name and item.in_out == "INPUT")
 
 
-def _points(debris: Debris, time_stretch: float, unit_scale: float) -> bpy.types.Mesh:
+def _points(debris: Debris, time_stretch: float, gravity: float, unit_scale: float) -> bpy.types.Mesh:
+    """Points where the pieces come to rest, with what lets them fly there."""
+    rest = flight.position(debris.start, debris.velocity, debris.drag_time, debris.time, gravity)
+    rank = np.empty(len(debris.radius))
+    rank[np.argsort(-debris.radius, kind="stable")] = np.arange(len(rank))
+    order = np.argsort(rank >= nodes.SHAPED, kind="stable")  # then what is seen is one run of points, copied as such
     points = bpy.data.meshes.new(NAME)
     points.vertices.add(len(debris.birth))
-    points.vertices.foreach_set("co", (debris.start / unit_scale).astype(np.float32).ravel())
+    points.vertices.foreach_set("co", (rest / unit_scale)[order].astype(np.float32).ravel())
     columns: tuple[tuple[str, Any, str, Any], ...] = (
         (nodes.BIRTH, "FLOAT", "value", debris.birth * time_stretch),
         (nodes.FLIGHT, "FLOAT", "value", debris.time),
         (nodes.DRAG, "FLOAT", "value", debris.drag_time),
         (nodes.RADIUS, "FLOAT", "value", debris.radius / unit_scale),
+        (nodes.RANK, "FLOAT", "value", rank),
+        (nodes.START, "FLOAT_VECTOR", "vector", debris.start / unit_scale),
         (nodes.LAUNCH, "FLOAT_VECTOR", "vector", debris.velocity / unit_scale),
         (nodes.KIND, "INT", "value", debris.kind),
         (nodes.STEP, "INT", "value", debris.step),
     )
     for name, kind, field, values in columns:
         attribute: Any = points.attributes.new(name, kind, "POINT")
-        attribute.data.foreach_set(field, values.astype(np.int32 if kind == "INT" else np.float32).ravel())
+        attribute.data.foreach_set(field, values[order].astype(np.int32 if kind == "INT" else np.float32).ravel())
     return points

@@ -41,6 +41,13 @@ def collection_of(surface: str) -> bpy.types.Collection:
     return shapes
 
 
+def material_of(shapes: bpy.types.Collection) -> bpy.types.Material:
+    """The material of a collection from `collection_of`."""
+    material = shapes.objects[0].active_material
+    assert material is not None
+    return material
+
+
 def remove(shapes: bpy.types.Collection) -> None:
     """Take a collection from `collection_of` away with what is in it."""
     for obj in list(shapes.objects):

@@ -140,7 +140,7 @@ def _wind(layout: Any, ground: Any) -> None:
     debris = debris_object.of(ground)
     if debris is None:
         return
-    for name in ("Wind", "Amount"):
+    for name in ("Wind", "Amount", "Shaped"):
         if (field := debris_object.field_of(debris, name)) is not None:
             layout.prop(*field, text=name)
 
