@@ -1,0 +1,79 @@
+"""What debris costs in a frame, against the bare frame of a walk and an instance for each piece; in turns."""
+
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender.after import debris_object
+from softground_addon.core.after.debris import Debris
+from tests.benchmarks.test_playback_speed import heavy_walker
+
+pytestmark = pytest.mark.benchmark
+
+FRAMES = 120
+TURNS = 8
+TIMED = np.random.default_rng(0).permutation(np.arange(2, FRAMES))[:30]
+
+
+def thrown(count):
+    """Pieces whose births are spread over a shot."""
+    random = np.random.default_rng(0)
+    return Debris(
+        birth=np.sort(random.uniform(1, FRAMES, count)),
+        start=random.uniform(-3, 3, (count, 3)),
+        velocity=random.normal(0, 1, (count, 3)),
+        drag_time=random.uniform(0.05, 0.5, count),
+        time=random.uniform(0.05, 0.8, count),
+        radius=random.uniform(0.001, 0.01, count),
+        kind=random.integers(0, 3, count).astype(np.int32),
+        step=np.sort(random.integers(0, 50, count)).astype(np.int32),
+        volume=np.zeros(50),
+        masses={},
+    )
+
+
+def put(scene, count):
+    parent = bpy.data.objects.new("Ground", None)
+    scene.collection.objects.link(parent)
+    about = {"frame_rate": 24.0, "time_stretch": 1.0, "gravity": 9.81, "unit_scale": 1.0}
+    return debris_object.put(parent, thrown(count), surface="snow", **about)
+
+
+def an_instance_each(obj):
+    """A copy in which every piece has a shape."""
+    copy = obj.copy()
+    modifier = copy.modifiers[0]
+    debris_object.compat.write_input(modifier, debris_object.socket_of(modifier.node_group, "Shaped"), 10**7)
+    bpy.context.scene.collection.objects.link(copy)
+    return copy
+
+
+def played(scene, shown, others):
+    """Milliseconds of each frame, (F,)."""
+    for other in others:
+        other.hide_viewport = other != shown
+    scene.frame_set(1)
+    taken = []
+    for frame in TIMED:
+        started = time.perf_counter()
+        scene.frame_set(int(frame))
+        taken.append(time.perf_counter() - started)
+    return np.array(taken) * 1e3
+
+
+@pytest.mark.parametrize(("count", "limit"), [(50_000, 2.0), (300_000, 9.0)])
+def test_debris_costs_little_beside_the_bare_frame_of_a_walk(scene, count, limit):
+    heavy_walker(scene, FRAMES)
+    debris = put(scene, count)
+    each = an_instance_each(debris)
+    contestants = {"bare": None, "debris": debris, "an instance each": each}
+    turns = [{name: played(scene, shown, (debris, each)) for name, shown in contestants.items()} for _ in range(TURNS)]
+    least = {name: float(np.min([turn[name] for turn in turns], axis=0).mean()) for name in contestants}
+    bare = least["bare"]
+    print(f"\n{count:,} pieces")
+    for name, value in least.items():
+        print(f"  {name:18s} {value:7.2f} ms, {value - bare:7.2f} ms more, {value / bare:5.2f} x bare")
+    assert least["debris"] - bare <= limit * bare
+    assert least["debris"] - bare <= 0.4 * (least["an instance each"] - bare)
