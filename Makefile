@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes gallery test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
+.PHONY: ready blenders demo scenes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -34,6 +34,12 @@ scenes: $(READY)
 # The same, and then the pictures into docs/images and the small .blend files into sample_scenes.
 gallery: scenes
 	$(BIN)/python -m sample_scenes.publish
+
+# The moving picture of the README, and the small ones of the preset menu.
+moving: $(READY)
+	$(BIN)/python -m sample_scenes.moving_picture --output build/moving --samples 8
+	cp build/moving/moving_picture.webp docs/images/
+	$(BIN)/python -m sample_scenes.preset_pictures
 
 # Processes side by side gain nothing from threads that wait for each other's processors.
 test slow marathon: export OPENBLAS_NUM_THREADS := 1

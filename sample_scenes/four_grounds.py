@@ -6,6 +6,7 @@ the pressure rolls from the heel to the toes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, radians, sin
 from pathlib import Path
@@ -41,14 +42,19 @@ class FourGrounds:
     walkers: list[bpy.types.Object]
 
 
-def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> FourGrounds:
+def build(
+    scene: bpy.types.Scene,
+    cell_size: float | None = CELL_SIZE,
+    options: Options | None = None,
+    presets: Sequence[str] | None = None,
+) -> FourGrounds:
     """The same short walk on each preset."""
     body = Body()
     first = create_character("Hiker", body, scene.collection, production.COARSENESS)
     write_action(first, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     bakes, walkers = {}, []
-    for number, preset in enumerate(PRESETS):
+    for number, preset in enumerate(presets or PRESETS):
         walker = copy_character(first, f"Hiker {preset}", scene.collection)
         walker.location.x = number * SPACING
         chosen = {"shape_keys": "false"} | dict(options or {})

@@ -22,6 +22,7 @@ from .interface import (
     overlay,
     panels,
     prediction,
+    preset_icons,
     preset_menu,
     response_panel,
     sample_scene,
@@ -90,6 +91,7 @@ def register() -> None:
         undo.callback(depth_field.clear)
         undo.callback(prediction.unregister)
         undo.callback(outdated.forget)
+        undo.callback(preset_icons.unregister)
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())

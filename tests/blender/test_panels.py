@@ -1,6 +1,8 @@
 """Panels, presets and the depth to expect, as far as they can be seen without a window."""
 
 import json
+import time
+from dataclasses import replace
 from unittest.mock import MagicMock
 
 import bpy
@@ -8,7 +10,14 @@ import pytest
 
 from softground_addon.blender import jobs, registration
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.interface import bake_result, ground_options_panel, panels, prediction, preset_menu
+from softground_addon.blender.interface import (
+    bake_result,
+    ground_options_panel,
+    panels,
+    prediction,
+    preset_icons,
+    preset_menu,
+)
 from softground_addon.blender.reading import analysis
 from softground_addon.core.ground import presets
 from tests.blender.shots import import_motion, walker
@@ -229,6 +238,34 @@ def test_broken_preset_files_are_left_out_with_a_message(user_folder):
     assert [path.name for path, _ in found] == ["good.json"]
     assert len(broken) == 2
     assert all("json" in message for message in broken)
+
+
+def rows_of_the_menu():
+    """The presets in the menu, each with what its button is given; and how long it took [s]."""
+    menu = MagicMock()
+    started = time.perf_counter()
+    preset_menu.SOFTGROUND_MT_presets.draw(menu, bpy.context)
+    took = time.perf_counter() - started
+    return {call.kwargs["text"]: call.kwargs for call in menu.layout.operator.call_args_list}, took
+
+
+def test_each_preset_has_a_picture_in_the_menu(addon, user_folder):
+    (user_folder / "good.json").write_text(presets.dump(replace(presets.find("snow"), name="My Bog")))
+    (user_folder / "odd.json").write_text(presets.dump(replace(presets.find("snow"), name="My Heath")))
+    (user_folder / "odd.png").write_bytes(b"no picture")
+    rows, _ = rows_of_the_menu()
+    pictures = [row.get("icon_value", 0) for name, row in rows.items() if not name.startswith("My ")]
+    assert all(pictures)
+    assert len(set(pictures)) == len(pictures) == len(list(presets.FOLDER.glob("*.json")))
+    assert rows["My Bog"]["icon"] == "BLANK1"
+    assert rows["My Heath"]["text"] == "My Heath"
+    preset_icons.unregister()
+    assert preset_icons.of(presets.FOLDER / "snow.json")  # they are read again where they are asked for
+    assert sum(path.stat().st_size for path in presets.FOLDER.glob("*.png")) < 200_000
+
+
+def test_the_preset_menu_opens_at_once(addon, user_folder):
+    assert min(rows_of_the_menu()[1] for _ in range(5)) < 0.020
 
 
 def test_characters_and_soles_can_be_corrected(shot):

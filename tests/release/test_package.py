@@ -32,7 +32,7 @@ def sources(folder):
 
 
 def test_it_holds_the_extension_and_nothing_else(built):
-    code = [path for kind in ("*.py", "*.json") for path in (ROOT / "softground_addon").rglob(kind)]
+    code = [path for kind in ("*.py", "*.json", "*.png") for path in (ROOT / "softground_addon").rglob(kind)]
     about = ("blender_manifest.toml", "__init__.py", "README.md", "LICENSE", "CHANGELOG.md")
     with zipfile.ZipFile(built) as archive:
         assert archive.namelist() == sorted([*about, *(path.relative_to(ROOT).as_posix() for path in code)])

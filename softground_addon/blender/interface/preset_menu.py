@@ -17,6 +17,7 @@ from ..characters.character_setup import characters_of, title_of
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..settings import user_folder
+from . import preset_icons
 
 
 def listed(folder: Path) -> tuple[list[tuple[Path, presets.Preset]], list[str]]:
@@ -64,7 +65,9 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
             if folder != presets.FOLDER and (found or broken):
                 layout.separator()
             for path, preset in found:
-                entry = layout.operator("softground.load_preset", text=preset.name, translate=folder == presets.FOLDER)
+                is_ours, picture = folder == presets.FOLDER, preset_icons.of(path)
+                shown = {"icon_value": picture} if picture else {"icon": "BLANK1"}
+                entry = layout.operator("softground.load_preset", text=preset.name, translate=is_ours, **shown)
                 entry.filepath = str(path)
             for message in broken:
                 layout.label(text=message, icon="ERROR", translate=False)
