@@ -1,5 +1,7 @@
 """After a bake of prints alone the panel says how far feet float, and one button lets them down."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import pytest
 
@@ -7,6 +9,7 @@ from softground_addon.blender import jobs
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking import bake_job, bake_report, sink_feet
 from softground_addon.blender.characters.selection import set_up_automatically
+from softground_addon.blender.interface import bake_result
 from softground_addon.blender.reading import analysis
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
@@ -166,3 +169,31 @@ def test_clear_bake_switches_off_what_the_button_has_switched_on_and_nothing_els
     bpy.ops.softground.sink_feet()
     bpy.ops.softground.clear_bake()
     assert options.grounding.use
+
+
+def test_the_action_is_named_while_it_waits_below_the_layer_and_comes_back_as_it_was(first_walk):
+    options = first_walk.softground
+    armature = options.characters[0].armature
+    action = armature.animation_data.action
+    before = fingerprints.of_action(action), fingerprints.of_object(armature)
+
+    def shown():
+        layout = MagicMock()
+        bake_result._moved_action(layout, options.characters[0])
+        return [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith("label")]
+
+    assert shown() == []
+    for take_off in ("untick", "clear"):
+        options.sink_feet = True
+        bpy.ops.softground.bake()
+        assert armature.animation_data.action is None
+        (line,) = shown()
+        assert f"'{action.name}'" in line
+        assert "NLA" in line
+        if take_off == "untick":
+            options.sink_feet = False
+            bpy.ops.softground.bake()
+        else:
+            bpy.ops.softground.clear_bake()
+        assert (fingerprints.of_action(action), fingerprints.of_object(armature)) == before
+        assert shown() == []

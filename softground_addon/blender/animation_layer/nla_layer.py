@@ -185,6 +185,12 @@ def without_layer(obj: bpy.types.Object) -> Iterator[None]:
                 track.mute = False
 
 
+def moved_action(obj: bpy.types.Object) -> bpy.types.Action | None:
+    """The user's action where it waits on a track below the layer; None where it is still the active one."""
+    strip = _strip(obj, SOURCE)
+    return strip.action if strip else None
+
+
 def own_action(obj: bpy.types.Object) -> tuple[bpy.types.Action | None, Any]:
     """The user's active action and its slot, also where a copy of it is at work."""
     if copied_action.is_on(obj):

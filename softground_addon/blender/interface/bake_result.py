@@ -10,17 +10,19 @@ from typing import Any
 import bpy
 
 from .. import settings
+from ..animation_layer import nla_layer
 from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
 from ..response import response_job
 
 
-def draw(layout: Any, options: Any, summary: Any) -> None:
-    """Show the summary of a bake, how many warnings there are, and feet that float."""
+def draw(layout: Any, options: Any, summary: Any, character: Any) -> None:
+    """Show the summary of a bake, how many warnings there are, feet that float, and where a character's action is."""
     _result(layout, summary)
     _warnings(layout, ground_mesh.warnings_of(baked_ground.display_mesh_of(options.ground)))
     _floating_feet(layout, options, summary)
+    _moved_action(layout, character)
 
 
 def _result(layout: Any, summary: Any) -> None:
@@ -55,6 +57,15 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)
     box.label(text="above their prints", icon="BLANK1")
     box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
+
+
+def _moved_action(layout: Any, character: Any) -> None:
+    """Where the action of a character is while the layer of keys lies on it."""
+    action = nla_layer.moved_action(character.armature) if character and character.armature else None
+    if action is not None:
+        row = layout.row()
+        row.active = False
+        row.label(text=f"'{action.name}' is in the NLA Editor, under the sunk feet", icon="NLA", translate=False)
 
 
 class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):

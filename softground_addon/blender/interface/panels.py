@@ -277,7 +277,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         row.operator("softground.go_to_last_step", text="Last Step", icon="NEXT_KEYFRAME")
         row.operator("softground.clear_bake", icon="TRASH")
         if summary:
-            bake_result.draw(layout, options, summary)
+            bake_result.draw(layout, options, summary, active_character(settings.scene_of(context)))
             for reason in state.stale.splitlines():
                 layout.label(text=reason, icon="ERROR", translate=False)
         if apart := _apart_from_scene(settings.scene_of(context)):
