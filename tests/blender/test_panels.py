@@ -249,19 +249,26 @@ def rows_of_the_menu():
     return {call.kwargs["text"]: call.kwargs for call in menu.layout.operator.call_args_list}, took
 
 
-def test_each_preset_has_a_picture_in_the_menu(addon, user_folder):
-    (user_folder / "good.json").write_text(presets.dump(replace(presets.find("snow"), name="My Bog")))
-    (user_folder / "odd.json").write_text(presets.dump(replace(presets.find("snow"), name="My Heath")))
-    (user_folder / "odd.png").write_bytes(b"no picture")
+def test_each_preset_has_a_picture_for_the_menu(addon, user_folder, monkeypatch):
+    for name in ("My Bog", "My Heath"):
+        (user_folder / f"{name}.json").write_text(presets.dump(replace(presets.find("snow"), name=name)))
+    (user_folder / "My Heath.png").write_bytes(b"no picture")
+    paths = sorted(presets.FOLDER.glob("*.json"))
+    assert all(tuple(preset_icons.read(path).image_size) == (96, 96) for path in paths)
+    assert sum(path.with_suffix(".png").stat().st_size for path in paths) < 200_000
+    assert {row["icon"] for row in rows_of_the_menu()[0].values()} == {"BLANK1"}  # without a window there are no icons
+    monkeypatch.setattr(preset_icons, "of", lambda path: 1 + paths.index(path) if path in paths else 0)
     rows, _ = rows_of_the_menu()
-    pictures = [row.get("icon_value", 0) for name, row in rows.items() if not name.startswith("My ")]
-    assert all(pictures)
-    assert len(set(pictures)) == len(pictures) == len(list(presets.FOLDER.glob("*.json")))
-    assert rows["My Bog"]["icon"] == "BLANK1"
-    assert rows["My Heath"]["text"] == "My Heath"
+    assert sorted(row["icon_value"] for row in rows.values() if "icon" not in row) == [1 + n for n in range(len(paths))]
+    assert rows["My Bog"]["icon"] == rows["My Heath"]["icon"] == "BLANK1"
+
+
+def test_pictures_that_were_freed_are_read_again(addon):
+    snow = presets.FOLDER / "snow.json"
+    assert preset_icons.read(snow)
     preset_icons.unregister()
-    assert preset_icons.of(presets.FOLDER / "snow.json")  # they are read again where they are asked for
-    assert sum(path.stat().st_size for path in presets.FOLDER.glob("*.png")) < 200_000
+    assert not preset_icons._shown
+    assert preset_icons.read(snow)
 
 
 def test_the_preset_menu_opens_at_once(addon, user_folder):

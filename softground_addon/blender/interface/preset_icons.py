@@ -12,16 +12,22 @@ _shown: list[bpy.utils.previews.ImagePreviewCollection] = []
 
 
 def of(preset: Path) -> int:
-    """The number of a preset's picture, as `icon_value` takes it; 0, which shows none, where there is none."""
+    """The number of a preset's picture, as `icon_value` takes it; 0 where there is none, or no window to show it."""
+    picture = read(preset)
+    return int(picture.icon_id) if picture else 0
+
+
+def read(preset: Path) -> bpy.types.ImagePreview | None:
+    """The picture beside a preset's file; None where there is none."""
     picture, key = preset.with_suffix(".png"), str(preset)
     if not picture.is_file():
-        return 0
+        return None
     if not _shown:
         _shown.append(bpy.utils.previews.new())
     if key not in _shown[0]:
         with suppress(OSError, KeyError):
             _shown[0].load(key, str(picture), "IMAGE")
-    return int(_shown[0][key].icon_id) if key in _shown[0] else 0
+    return _shown[0].get(key)
 
 
 def unregister() -> None:
