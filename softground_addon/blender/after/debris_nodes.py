@@ -217,11 +217,11 @@ class _Graph:
         self.link(second, node.inputs["B"])
         return node.outputs["Result"]
 
-    def logic(self, operation: str, first: Any, second: Any = False) -> Any:
+    def logic(self, operation: str, *operands: Any) -> Any:
         node = self.node("FunctionNodeBooleanMath")
         node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
+        for operand, socket in zip(operands, node.inputs, strict=False):  # for one there may be two sockets
+            self.link(operand, socket)
         return node.outputs["Boolean"]
 
     def switch(self, condition: Any, otherwise: Any, then: Any) -> Any:
