@@ -65,7 +65,7 @@ def _moved_action(layout: Any, character: Any) -> None:
     if action is not None:
         row = layout.row()
         row.active = False
-        row.label(text=f"'{action.name}' is in the NLA Editor, under the sunk feet", icon="NLA", translate=False)
+        row.label(text=f"Action in the NLA: {action.name}", icon="NLA", translate=False)
 
 
 class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
