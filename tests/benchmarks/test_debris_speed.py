@@ -63,7 +63,7 @@ def played(scene, shown, others):
     return np.array(taken) * 1e3
 
 
-@pytest.mark.parametrize(("count", "limit"), [(50_000, 2.0), (300_000, 9.0)])
+@pytest.mark.parametrize(("count", "limit"), [(50_000, 3.0), (300_000, 9.0)])
 def test_debris_costs_little_beside_the_bare_frame_of_a_walk(scene, count, limit):
     heavy_walker(scene, FRAMES)
     debris = put(scene, count)
@@ -76,4 +76,4 @@ def test_debris_costs_little_beside_the_bare_frame_of_a_walk(scene, count, limit
     for name, value in least.items():
         print(f"  {name:18s} {value:7.2f} ms, {value - bare:7.2f} ms more, {value / bare:5.2f} x bare")
     assert least["debris"] - bare <= limit * bare
-    assert least["debris"] - bare <= 0.4 * (least["an instance each"] - bare)
+    assert least["debris"] - bare <= 0.5 * (least["an instance each"] - bare)
