@@ -1,4 +1,4 @@
-"""The command line: `softground bake`, `export` and `batch`, in `blender --command` and with the bpy module alike."""
+"""The command line: `softground bake`, `clean`, `export` and `batch`, in `blender --command` and with the bpy module alike."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ...core.ground import presets
 from ...core.record.archive import LARGEST_TEXT
 from ...core.record.edits import StepEdit, from_json
 from .. import jobs, settings
-from ..baking import bake_job
+from ..baking import bake_job, clean_feet
 from ..characters.selection import set_up_automatically
 from ..output import export_formats
 from ..settings import user_folder
@@ -84,6 +84,8 @@ def _exit_code(arguments: Sequence[str], *, standalone: bool) -> int:
             return _batch_code(command.bake_batch(options, program.made_by(), program.worker_command))
         if options.command == "export":
             _export(options)
+        elif options.command == "clean":
+            _clean(options)
         else:
             _bake(options)
     except SystemExit as leaving:  # argparse has printed its message
@@ -156,6 +158,29 @@ def _bake(options: argparse.Namespace) -> None:
         print(json.dumps(said), flush=True)
     if options.progress in ("plain", "openjd"):
         print(report.summary(result.report), flush=True)
+
+
+def _clean(options: argparse.Namespace) -> None:
+    if not (options.save or options.in_place or options.report):
+        raise InputError("Nothing would be kept: give --save FILE.blend, --in-place or --report FILE.json.")
+    if options.blend is not None:
+        _open(options.blend)
+    scene = _scene(options.scene)
+    target = _save_target(options)
+    _check_places(options, target)
+    set_up_automatically(scene)
+    if options.frames:
+        scene.softground.frame_start, scene.softground.frame_end = options.frames
+    cleaned = jobs.run(clean_feet.clean_feet(scene))
+    with contextlib.ExitStack() as results:
+        if target:
+            _save_copy(results.enter_context(files.replacing(target)))
+        if options.report:
+            path = results.enter_context(files.replacing(Path(os.path.realpath(options.report))))
+            path.write_text(report.dump(cleaned.as_dict()), encoding="utf-8")
+    print(cleaned.summary, flush=True)
+    for warning in cleaned.warnings:
+        print(f"softground: {warning}", file=sys.stderr)
 
 
 def _export(options: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""What may be typed after `softground`: the options of `bake`, `export` and `batch`."""
+"""What may be typed after `softground`: the options of `bake`, `clean`, `export` and `batch`."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ def _parser(*, standalone: bool) -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     _add_bake(commands.add_parser("bake", help="bake the footprints of a shot"), standalone=standalone)
+    _add_clean(commands.add_parser("clean", help="take sliding and floating out of the feet"), standalone=standalone)
     _add_export(commands.add_parser("export", help="write a baked ground for other programs"), standalone=standalone)
     command.add_arguments(commands.add_parser("batch", help="bake the shots of a manifest side by side; resumable"))
     return parser
@@ -75,6 +76,18 @@ def _add_bake(bake: argparse.ArgumentParser, *, standalone: bool) -> None:
     )
     bake.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this parent process has ended")
     bake.set_defaults(blend=None)
+
+
+def _add_clean(clean: argparse.ArgumentParser, *, standalone: bool) -> None:
+    if standalone:
+        clean.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file whose feet to clean")
+    clean.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
+    clean.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
+    destination = clean.add_mutually_exclusive_group()
+    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the shot with its layer as this")
+    destination.add_argument("--in-place", action="store_true", help="save the shot over the opened file")
+    clean.add_argument("--report", type=Path, metavar="FILE.json", help="write what the feet did before and after")
+    clean.set_defaults(blend=None, preset=None, edits=None, receipt=None)
 
 
 def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:

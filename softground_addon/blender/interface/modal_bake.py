@@ -11,7 +11,7 @@ import bpy
 from ...core.errors import InputError, SoftGroundError
 from ...core.settings import ObjectName
 from .. import jobs, session, settings
-from ..baking import bake_job, sink_feet
+from ..baking import bake_job, clean_feet, sink_feet
 from ..characters.character_setup import characters_of
 from ..operator_base import reports_errors
 from ..reading import analysis
@@ -64,6 +64,9 @@ class ModalJob(bpy.types.Operator):
     cancelled: ClassVar[str]
     """What to say when the user has left the job."""
 
+    stage_names: ClassVar[dict[str, str]] = STAGE_NAMES
+    """What the status bar says of each stage."""
+
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Whether no other job runs."""
@@ -106,7 +109,7 @@ class ModalJob(bpy.types.Operator):
         self._timer = manager.event_timer_add(TIMER_STEP, window=context.window)
         self._workspace = context.workspace.name
         manager.progress_begin(0.0, 1.0)
-        self._show_status(0.0, STAGE_NAMES["sample"])
+        self._show_status(0.0, self.stage_names["sample"])
         manager.modal_handler_add(self)
         _running.append(self)
         for window in manager.windows:
@@ -192,7 +195,7 @@ class ModalJob(bpy.types.Operator):
         passed = time.perf_counter() - self._started
         left = passed * (1.0 - done) / max(done, 1e-3)
         bpy.context.window_manager.progress_update(done)
-        self._show_status(done, f"{STAGE_NAMES[progress.stage]}: {max(1, round(left))} s left")
+        self._show_status(done, f"{self.stage_names[progress.stage]}: {max(1, round(left))} s left")
 
     def _show_status(self, progress: float, status: str) -> None:
         self._write_status_bar(f"{self.bl_label} {progress:.0%}  |  {status}  |  [Esc] Cancel")
@@ -299,6 +302,27 @@ class SOFTGROUND_OT_sink_feet(_Bake):
         self.report({"INFO"}, f"Feet stand on their prints; the largest gap left is {largest:.1f} mm")
 
 
+class SOFTGROUND_OT_clean_feet(_Bake):
+    """Let feet stand still where they stand: no sliding, no floating, no sinking, on the ground as a hard floor or on a
+    flat one. Hips and legs follow, as a layer above the animation that Clear Bake takes off. Esc cancels"""
+
+    bl_idname = "softground.clean_feet"
+    bl_label = "Clean Feet"
+    cancelled = "Clean Feet cancelled: nothing was changed"
+    stage_names: ClassVar[dict[str, str]] = STAGE_NAMES | {
+        "simulate": "Setting the feet down",
+        "write": "Writing the layer",
+    }
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[clean_feet.CleanFeet]:
+        return clean_feet.clean_feet(scene)
+
+    def _show(self, result: clean_feet.CleanFeet) -> None:
+        self.report({"INFO"}, result.summary)
+        for warning in result.warnings:
+            self.report({"WARNING"}, warning)
+
+
 class SOFTGROUND_OT_hold_window(bpy.types.Operator):
     """Let nothing be changed from a window while a bake runs in another one"""
 
@@ -401,6 +425,7 @@ CLASSES = (
     SOFTGROUND_OT_bake,
     SOFTGROUND_OT_bake_again,
     SOFTGROUND_OT_sink_feet,
+    SOFTGROUND_OT_clean_feet,
     SOFTGROUND_OT_hold_window,
     SOFTGROUND_OT_cancel_bake,
 )

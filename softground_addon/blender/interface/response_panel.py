@@ -107,6 +107,7 @@ class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         scene = settings.scene_of(context)
         options, character = scene.softground, active_character(scene)
+        layout.operator("softground.clean_feet", icon="CON_FLOOR")
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
         column.separator()

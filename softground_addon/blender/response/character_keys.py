@@ -45,6 +45,7 @@ def response_curves(
     *,
     metre: float,
     stretch: float,
+    accuracy: float = 1.0,
 ) -> Generator[int, None, list[LayerCurve]]:
     """The keys that make a rig respond.
 
@@ -59,6 +60,8 @@ def response_curves(
         Blender unit [m].
     stretch : float
         Frames of the animation per frame of the scene.
+    accuracy : float
+        Part of `ANGLE_TOLERANCE` and `LENGTH_TOLERANCE` that keys may be off by.
 
     Yields
     ------
@@ -69,7 +72,7 @@ def response_curves(
     curves: list[LayerCurve] = []
     for done, control in enumerate(rig.controls):
         if control.part in moved and (not control.carried_by or control.carried_by in moved):
-            curves += _bone_curves(found(armature), control, rig.poses, moved, motion.frames * stretch, metre)
+            curves += _bone_curves(found(armature), control, rig.poses, moved, motion.frames * stretch, metre, accuracy)
         yield done + 1
     return curves
 
@@ -116,6 +119,7 @@ def _bone_curves(
     moved: dict[str, Array],
     frames: Array,
     metre: float,
+    accuracy: float,
 ) -> list[LayerCurve]:
     bone, pose = armature.pose.bones[control.bone], poses.bones[control.bone]
     basis = _basis(bone.rotation_mode, pose)
@@ -131,9 +135,9 @@ def _bone_curves(
     curves = []
     if control.moves:
         offset = new[:, :3, 3] - pose.location
-        curves += _curves(path + "location", control.bone, frames, offset, LENGTH_TOLERANCE / max(size, 1e-12))
+        curves += _curves(path + "location", control.bone, frames, offset, accuracy * LENGTH_TOLERANCE / max(size, 1e-12))
     name, values, tolerance = _rotation_layer(bone.rotation_mode, pose, _pure_rotation(new))
-    return curves + _curves(path + name, control.bone, frames, values, tolerance)
+    return curves + _curves(path + name, control.bone, frames, values, accuracy * tolerance)
 
 
 def _curves(path: str, bone: str, frames: Array, values: Array, tolerance: float) -> list[LayerCurve]:

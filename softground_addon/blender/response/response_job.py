@@ -185,7 +185,11 @@ def responses_of(
 
 
 def layers_of(
-    wanted: BakeSettings, rigs: Sequence[ReadRig], responses: Sequence[CharacterResponse]
+    wanted: BakeSettings,
+    rigs: Sequence[ReadRig],
+    responses: Sequence[CharacterResponse],
+    *,
+    accuracy: float = 1.0,
 ) -> Job[list[Layer]]:
     """The keys of each character's layer, of rigs as they were read; none without responses."""
     layers: list[Layer] = []
@@ -198,6 +202,7 @@ def layers_of(
             character.response,
             metre=wanted.unit_scale_m,
             stretch=wanted.time_stretch,
+            accuracy=accuracy,
         )
         count, parts = len(rig.controls), len(responses)
         curves = yield from counted(work, "write", count, part=number, parts=parts, share=SHARE_OF_WRITING)

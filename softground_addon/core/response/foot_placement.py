@@ -116,6 +116,7 @@ def place_sole(
     heel_rise: Array | None = None,
     change: Array | None = None,
     clearance: Array | None = None,
+    points: Array | None = None,
 ) -> Placement:
     """Put a sole on the ground.
 
@@ -143,6 +144,8 @@ def place_sole(
         Further displacement, 0 while it touches [m].
     clearance : (F,) float array, optional
         How far above the ground its lowest point should be while it touches [m].
+    points : (F, Q, 3) float array, optional
+        Of the sole, that the ground is read under; by default those inside its edge, as in a print with soft edges [m].
 
     Returns
     -------
@@ -150,14 +153,16 @@ def place_sole(
         Without effect where the sole never touches.
     """
     sole, frames = motion.soles[number], motion.frames
-    points = posed_points(sole)
+    points = posed_points(sole) if points is None else points
     if not touching.any():
         carry = np.broadcast_to(np.eye(4), (len(frames), 4, 4)).copy()
         return Placement(carry, np.zeros(len(frames)), np.zeros(len(frames)), np.full(len(frames), np.inf))
     pivot = np.einsum("fq,fqi->fi", _lowest(points, PIVOT_DEPTH), points)
     slide = lock * slide_offset(points, touching) if lock else np.zeros_like(pivot)
     width = ALIGN_TIME * motion.adult_second
-    alignment = _alignment(sole, points + slide[:, None], touching, ground, undisturbed, frames, width)
+    alignment = np.zeros_like(pivot)
+    if align:
+        alignment = _alignment(sole, points + slide[:, None], touching, ground, undisturbed, frames, width)
     turn = rotation(align * alignment)
     carry = displacement(turn, pivot, pivot + slide)
     if heel_rise is not None:
@@ -166,14 +171,14 @@ def place_sole(
         carry = displacement(rotation(heel_rise[:, None] * across), toes, toes) @ carry
     turned = carried(carry[:, None], points)
     needed = -lowest_clearance(turned, ground, frames)
+    on_top = needed if undisturbed is ground else -lowest_clearance(turned, undisturbed, frames)
     if clearance is not None:
         needed = np.where(touching, needed + clearance, needed)
-    lift = _between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
+    lift = between_contacts(np.where(np.isfinite(needed), needed, 0.0), touching, upward=True)
     lift += _swing_clearance(needed - lift, touching, max(1, round(CLEAR_TIME * motion.adult_second)))
     carry[:, 2, 3] += lift
     if change is not None:
         carry[:, :3, 3] += change
-    on_top = -lowest_clearance(turned, undisturbed, frames)
     stands = touching & np.isfinite(on_top)
     sinkage = np.maximum(np.subtract(on_top, needed, out=np.zeros_like(needed), where=stands), 0.0)
     room = np.where(touching, 0.0, np.maximum(lift - needed, 0.0))
@@ -209,7 +214,7 @@ def slide_offset(points: Array, touching: Mask) -> Array:
     for first, end in zip(*runs(touching), strict=True):
         slid = np.cumsum(np.concatenate([np.zeros((1, 3)), step[first + 1 : end]]), axis=0)
         offset[first:end] = slid[len(slid) // 2] - slid
-    return np.stack([_between_contacts(offset[:, i], touching) for i in range(3)], axis=-1)
+    return np.stack([between_contacts(offset[:, i], touching) for i in range(3)], axis=-1)
 
 
 def _alignment(
@@ -257,7 +262,7 @@ def _posed_for(motion: SoleMotion, points: Array, touching: Mask, undisturbed: P
     return posed
 
 
-def _between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> Array:
+def between_contacts(values: Array, touching: Mask, *, upward: bool = False) -> Array:
     """Values (F,) of the contacts, with a cubic from the end of each to the start of the next; the ends held.
 
     With `upward`, a value that falls at the end of a contact or will rise after the start of one does not go on so

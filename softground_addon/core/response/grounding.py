@@ -127,10 +127,10 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
     unsunk = np.stack([placement.lift for placement in placements.values()], axis=1) + sinkage
     deeper = np.exp((sinkage - sinkage.max(axis=1, keepdims=True)) / (LOWER_FOOT * motion.leg_length))
     width = HIPS_TIME * motion.adult_second
-    return _mean_over_time(unsunk, load, width) - _mean_over_time(sinkage, load * deeper, width)
+    return mean_over_time(unsunk, load, width) - mean_over_time(sinkage, load * deeper, width)
 
 
-def _mean_over_time(values: Array, weights: Array, width: float) -> Array:
+def mean_over_time(values: Array, weights: Array, width: float) -> Array:
     """Weighted mean (F,) of values (F, S) under a Gaussian over time, straight where nothing has weight for long."""
     total = smoothed(weights.sum(axis=1), width)
     known = np.flatnonzero(total > 1e-3 * max(float(total.max()), 1e-12))
@@ -148,6 +148,8 @@ def settle(
     lean: Array,
     *,
     crouch: Array | None = None,
+    level: Array | None = None,
+    source_pace: bool = False,
 ) -> Slices[Response]:
     """Bring the hips to where they belong and solve the legs.
 
@@ -162,8 +164,14 @@ def settle(
         Angle that the body leans toward +x and +y [rad], pivoting about the ground below the hips.
     crouch : (F,) float array, optional
         How much deeper the hips go by choice [m].
+    level : (F, 2) float array, optional
+        How far the hips move along the ground [m].
+    source_pace : bool
+        Whether knees may turn as fast as the fastest of the source, and no faster.
     """
     tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
+    if level is not None:
+        raised[:, :2] += level
     legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
     ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
     short = np.zeros(len(motion.frames))
@@ -188,6 +196,7 @@ def settle(
             step=motion.time_step,
             time_scale=motion.time_scale,
             leg_length=motion.leg_length,
+            as_source=source_pace,
         )
         raised[:, 2] += relief.hips
     body = tilted.copy()

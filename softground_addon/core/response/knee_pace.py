@@ -49,6 +49,10 @@ TOO_FAST = 300.0
 OUT_OF_REACH = 1e3
 """What an ankle out of reach costs beside a knee that is too fast, per leg length and radian."""
 STEPS = 14
+FIRM = 100.0
+"""How many times more it costs where no knee may turn faster than the fastest of the source."""
+FURTHER_STEPS = 12
+"""How many more steps that takes."""
 _PARTS = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
 """Parts of a step that are tried until one of them is better: nearly straight knees are far from linear."""
 
@@ -95,7 +99,9 @@ class Relief:
 
 
 @sliced
-def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float) -> Slices[Relief]:
+def relieve(
+    legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg_length: float, as_source: bool = False
+) -> Slices[Relief]:
     """The least and smoothest correction with which no knee turns too fast.
 
     Parameters
@@ -107,9 +113,15 @@ def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg
     time_scale : float
         How much slower than an adult's the motion is.
     leg_length : float [m]
+    as_source : bool
+        Whether a knee may turn as fast as the fastest of the source at any time, and no faster.
     """
     paced = list(legs.values())
-    paces = [_allowed_turn(leg, step, time_scale) for leg in paced]
+    if as_source:
+        fastest = max(float(np.abs(np.diff(leg.source.flexion)).max(initial=0.0)) for leg in paced)
+        paces = [np.full(len(leg.stands) - 1, fastest) for leg in paced]
+    else:
+        paces = [_allowed_turn(leg, step, time_scale) for leg in paced]
     bends = (SMOOTHING_TIME * time_scale / step) ** 2
     per_frame = _FRAME * time_scale / step
     change = np.zeros((len(paced[0].stands), 1 + len(paced)))  # of the hips, then of each foot
@@ -121,7 +133,8 @@ def relieve(legs: Mapping[str, PacedLeg], *, step: float, time_scale: float, leg
         return found
 
     if any(len(one.wanted) for one in violated(change, 1.0)):
-        for weight in np.geomspace(TOO_FAST / 100.0, TOO_FAST, STEPS):
+        steps, most = (STEPS + FURTHER_STEPS, FIRM * TOO_FAST) if as_source else (STEPS, TOO_FAST)
+        for weight in np.geomspace(TOO_FAST / 100.0, most, steps):
             yield
             now = violated(change, weight) + _small_and_smooth(change, paced, bends, leg_length)
             toward = _solution(now, change)

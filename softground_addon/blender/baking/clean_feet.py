@@ -1,0 +1,153 @@
+"""Feet that neither slide, float nor sink, as a layer: no soft ground is needed, and nothing is pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.loads.estimate import CharacterLoads
+from ...core.loads.sliding import treadmill_speed
+from ...core.motion.motion import CharacterMotion
+from ...core.response.clean_feet import FootFaults, clean, foot_faults
+from ...core.response.grounding import leg_soles, responding
+from ...core.response.response import at_scene_frames, gaps
+from ...core.settings import BakeSettings
+from ..characters.character_setup import characters_of
+from ..jobs import Job, Progress, meanwhile
+from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
+from ..response import response_job
+from ..response.character_keys import ReadRig
+from ..response.response_job import CharacterResponse
+
+EXACT = 0.1
+"""Keys are left out where straight lines stay within this part of the tolerance of other layers."""
+
+Faults = dict[str, dict[str, dict[str, dict[str, float]]]]
+"""Before and after: by character, slide, float and penetration, p95 and max [mm]."""
+
+
+@dataclass(frozen=True)
+class CleanFeet:
+    """What Clean Feet leaves behind beside the layers.
+
+    Attributes
+    ----------
+    feet : dict
+        "before" and "after": by character "slide", "float" and "penetration", each "p95" and "max" [mm].
+    warnings : tuple of str
+    """
+
+    feet: Faults
+    warnings: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"schema_version": 1, "feet": self.feet, "warnings": list(self.warnings)}
+
+    @property
+    def summary(self) -> str:
+        """In a line."""
+        largest = {
+            when: max(kind["slide"]["max"] for kind in of_one.values()) for when, of_one in self.feet.items() if of_one
+        }
+        gap = max(max(kind[of]["max"] for of in ("float", "penetration")) for kind in self.feet["after"].values())
+        return (
+            f"Feet slid by up to {largest['before']:.0f} mm, now by {largest['after']:.1f} mm; "
+            f"the largest gap left is {gap:.1f} mm"
+        )
+
+
+def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
+    """Put each character's feet where they stand, on the scene's ground as a hard floor, or else a flat one.
+
+    Raises
+    ------
+    SoftGroundError
+        If a shot cannot be read, or a rig cannot take the layer; nothing is changed then.
+    """
+    if not any(character.armature for character in characters_of(scene)):
+        raise InputError("No character here has feet to clean: add a character with an animated armature.")
+    wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
+    assert wanted.response is not None
+    wanted = replace(wanted, response=replace(wanted.response, tilt=None))
+    response_job.check_characters(wanted.characters)
+    shot = yield from read_shot(scene, wanted)
+    standing = yield from response_job.standing_on(shot.motions, shot.terrain, wanted.response)
+    loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
+    cleaned, feet = yield from _cleaned(shot, loads)
+    layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)
+    response_job.put_layers(scene, wanted, layers)
+    yield Progress("write", 1.0)
+    return CleanFeet(feet, _left_out(wanted, shot))
+
+
+def _cleaned(shot: Shot, loads: Sequence[CharacterLoads]) -> Job[tuple[list[CharacterResponse], Faults]]:
+    """Each rigged character's response, and what its feet did before and do after."""
+    found: list[CharacterResponse] = []
+    feet: Faults = {"before": {}, "after": {}}
+    now = Progress("simulate", 1.0)
+    rigged = [one for one in zip(shot.motions, loads, strict=True) if one[0].centre is None]
+    for (motion, of_character), rig in zip(rigged, shot.rigs, strict=True):
+        _check(motion, of_character, rig)
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain))
+        after = responding(motion, response)
+        for when, moved in (("before", motion), ("after", after)):
+            faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain))
+            feet[when][motion.name] = _statistics(faults)
+        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, ()))
+        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, ()))
+        found.append(CharacterResponse(motion, response, made, left, 0.0))
+    return found, feet
+
+
+def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None:
+    """Raise InputError, naming the remedy, where feet cannot be cleaned."""
+    legs = leg_soles(motion)
+    if not legs:
+        raise InputError(
+            f"'{motion.name}' has no leg with hip, knee and ankle to clean: complete its joints in Body Bones, under "
+            "Advanced."
+        )
+    parts = {control.part for control in rig.controls}
+    if not all(f"foot_{side}" in parts for side in legs):
+        raise InputError(
+            f"The legs of '{motion.name}' cannot take a layer, as their IK hangs on another object or other bones drive "
+            "them: bake its action to FK bones (Animation > Bake Action) and clean its feet then."
+        )
+    if treadmill_speed(loads.motion, loads.contacts) > 0:
+        raise InputError(
+            f"'{motion.name}' walks on the spot, and feet that stood still would tear its legs: key its travel on its "
+            "hips or its armature first."
+        )
+
+
+def _left_out(wanted: BakeSettings, shot: Shot) -> tuple[str, ...]:
+    """What is said of soles that are not feet."""
+    names: list[str] = []
+    for motion, one in zip(shot.motions, wanted.characters, strict=True):
+        if one.armature:
+            feet = set(leg_soles(motion).values())
+            names += [f"{sole.sole.name} of {motion.name}" for i, sole in enumerate(motion.soles) if i not in feet]
+    return (f"Only feet of legs are cleaned; left as they are: {', '.join(names)}.",) if names else ()
+
+
+def _statistics(faults: FootFaults) -> dict[str, dict[str, float]]:
+    sizes: Mapping[str, NDArray[np.float64]] = {
+        "slide": faults.slide,
+        "float": faults.float_,
+        "penetration": faults.penetration,
+    }
+    return {
+        name: {
+            "p95": round(float(np.percentile(size, 95)) * 1e3 if len(size) else 0.0, 3),
+            "max": round(float(size.max(initial=0.0)) * 1e3, 3),
+        }
+        for name, size in sizes.items()
+    }

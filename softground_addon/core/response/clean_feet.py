@@ -1,0 +1,108 @@
+"""Feet that neither slide, float nor sink on a hard floor: the composer of locked feet, hips and legs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import Terrain
+from ..motion.motion import CharacterMotion
+from ..numerics.plane_fit import smoothed
+from ..numerics.rigid import carried
+from ..numerics.slices import Slices, sliced
+from ..record.ground_history import GroundHistory
+from .foot_lock import lock, moved, rim_points, slides, underside_on
+from .foot_placement import Placement, place_sole
+from .grounding import HIPS_TIME, LOAD_TIME, Response, leg_soles, mean_over_time, settle
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class FootFaults:
+    """What a character's feet do on a hard floor while they stand that feet do not.
+
+    Attributes
+    ----------
+    slide : (N,) float array
+        Distance of each point that bears from where it first bore, at each of its frames [m].
+    float_, penetration : (K,) float arrays
+        Height of the sole's lowest point above and below the floor [m].
+    frames : (K,) float array
+        Scene frames of those.
+    """
+
+    slide: Array
+    float_: Array
+    penetration: Array
+    frames: Array
+
+
+@sliced
+def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[Response]:
+    """What makes the feet stand where their contacts say that they stand.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    touching : (F, S) bool array
+    terrain : Terrain
+        The floor.
+    """
+    floor = GroundHistory(terrain)
+    placements: dict[str, tuple[int, Placement]] = {}
+    offsets = []
+    for side, number in leg_soles(motion).items():
+        touches = touching[:, number]
+        yield
+        first = place_sole(motion, number, touches, floor, floor)
+        yield
+        lying = moved(motion.soles[number], first.carry)
+        locked = lock(underside_on(lying, floor, motion.frames), touches) @ first.carry
+        held = moved(motion.soles[number], locked)
+        soles = tuple(held if index == number else other for index, other in enumerate(motion.soles))
+        placed = place_sole(
+            replace(motion, soles=soles), number, touches, floor, floor, align=0.0, points=rim_points(held)
+        )
+        lift = first.lift + placed.lift
+        placements[side] = number, Placement(placed.carry @ locked, lift, np.zeros_like(lift), placed.room)
+        carry = placements[side][1].carry
+        ankle = motion.joints[f"ankle_{side}"]
+        offsets.append((carried(carry, ankle) - ankle)[:, :2])
+    yield
+    level = _hips_go_along(motion, [number for number, _ in placements.values()], offsets, touching)
+    upright = np.zeros((len(motion.frames), 2))
+    return (yield from settle.slices(motion, placements, touching, upright, level=level, source_pace=True))
+
+
+def _hips_go_along(motion: CharacterMotion, soles: list[int], offsets: list[Array], touching: Mask) -> Array:
+    """How far the hips move along the floor (F, 2) [m]: as the feet that stand, smoothly."""
+    if not soles:
+        return np.zeros((len(motion.frames), 2))
+    stands = touching[:, soles]
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
+    width = HIPS_TIME * motion.adult_second
+    of_feet = np.stack(offsets, axis=1)
+    return np.stack([mean_over_time(of_feet[..., i], load, width) for i in range(2)], axis=-1)
+
+
+@sliced
+def foot_faults(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[FootFaults]:
+    """How far the legs' soles slide, float and sink while they touch, by all points of their rims."""
+    floor = GroundHistory(terrain)
+    slid, gaps, frames = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+    for number in leg_soles(motion).values():
+        yield
+        sole, touches = motion.soles[number], touching[:, number]
+        under = underside_on(sole, floor, motion.frames)
+        slid.append(slides(under, touches))
+        lowest = under.lowest()
+        gaps.append(lowest[touches & np.isfinite(lowest)])
+        frames.append(motion.frames[touches & np.isfinite(lowest)])
+    gap = np.concatenate(gaps)
+    return FootFaults(np.concatenate(slid), np.maximum(gap, 0.0), np.maximum(-gap, 0.0), np.concatenate(frames))
+

@@ -1,0 +1,225 @@
+"""Where a foot stands still on a hard floor: what takes the slide out of each of its contacts.
+
+A rigid foot rolls over heel, ball and toes while it stands. At each moment only its lowest points bear, and those may
+not move along the floor; the others may. So the foot rolls as it does in the source, without slip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import Sole, SoleMotion, SolePatch
+from ..numerics.intervals import runs
+from ..numerics.rigid import displacement, rotation
+from .foot_placement import PressedGround, between_contacts
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PLANTED = 0.01
+"""Points of a sole bear that are this near to its lowest, in sole lengths (3 mm of an adult's shoe)."""
+MOST = 0.5
+"""A rigid piece of the sole bears that has this part as many points near the floor as the one with most of them."""
+AXLE = 0.01
+"""Points that bear within about this distance of each other are an axle, about which the foot may turn, in lengths."""
+TWIST = np.radians(25.0)
+"""A foot that turns by more than this in one contact is meant to turn: it keeps its turn, about what bears [rad]."""
+STILL = 0.004
+"""A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
+
+
+def rim(sole: Sole) -> list[tuple[int, Array]]:
+    """Points around each patch of a sole, and its lowest: patch and positions (K, 3) in the patch's frame [m].
+
+    A convex sole that is tilted stands on one of its rim. The landmarks where the sole has no patches.
+    """
+    if not sole.patches:
+        return [(int(p), sole.landmarks[sole.landmark_patch == p]) for p in np.unique(sole.landmark_patch)]
+    return [(number, _outermost(patch)) for number, patch in enumerate(sole.patches)]
+
+
+def _outermost(patch: SolePatch) -> Array:
+    """The first and last node of each row and column inside a patch's outline, every third inside, and the lowest."""
+    inside = patch.signed_distance <= 0.0
+    before, after = np.roll(inside, 1, axis=1), np.roll(inside, -1, axis=1)
+    before[:, 0] = after[:, -1] = False
+    above, below = np.roll(inside, 1, axis=0), np.roll(inside, -1, axis=0)
+    above[0] = below[-1] = False
+    chosen = inside & ~(before & after & above & below)
+    chosen[::3, ::3] |= inside[::3, ::3]
+    lowest = np.where(inside, patch.heights, np.inf).argmin()
+    chosen.flat[lowest] |= bool(inside.any())
+    rows, columns = np.nonzero(chosen)
+    x = patch.origin[0] + columns * patch.spacing
+    y = patch.origin[1] + rows * patch.spacing
+    return np.stack([x, y, patch.heights[rows, columns]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Underside:
+    """The rim of a sole over time, on a floor.
+
+    Attributes
+    ----------
+    points : (F, Q, 3) float array
+        In the world [m].
+    heights : (F, Q) float array
+        Above the floor [m].
+    piece : (Q,) int array
+        Which rigid piece of the sole each belongs to.
+    length : float
+        Of the sole [m].
+    """
+
+    points: Array
+    heights: Array
+    piece: NDArray[np.intp]
+    length: float
+
+    def lowest(self) -> Array:
+        """Height of the lowest point, (F,) [m]."""
+        return np.asarray(self.heights.min(axis=1))
+
+    def bearing(self) -> Array:
+        """How much each point bears (F, Q), 1 in all of a frame.
+
+        Those near the lowest do, of the piece with most of them: where the toes lie flat, the ball of the foot that
+        bends up from them rolls off the floor.
+        """
+        above = self.heights - self.lowest()[:, None]
+        bears = np.exp(-above / (PLANTED * max(self.length, 1e-9))) * self._of_bearing_piece(above)
+        return np.asarray(bears / bears.sum(axis=1, keepdims=True))
+
+    def planted(self) -> Mask:
+        """Which points bear (F, Q): those no higher than `PLANTED` above the lowest, of a piece that bears."""
+        above = self.heights - self.lowest()[:, None]
+        return (above <= PLANTED * self.length) & self._of_bearing_piece(above)
+
+    def _of_bearing_piece(self, above: Array) -> Mask:
+        near = above <= PLANTED * self.length
+        count = np.stack([near[:, self.piece == one].sum(axis=1) for one in range(self.piece.max() + 1)], axis=1)
+        return np.asarray((count >= MOST * count.max(axis=1, keepdims=True))[:, self.piece])
+
+
+def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Underside:
+    """The rim of a sole over time and its heights above a floor, above its own lowest point where there is none."""
+    pieces = rim(motion.sole)
+    points = rim_points(motion)
+    ground = floor.heights(points[..., 0], points[..., 1], np.broadcast_to(frames[:, None], points.shape[:2]))
+    known = np.isfinite(ground)
+    own = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    heights = np.where(known.any(axis=1, keepdims=True), np.where(known, points[..., 2] - ground, np.inf), own)
+    piece = np.concatenate([np.full(len(places), patch) for patch, places in pieces])
+    return Underside(points, heights, piece, motion.sole.length)
+
+
+def rim_points(motion: SoleMotion) -> Array:
+    """World positions of a sole's `rim`, (F, Q, 3) [m]."""
+    poses = motion.transforms
+    return np.concatenate(
+        [
+            points @ np.swapaxes(poses[:, patch, :3, :3], -1, -2) + poses[:, patch, None, :3, 3]
+            for patch, points in rim(motion.sole)
+        ],
+        axis=1,
+    )
+
+
+def lock(sole: Underside, touching: Mask) -> Array:
+    """Level displacements (F, 4, 4) that keep what bears of a sole in its place during each contact.
+
+    Parameters
+    ----------
+    sole : Underside
+    touching : (F,) bool array
+    """
+    if not touching.any():
+        return np.broadcast_to(np.eye(4), (len(touching), 4, 4))
+    points, weight, length = sole.points, sole.bearing(), sole.length
+    turn, move = np.zeros(len(points)), np.zeros((len(points), 2))
+    middle = points[..., :2].mean(axis=1)
+    for first, end in zip(*runs(touching), strict=True):
+        during = slice(first, end)
+        turn[during], shift = _held(points[during, :, :2], weight[during], length)
+        move[during] = _turned(turn[during], middle[during]) + shift - middle[during]
+    turn = between_contacts(turn, touching)
+    move = np.stack([between_contacts(move[:, i], touching) for i in range(2)], axis=-1)
+    start = np.concatenate([middle, np.zeros((len(middle), 1))], axis=1)
+    end = np.concatenate([middle + move, np.zeros((len(middle), 1))], axis=1)
+    return displacement(rotation(turn[:, None] * (0.0, 0.0, 1.0)), start, end)
+
+
+def _steps(points: Array, weight: Array, length: float) -> tuple[Array, Array, bool]:
+    """Turns (K - 1,) and shifts (K - 1, 2) that bring each frame's bearing points back to where they were in the frame
+    before, and whether the foot turns on purpose."""
+    both = np.sqrt(weight[1:] * weight[:-1])
+    both = np.where(both.sum(axis=1, keepdims=True) > 1e-3, both, weight[1:] + weight[:-1])
+    turns, shifts = _fitted(points[1:], points[:-1], both, AXLE * length)
+    if abs(turns.sum()) > TWIST:
+        return (*_fitted(points[1:], points[:-1], both, np.inf), True)
+    return turns, shifts, False
+
+
+def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:
+    """Turn (K,) and shift (K, 2) of one contact's frames: x goes to R(turn)·x + shift, and what bears stays."""
+    turns, shifts, _ = _steps(points, weight, length)
+    turn = np.concatenate([[0.0], np.cumsum(turns)])
+    shift = np.concatenate([np.zeros((1, 2)), np.cumsum(_turned(turn[:-1], shifts), axis=0)])
+    slid = np.linalg.norm(np.gradient(shift, axis=0), axis=1) if len(shift) > 1 else np.zeros(1)
+    slow = (1.0 / (1.0 + (slid / (STILL * length)) ** 2))[:, None] * weight
+    held = _turned(turn[:, None], points) + shift[:, None]
+    back, away = _fitted(held.reshape(1, -1, 2), points.reshape(1, -1, 2), slow.reshape(1, -1), AXLE * length)
+    return turn + back, _turned(back, shift) + away
+
+
+def _fitted(start: Array, end: Array, weight: Array, axle: float) -> tuple[Array, Array]:
+    """Least-squares turn (K,) and shift (K, 2) from points to points (K, Q, 2) (Procrustes); points nearer to each
+    other than `axle` do not turn."""
+    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
+    a, b = np.einsum("kq,kqi->ki", weight, start), np.einsum("kq,kqi->ki", weight, end)
+    p, q = start - a[:, None], end - b[:, None]
+    sine = np.einsum("kq,kq->k", weight, p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0])
+    cosine = np.einsum("kq,kq->k", weight, p[..., 0] * q[..., 0] + p[..., 1] * q[..., 1])
+    turn = np.zeros(len(start)) if np.isinf(axle) else np.arctan2(sine, np.maximum(cosine, 0.0) + axle**2)
+    return turn, b - _turned(turn, a)
+
+
+def _turned(turn: Array, points: Array) -> Array:
+    """Points (..., 2) turned about the origin by angles (...) [rad]."""
+    cosine, sine = np.cos(turn), np.sin(turn)
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def slides(sole: Underside, touching: Mask) -> Array:
+    """How far each planted point is from where it was planted, for each of its frames, (N,) [m].
+
+    Of a foot that turns on purpose (`TWIST`), how far the place that it turns about has slid.
+    """
+    planted, weight = sole.planted() & touching[:, None], sole.bearing()
+    found = [np.zeros(0)]
+    for first, end in zip(*runs(touching), strict=True):
+        points = sole.points[first:end, :, :2]
+        _, shifts, on_purpose = _steps(points, weight[first:end], sole.length)
+        if on_purpose:
+            found.append(np.linalg.norm(np.cumsum(shifts, axis=0), axis=1))
+        else:
+            found.append(_since_planted(points, planted[first:end]))
+    return np.concatenate(found)
+
+
+def _since_planted(points: Array, planted: Mask) -> Array:
+    """Distance of planted points (K, Q, 2) from where they were planted, at each of the frames in which they are."""
+    starts = planted & ~np.concatenate([np.zeros((1, planted.shape[1]), bool), planted[:-1]])
+    since = np.maximum.accumulate(np.where(starts, np.arange(len(points))[:, None], 0), axis=0)
+    first = np.take_along_axis(points, since[..., None], axis=0)
+    return np.asarray(np.linalg.norm(points - first, axis=-1)[planted])
+
+
+def moved(motion: SoleMotion, carry: Array) -> SoleMotion:
+    """A sole carried by rigid displacements (F, 4, 4)."""
+    return SoleMotion(motion.sole, carry[:, None] @ motion.transforms, motion.bears)
+
