@@ -135,7 +135,9 @@ def _bone_curves(
     curves = []
     if control.moves:
         offset = new[:, :3, 3] - pose.location
-        curves += _curves(path + "location", control.bone, frames, offset, accuracy * LENGTH_TOLERANCE / max(size, 1e-12))
+        curves += _curves(
+            path + "location", control.bone, frames, offset, accuracy * LENGTH_TOLERANCE / max(size, 1e-12)
+        )
     name, values, tolerance = _rotation_layer(bone.rotation_mode, pose, _pure_rotation(new))
     return curves + _curves(path + name, control.bone, frames, values, accuracy * tolerance)
 

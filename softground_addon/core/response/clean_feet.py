@@ -105,4 +105,3 @@ def foot_faults(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Sl
         frames.append(motion.frames[touches & np.isfinite(lowest)])
     gap = np.concatenate(gaps)
     return FootFaults(np.concatenate(slid), np.maximum(gap, 0.0), np.maximum(-gap, 0.0), np.concatenate(frames))
-

@@ -222,4 +222,3 @@ def _since_planted(points: Array, planted: Mask) -> Array:
 def moved(motion: SoleMotion, carry: Array) -> SoleMotion:
     """A sole carried by rigid displacements (F, 4, 4)."""
     return SoleMotion(motion.sole, carry[:, None] @ motion.transforms, motion.bears)
-

@@ -1,0 +1,185 @@
+"""Clean Feet: standing feet neither slide, float nor sink, read from the rig as the user's scene shows it."""
+
+import json
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from softground_addon.blender import jobs
+from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.baking.clean_feet import clean_feet
+from softground_addon.blender.command_line import cli
+from softground_addon.blender.compat import action_curves
+from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
+from softground_addon.blender.response import response_job
+from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.response.clean_feet import foot_faults
+from softground_addon.core.response.response import at_scene_frames
+from tests.blender import fingerprints, responders, shots
+from tests.blender.grounds import plane
+
+SLIDE_95, SLIDE_MAX, GAP_95 = 1.0, 3.0, 1.0
+"""Bars [mm]: 95 of 100 frames, and the largest."""
+KNEE = 1.05
+"""Fastest knee over the fastest of the source."""
+
+
+def read(scene):
+    """The shot, and when its first character's soles touch."""
+    wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
+    shot = jobs.run(read_shot(scene, wanted))
+    standing = jobs.run(response_job.standing_on(shot.motions, shot.terrain, wanted.response))
+    loads = jobs.run(estimate_shot(wanted, replace(shot, motions=standing)))[0]
+    return shot, at_scene_frames(loads.contacts.touching, loads.motion.frames, shot.motions[0])
+
+
+def on_the_rig(scene, motion):
+    """The motion with its soles as the bones carry them now, and the height of the hips."""
+    character = scene.softground.characters[0]
+    mapping = responders.mapping_of(character)
+    bones = [source.bone for source in mapping.soles] + [mapping.joints["hips"][0]]
+    frames = motion.frames.astype(int)
+    now = responders.world_matrices(scene, character.armature, bones, frames)
+    character.response_strength = 0.0
+    before = responders.world_matrices(scene, character.armature, bones, frames)
+    character.response_strength = 1.0
+    carry = now @ np.linalg.inv(before)
+    soles = [SoleMotion(sole.sole, carry[:, i, None] @ sole.transforms) for i, sole in enumerate(motion.soles)]
+    return replace(motion, soles=tuple(soles)), now[:, -1, :3, 3]
+
+
+def millimetres(sizes):
+    return np.percentile(sizes, 95) * 1e3, sizes.max() * 1e3
+
+
+def fastest_knee(legs):
+    return max(np.abs(np.diff(leg.flexion)).max() for leg in legs)
+
+
+def check_bars(scene, name, before_knee):
+    shot, touching = read(scene)
+    cleaned, _ = on_the_rig(scene, shot.motions[0])
+    source = foot_faults(shot.motions[0], touching, shot.terrain)
+    faults = foot_faults(cleaned, touching, shot.terrain)
+    knee = fastest_knee(responders.legs(scene)) / before_knee
+    said = {of: (millimetres(getattr(source, of)), millimetres(getattr(faults, of))) for of in ("slide", "float_")}
+    print(f"\n{name}: {said}, knee {knee:.3f}")
+    assert millimetres(faults.slide)[0] < SLIDE_95
+    assert millimetres(faults.slide)[1] < SLIDE_MAX
+    assert millimetres(faults.float_)[0] < GAP_95
+    assert millimetres(faults.penetration)[0] < GAP_95
+    assert knee < KNEE
+
+
+@pytest.fixture
+def floor_walk(scene):
+    """The walker on a plane at the height that it was made for."""
+    shots.walker(scene, frames=48)
+    bpy.ops.softground.add_character()
+    scene.softground.ground = plane(scene)
+    bpy.context.view_layer.update()
+    return scene
+
+
+def spoil(scene, slide=0.02, floats=0.03):
+    """Sliding to and fro, and a float, by keys on the armature object: known, and not in the walk."""
+    armature = scene.softground.characters[0].armature
+    for frame in range(scene.softground.frame_start, scene.softground.frame_end + 1):
+        armature.location = (slide * np.sin(frame / 7.0), slide * np.cos(frame / 9.0), floats)
+        armature.keyframe_insert("location", frame=frame)
+    scene.frame_set(scene.frame_current)
+
+
+def test_a_slide_and_a_float_that_were_added_are_gone(floor_walk):
+    jobs.run(clean_feet(floor_walk))
+    shot, touching = read(floor_walk)
+    plain, hips = on_the_rig(floor_walk, shot.motions[0])
+    bpy.ops.softground.clear_bake()
+    spoil(floor_walk)
+    before = fastest_knee(responders.legs(floor_walk))
+    assert bpy.ops.softground.clean_feet() == {"FINISHED"}
+    check_bars(floor_walk, "spoilt walk", before)
+    cleaned, cleaned_hips = on_the_rig(floor_walk, read(floor_walk)[0].motions[0])
+    for with_slide, without, stands in zip(cleaned.soles, plain.soles, touching.T, strict=True):
+        height = with_slide.landmark_positions()[..., 2] - without.landmark_positions()[..., 2]
+        assert np.abs(height[stands]).max() < 5e-3
+    assert np.abs(cleaned_hips[:, 2] - hips[:, 2]).max() < 0.01, "the body is back at its height"
+
+
+def test_clear_bake_gives_the_bytes_back(floor_walk):
+    spoil(floor_walk)
+    before = fingerprints.of_file()
+    bpy.ops.softground.clean_feet()
+    assert nla_layer.has_layer(floor_walk.softground.characters[0].armature)
+    assert not floor_walk.softground.grounding.use
+    bpy.ops.softground.clear_bake()
+    assert fingerprints.of_file() == before
+
+
+def test_what_is_cancelled_leaves_everything_as_it_was(floor_walk):
+    before = fingerprints.of_file()
+    job = clean_feet(floor_walk)
+    for _ in range(3):
+        next(job)
+    job.close()
+    assert fingerprints.of_file() == before
+
+
+def test_controls_of_ik_legs_are_cleaned(scene):
+    responders.with_ik()
+    bpy.ops.softground.add_character()
+    spoil(scene, floats=0.01)
+    before = fastest_knee(responders.legs(scene))
+    jobs.run(clean_feet(scene))
+    check_bars(scene, "IK legs", before)
+
+
+def test_a_walk_on_the_spot_is_refused_with_the_remedy(floor_walk):
+    armature = floor_walk.softground.characters[0].armature
+    path = responders.world_matrices(floor_walk, armature, ["hips"], (1, 48))[:, 0, :3, 3]
+    step = np.array(armature.data.bones["hips"].matrix_local)[:3, :3].T @ ((path[1] - path[0]) / 47 * (1, 1, 0))
+    for curve in action_curves(armature.animation_data.action):
+        if curve.data_path.endswith("location"):
+            responders.scale_keys(curve, 1.0, add=-float(step[curve.array_index]))
+    floor_walk.frame_set(1)
+    before = fingerprints.of_file()
+    with pytest.raises(RuntimeError, match="walks on the spot"):
+        bpy.ops.softground.clean_feet()
+    assert fingerprints.of_file() == before
+
+
+def test_what_has_no_feet_is_refused(scene):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.25, location=(0, 0, 0.25))
+    bpy.ops.softground.add_character()
+    with pytest.raises(RuntimeError, match="feet to clean"):
+        bpy.ops.softground.clean_feet()
+
+
+def test_the_command_line_cleans_a_shot_and_reports_before_and_after(saved_walker, tmp_path):
+    report, cleaned = tmp_path / "feet.json", tmp_path / "clean.blend"
+    assert cli.run_standalone(["clean", str(saved_walker), "--save", str(cleaned), "--report", str(report)]) == 0
+    feet = json.loads(report.read_text(encoding="utf-8"))["feet"]
+    assert set(feet) == {"before", "after"}
+    for of_one in feet.values():
+        assert set(of_one["Walker"]) == {"slide", "float", "penetration"}
+        assert all(set(size) == {"p95", "max"} for size in of_one["Walker"].values())
+    assert feet["after"]["Walker"]["slide"]["max"] < SLIDE_MAX
+    bpy.ops.wm.open_mainfile(filepath=str(cleaned))
+    assert nla_layer.has_layer(bpy.context.scene.softground.characters[0].armature)
+
+
+def test_the_command_line_refuses_to_clean_for_nothing(saved_walker, capsys):
+    assert cli.run_standalone(["clean", str(saved_walker)]) == 2
+    assert "--save" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shots.MOTION_FILES)
+def test_reference_motions_keep_the_bars(scene, name):
+    shots.import_motion(name)
+    bpy.ops.softground.add_character()
+    before = fastest_knee(responders.legs(scene))
+    jobs.run(clean_feet(scene))
+    check_bars(scene, name, before)
