@@ -1,4 +1,4 @@
-"""The command line: `softground bake`, `clean`, `export` and `batch`, in `blender --command` and with the bpy module."""
+"""The command line: `softground bake`, `clean`, `export` and `batch`, in `blender --command` and in the bpy module."""
 
 from __future__ import annotations
 
