@@ -30,6 +30,8 @@ HIPS_TIME = 0.10
 """Standard deviation of the smoothing of the hips' height over time [s], for an adult."""
 LOAD_TIME = 0.05
 """Standard deviation of the passing of weight from foot to foot [s], for an adult."""
+KNEE_TIME = 0.06
+"""Standard deviation of the smoothing of the direction of nearly straight knees [s], for an adult."""
 HEEL_TIME = 0.06
 """Time before and after in which a heel rises to what the leg can reach [s], for an adult."""
 NEAR_ENOUGH = 0.002
@@ -202,9 +204,10 @@ def settle(
     body = tilted.copy()
     body[:, :3, 3] += raised
     responses = {}
+    steady = KNEE_TIME * motion.adult_second if source_pace else 0.0
     for side, leg in legs.items():
         hip = carried(body, leg.hip)
-        solved = solve(leg, hip, ankles[side] + relief.feet[side][:, None] * unit(hip - ankles[side]))
+        solved = solve(leg, hip, ankles[side] + relief.feet[side][:, None] * unit(hip - ankles[side]), steady)
         foot = placements[side][1].carry.copy()
         foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
         responses[side] = LegResponse(solved.thigh, solved.shank, foot)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.plane_fit import smoothed
 from ..numerics.rigid import displacement, perpendicular, rotation, turn_between, unit
 
 Array = NDArray[np.float64]
@@ -14,6 +15,8 @@ Array = NDArray[np.float64]
 _KNEE_HINT = 0.1
 """How much the direction of the foot says about that of the knee, in leg lengths of knee offset: a bent knee decides
 for itself, a straight one bends toward the toes."""
+_SURE = 0.1
+"""A knee that lies so far off the line from hip to ankle has a direction of its own, in leg lengths (23°)."""
 _CLOSEST = 1e-6
 """Relative distance that a solved leg keeps from being quite straight or quite folded."""
 
@@ -95,7 +98,7 @@ class SolvedLeg:
     shank: Array
 
 
-def solve(leg: Leg, hip: Array, ankle: Array) -> SolvedLeg:
+def solve(leg: Leg, hip: Array, ankle: Array, steady: float = 0.0) -> SolvedLeg:
     """Reach from a new hip to a new ankle with thigh and shank of the same length.
 
     Where the ankle is out of reach the leg points toward it, straight. Where nothing moved the result is the source,
@@ -107,6 +110,9 @@ def solve(leg: Leg, hip: Array, ankle: Array) -> SolvedLeg:
         The source.
     hip, ankle : (F, 3) float arrays
         Where they go [m].
+    steady : float
+        Standard deviation in samples of the smoothing of the direction in which a nearly straight knee lies: of a leg
+        that was captured it is noise. Such a knee is not quite the source's then where nothing moved.
     """
     thigh, shank = leg.thigh, leg.shank
     farthest = np.maximum((thigh + shank) * (1 - _CLOSEST), leg.span)
@@ -116,7 +122,7 @@ def solve(leg: Leg, hip: Array, ankle: Array) -> SolvedLeg:
     along = (thigh**2 - shank**2 + span**2) / (2 * np.maximum(span, 1e-12))
     aside = np.sqrt(np.maximum(thigh**2 - along**2, 0.0))
     turn = rotation(turn_between(source_axis, axis))
-    bend = (turn @ _bend(leg, source_axis, aside)[..., None])[..., 0]
+    bend = (turn @ _bend(leg, source_axis, aside, steady)[..., None])[..., 0]
     knee = hip + along[:, None] * axis + aside[:, None] * bend
     foot = hip + span[:, None] * axis
     return SolvedLeg(
@@ -125,11 +131,15 @@ def solve(leg: Leg, hip: Array, ankle: Array) -> SolvedLeg:
     )
 
 
-def _bend(leg: Leg, axis: Array, aside: Array) -> Array:
+def _bend(leg: Leg, axis: Array, aside: Array, steady: float) -> Array:
     """Direction in which the knee lies off the source's axis: the source's own, the less the more it has to bend."""
     offset = leg.knee - leg.hip
     offset = offset - np.sum(offset * axis, axis=-1, keepdims=True) * axis
     distance = np.linalg.norm(offset, axis=-1)
+    if steady:
+        sure = np.clip(distance / (_SURE * leg.length), 0.0, 1.0)[:, None]
+        offset = sure * offset + (1.0 - sure) * smoothed(offset, steady)
+        offset -= np.sum(offset * axis, axis=-1, keepdims=True) * axis
     toes = unit(leg.toward_toes - np.sum(leg.toward_toes * axis, axis=-1, keepdims=True) * axis)
     settled = offset + _KNEE_HINT * leg.length[:, None] * toes
     forward = unit(np.where(np.linalg.norm(settled, axis=-1, keepdims=True) > 0, settled, perpendicular(axis)))

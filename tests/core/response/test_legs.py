@@ -102,3 +102,17 @@ def test_the_same_body_moved_as_a_whole_keeps_its_pose(shift, turn):
     move = displacement(rotation(np.array([turn])), np.zeros((1, 3)), np.array([shift]))
     joints = solved_joints(leg, solve(leg, carried(move, leg.hip), carried(move, leg.ankle)))
     assert flexion_of(*joints) == pytest.approx(flexion_of(leg.hip, leg.knee, leg.ankle), abs=1e-6)
+
+
+def test_a_nearly_straight_knee_that_is_noise_from_side_to_side_bends_steadily():
+    count = 40
+    noise = 0.004 * np.where(np.arange(count) % 2, 1.0, -1.0)
+    hip, ankle = np.tile((0.0, 0.0, 0.9), (count, 1)), np.zeros((count, 3))
+    knee = np.stack([np.full(count, 0.006), noise, np.full(count, 0.45)], axis=-1)
+    leg = Leg(hip, knee, ankle, np.tile((1.0, 0.0, 0.0), (count, 1)))
+    lower = hip - (0.0, 0.0, 0.05)
+
+    def sway(steady):
+        return np.abs(np.diff(carried(solve(leg, lower, ankle, steady).thigh, knee)[5:-5, 1])).max()
+
+    assert sway(3.0) < 0.3 * sway(0.0)
