@@ -1,7 +1,7 @@
 """Fig. 8, the four materials: the same step in snow, dry sand, mud and soil, seen from close by.
 
-Each preset as it comes, as two clicks in the panel have it, with Relief at Close-Up: rims lean ahead, dry sand lies at its
-angle of repose, and the pressure rolls from the heel to the toes.
+Each preset as two clicks in the panel have it, with Relief at Close-Up: rims lean ahead, dry sand lies at its angle of
+repose, and the pressure rolls from the heel to the toes.
 """
 
 from __future__ import annotations
@@ -137,6 +137,7 @@ def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
 def light(scene: bpy.types.Scene, step: Footprint) -> None:
     """A low sun from ahead and aside: walls throw shadows, wet ground shines toward the camera."""
     stage.add_sun(scene, step.heading - radians(125), SUN_ELEVATION)
+    scene.view_settings.exposure = -0.5
 
 
 def aim_at_print(camera: bpy.types.Object, step: Footprint) -> None:
