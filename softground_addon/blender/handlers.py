@@ -33,6 +33,7 @@ def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
 @persistent
 def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     """An edited animation or mesh makes what was read from it worthless, and may leave a bake outdated."""
+    live.watch()
     if scene.softground.ground is not None and not bpy.app.background:
         _later(compare_bake)
     if analysis.is_empty() or depsgraph is None:

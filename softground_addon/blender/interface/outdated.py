@@ -10,7 +10,7 @@ from ..baking import bake_report
 from .prediction import SOON
 
 WAIT = 0.3
-"""Time until it is looked at again where a bake is running, live mode is on, or a step is dragged [s]."""
+"""Time until it is looked at again where a bake is running, or a step is dragged [s]."""
 
 _compared: dict[int, BakeSettings] = {}
 """The settings that each scene's bake was compared with last, by session uid."""
@@ -25,7 +25,9 @@ def watch(scene: bpy.types.Scene) -> None:
 def compare_bake() -> float | None:
     """Tell whether the bake on the ground still fits; for a timer, as it may take a while."""
     state = session.current()
-    if state.is_baking or state.is_live or session.is_previewing():
+    if state.is_live:
+        return None  # there is no bake; it is looked again when the prints are kept
+    if state.is_baking or session.is_previewing():
         return WAIT
     windows = bpy.context.window_manager.windows
     if windows:

@@ -10,6 +10,7 @@ from ...core.motion.motion import JOINTS
 from .. import session, settings
 from ..characters.import_fixes import scale_to_metres
 from ..ground import baked_ground, ground_mesh, still_ground
+from ..live import live
 from ..settings import is_set_up, is_thing
 from . import bake_result, outdated, prediction, preset_menu
 from .character_editing import active_character, active_sole, suggested_mass
@@ -256,6 +257,7 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.fields()
         state = session.current()
+        live.watch()
         options = settings.scene_of(context).softground
         summary = ground_mesh.summary_of(baked_ground.display_mesh_of(options.ground)) if options.ground else {}
         if summary:

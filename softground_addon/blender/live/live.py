@@ -1,7 +1,8 @@
 """Live mode: the ground gives way while the timeline plays, is stepped or is scrubbed, and as sliders are moved.
 
-No modal operator is needed for it: a handler follows the frame and a timer the settings, so that autosave, undo and
-every other tool go on working. While live mode is on, the ground carries what a bake would leave on it.
+No modal operator is needed for it: a handler follows the frame, and a timer the settings once the panel is drawn or
+something is edited, so that autosave, undo and every other tool go on working, and nothing runs where nothing changes.
+While live mode is on, the ground carries what a bake would leave on it.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from .live_mode import Contact, LiveMode
 
 LOOK = 0.1
 """Time after which it is looked again whether the settings are others [s]."""
+SOON = 0.05
+"""Time from what may have changed something to the first look [s]."""
 PAUSE = 0.005
 """Time that is left to everything else between two parts of an answer [s]."""
 PART = 0.025
@@ -81,10 +84,19 @@ def answer(seconds: float | None = None) -> float | None:
         return LOOK
     try:
         part = min(max(time.perf_counter() - _mode.answered_at, PART), LONGEST_PART) if seconds is None else seconds
-        return PAUSE if _mode.answer(scene, part) else LOOK
+        if _mode.answer(scene, part):
+            return PAUSE
+        return LOOK if _mode.has_more(scene) else None
     except InputError:
         forget()
     return None
+
+
+def watch() -> None:
+    """Look soon whether there is something to press again, as the panel is drawn or something was edited."""
+    # In background a timer that waits would keep the bpy module from ending; there the next frame looks.
+    if _mode is not None and not bpy.app.background and not bpy.app.timers.is_registered(answer):
+        bpy.app.timers.register(answer, first_interval=SOON)
 
 
 def is_answering() -> bool:
@@ -155,8 +167,7 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
             _mode = LiveMode(scene)
             session.current().is_live = True
             _mode.follow(scene)
-            if not bpy.app.background:  # where a timer that waits would keep the bpy module from ending
-                bpy.app.timers.register(answer, first_interval=LOOK)
+            watch()
         elif self.keep:
             with analysis.own_changes(scene):
                 _mode.keep(scene)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import bpy
 import numpy as np
 
@@ -32,6 +34,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     copy = scene().softground.ground.copy()
     copy.data = copy.data.copy()
     scene().collection.objects.link(copy)
+    yield from hand.wait_for(lambda: not answering(), 20)  # names are among what was read, which is read again
     facts["renamed: goes on"] = yield from back_and_forth(pressed)
     facts["renamed: live"] = session().is_live
 
@@ -109,6 +112,12 @@ def back_and_forth(expected: np.ndarray) -> Steps:
         scene().frame_set(frame)
         yield 0.2
     return bool((heights() == expected).all())
+
+
+def answering() -> bool:
+    return next(
+        m for name, m in sys.modules.items() if name.endswith("softground_addon.blender.live.live")
+    ).is_answering()
 
 
 def heights() -> np.ndarray:
