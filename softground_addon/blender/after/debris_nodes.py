@@ -13,6 +13,8 @@ from typing import Any
 
 import bpy
 
+from ..node_graph import NodeGraph, new_group
+
 GROUP = "SoftGround Debris"
 MARK = "softground_debris"
 """Custom property of the group, of its object and of the collections of shapes."""
@@ -56,24 +58,23 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
     geometry = _thinned(graph, geometry, amount)
     frame = graph.node("GeometryNodeInputSceneTime").outputs["Frame"]
     since = graph.math("DIVIDE", graph.math("SUBTRACT", frame, graph.attribute(BIRTH)), frame_rate)
-    geometry = graph.store(geometry, AGE, "FLOAT", since)
+    geometry = graph.store(geometry, AGE, since, True)
     geometry = _moved(graph, geometry, wind, gravity=gravity, unit_scale=unit_scale)
     geometry = graph.forgotten(geometry, BIRTH, DRAG, START, LAUNCH)
-    unseen = graph.logic("OR", graph.less(graph.attribute(AGE), 0.0), graph.attribute(LEFT_OUT, "BOOLEAN"))
+    unseen = graph.either(graph.less(graph.attribute(AGE), 0.0), graph.attribute(LEFT_OUT, "BOOLEAN"))
     large = graph.less(graph.attribute(RANK), shaped)
-    geometry = graph.store(geometry, SMALL, "BOOLEAN", graph.logic("NOR", unseen, large))
+    geometry = graph.store(geometry, SMALL, graph.logic("NOR", unseen, large), True, "BOOLEAN")
     points = _points(graph, graph.forgotten(geometry, FLIGHT, RANK, LEFT_OUT), material)
     few = graph.without(geometry, graph.logic("NOT", large))
     pieces = _pieces(graph, few, graph.logic("NOT", unseen), collection)
-    out = graph.node("NodeGroupOutput")
-    graph.link(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, LEFT_OUT, SMALL), out.inputs["Geometry"])
+    graph.finish(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, LEFT_OUT, SMALL))
     return graph.tree
 
 
 def _thinned(graph: _Graph, geometry: Any, amount: Any) -> Any:
     """Points without those that the amount leaves out; nothing is done where it leaves out none."""
     fewer = graph.without(geometry, graph.less(amount, graph.random(0.0, 1.0, 1)))
-    return graph.switch(graph.less(amount, 1.0), geometry, fewer)
+    return graph.choose("GEOMETRY", graph.less(amount, 1.0), geometry, fewer)
 
 
 def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scale: float) -> Any:
@@ -90,14 +91,11 @@ def _moved(graph: _Graph, geometry: Any, wind: Any, *, gravity: float, unit_scal
     speed = graph.vector("ADD", graph.scaled(launch, left), graph.scaled(drift, graph.math("SUBTRACT", 1.0, left)))
 
     born = graph.logic("NOT", graph.less(age, 0.0))
-    flies = graph.logic("AND", graph.less(age, flight), born)
-    blows = graph.less(0.0, graph.length(wind))  # what has landed lies elsewhere for it
-    geometry = graph.store(geometry, VELOCITY, "FLOAT_VECTOR", speed, flies)
-    put = graph.node("GeometryNodeSetPosition")
-    graph.link(geometry, put.inputs["Geometry"])
-    graph.link(graph.logic("OR", flies, graph.logic("AND", blows, born)), put.inputs["Selection"])
-    graph.link(graph.vector("ADD", graph.attribute(START, "FLOAT_VECTOR"), moved), put.inputs["Position"])
-    return put.outputs["Geometry"]
+    flies = graph.both(graph.less(age, flight), born)
+    blows = graph.less(0.0, graph.vector("LENGTH", wind, output="Value"))  # what has landed lies elsewhere for it
+    geometry = graph.store(geometry, VELOCITY, speed, flies, "FLOAT_VECTOR")
+    away = graph.either(flies, graph.both(blows, born))
+    return graph.put(geometry, away, graph.vector("ADD", graph.attribute(START, "FLOAT_VECTOR"), moved))
 
 
 def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
@@ -134,14 +132,11 @@ def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> An
     return on_points.outputs["Instances"]
 
 
-class _Graph:
-    """A node group while it is built."""
+class _Graph(NodeGraph):
+    """The debris' group, while it is built."""
 
     def __init__(self) -> None:
-        self.tree: Any = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
-        self.tree.is_modifier = True
-        self.tree[MARK] = True
-        self._place = 0.0
+        super().__init__(new_group(GROUP, MARK))
 
     def inputs(self, shapes: bpy.types.Collection) -> list[Any]:
         """Geometry, wind, amount, how many are shaped, and shapes."""
@@ -162,90 +157,15 @@ class _Graph:
         group = self.node("NodeGroupInput")
         return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
 
-    def node(self, kind: str) -> Any:
-        node = self.tree.nodes.new(kind)
-        node.location = (self._place, 0.0)
-        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
-        self._place += 160.0
-        return node
-
-    def link(self, source: Any, socket: Any) -> None:
-        """Connect an output, or set a value."""
-        if isinstance(source, bpy.types.NodeSocket):
-            self.tree.links.new(source, socket)
-        else:
-            socket.default_value = source
-
-    def attribute(self, name: str, kind: str = "FLOAT") -> Any:
-        node = self.node("GeometryNodeInputNamedAttribute")
-        node.data_type = kind
-        node.inputs["Name"].default_value = name
-        return node.outputs["Attribute"]
-
-    def math(self, operation: str, first: Any, second: Any = 0.0) -> Any:
-        node = self.node("ShaderNodeMath")
-        node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
-        return node.outputs["Value"]
-
-    def vector(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
-        return node.outputs["Vector"]
-
-    def scaled(self, vector: Any, factor: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = "SCALE"
-        self.link(vector, node.inputs[0])
-        self.link(factor, node.inputs["Scale"])
-        return node.outputs["Vector"]
-
-    def length(self, vector: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = "LENGTH"
-        self.link(vector, node.inputs[0])
-        return node.outputs["Value"]
-
     def less(self, first: Any, second: Any) -> Any:
         """Whether one is less than the other."""
-        node = self.node("FunctionNodeCompare")
-        node.data_type, node.operation = "FLOAT", "LESS_THAN"
-        self.link(first, node.inputs["A"])
-        self.link(second, node.inputs["B"])
-        return node.outputs["Result"]
-
-    def logic(self, operation: str, *operands: Any) -> Any:
-        node = self.node("FunctionNodeBooleanMath")
-        node.operation = operation
-        for operand, socket in zip(operands, node.inputs, strict=False):  # for one there may be two sockets
-            self.link(operand, socket)
-        return node.outputs["Boolean"]
-
-    def switch(self, condition: Any, otherwise: Any, then: Any) -> Any:
-        """One of two geometries: the other is not computed."""
-        node = self.node("GeometryNodeSwitch")
-        node.input_type = "GEOMETRY"
-        for name, source in (("Switch", condition), ("False", otherwise), ("True", then)):
-            self.link(source, node.inputs[name])
-        return node.outputs["Output"]
+        return self.compare("LESS_THAN", first, second)
 
     def joined(self, *geometries: Any) -> Any:
         node = self.node("GeometryNodeJoinGeometry")
         for geometry in geometries:
             self.link(geometry, node.inputs["Geometry"])
         return node.outputs["Geometry"]
-
-    def forgotten(self, geometry: Any, *names: str) -> Any:
-        """Without some attributes, so that nothing carries them on."""
-        for name in names:
-            node = self.node("GeometryNodeRemoveAttribute")
-            self.link(geometry, node.inputs["Geometry"])
-            self.link(name, node.inputs["Name"])
-            geometry = node.outputs["Geometry"]
-        return geometry
 
     def random(self, low: Any, high: Any, seed: int, kind: str = "FLOAT") -> Any:
         node = self.node("FunctionNodeRandomValue")
@@ -263,11 +183,4 @@ class _Graph:
         node.domain = "POINT"
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])
-        return node.outputs["Geometry"]
-
-    def store(self, geometry: Any, name: str, kind: str, value: Any, selection: Any = True) -> Any:
-        node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = kind, "POINT"
-        for socket, source in (("Geometry", geometry), ("Selection", selection), ("Name", name), ("Value", value)):
-            self.link(source, node.inputs[socket])
         return node.outputs["Geometry"]

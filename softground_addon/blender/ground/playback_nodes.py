@@ -16,7 +16,7 @@ import bpy
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import NARROW
 from ...core.record.footprints import NEVER
-from .node_graph import NodeGraph, new_group
+from ..node_graph import NodeGraph, new_group
 
 GROUP = "SoftGround Playback"
 MARK = "softground_playback"

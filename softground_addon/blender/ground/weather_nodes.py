@@ -14,7 +14,7 @@ import bpy
 
 from ...core.after import weather as w
 from ...core.after.weathered_ground import BOUNDS, COVERED, KNOTS, Matter
-from .node_graph import NodeGraph, Number, new_group
+from ..node_graph import NodeGraph, Number, new_group
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 
 GROUP = "SoftGround Weather"
@@ -143,7 +143,7 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
     stored = {WETNESS: wetness, FRESH: fresh} | ({WATER: more.pop(0)} if water else {})
     # Before anything moves: all of it follows from where the playback has the vertices.
     changed = _with(graph, changed, _seen(graph, stored, more.pop() if kept else None, matter))
-    changed = _forgotten(graph, _moved(graph, changed, up, height), NOW[: 1 + (len(seen) > 3)])
+    changed = graph.forgotten(_moved(graph, changed, up, height), *NOW[: 1 + (len(seen) > 3)])
     graph.finish(graph.choose("GEOMETRY", sky.is_any().above(0.0).socket, geometry, changed))
 
 
@@ -160,16 +160,6 @@ def _worked_out(graph: NodeGraph, geometry: Any, values: Sequence[Number]) -> tu
         geometry = graph.store(geometry, name, pack.outputs["Vector"], True, "FLOAT_VECTOR")
         kept += [graph.number(part) for part in graph.separated(_vector(graph, name))][: len(together)]
     return geometry, kept
-
-
-def _forgotten(graph: NodeGraph, geometry: Any, names: Sequence[str]) -> Any:
-    """A geometry without what was kept while it was worked out."""
-    for name in names:
-        node = graph.node("GeometryNodeRemoveAttribute")
-        graph.link(geometry, node.inputs["Geometry"])
-        node.inputs["Name"].default_value = name
-        geometry = node.outputs["Geometry"]
-    return geometry
 
 
 def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:

@@ -73,7 +73,16 @@ class NodeGraph:
         self.link(value, node.inputs["Value"])
         return node.outputs["Geometry"]
 
-    def math(self, operation: str, first: Any, second: Any) -> Any:
+    def forgotten(self, geometry: Any, *names: str) -> Any:
+        """Without some attributes, so that nothing carries them on."""
+        for name in names:
+            node = self.node("GeometryNodeRemoveAttribute")
+            self.link(geometry, node.inputs["Geometry"])
+            self.link(name, node.inputs["Name"])
+            geometry = node.outputs["Geometry"]
+        return geometry
+
+    def math(self, operation: str, first: Any, second: Any = 0.0) -> Any:
         node = self.node("ShaderNodeMath")
         node.operation = operation
         self.link(first, node.inputs[0])
@@ -81,16 +90,16 @@ class NodeGraph:
         return node.outputs["Value"]
 
     def both(self, first: Any, second: Any) -> Any:
-        return self._logic("AND", first, second)
+        return self.logic("AND", first, second)
 
     def either(self, first: Any, second: Any) -> Any:
-        return self._logic("OR", first, second)
+        return self.logic("OR", first, second)
 
-    def _logic(self, operation: str, first: Any, second: Any) -> Any:
+    def logic(self, operation: str, *operands: Any) -> Any:
         node = self.node("FunctionNodeBooleanMath")
         node.operation = operation
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
+        for operand, socket in zip(operands, node.inputs, strict=False):  # for one there may be two sockets
+            self.link(operand, socket)
         return node.outputs["Boolean"]
 
     def compare(self, operation: str, first: Any, second: Any) -> Any:
