@@ -76,19 +76,26 @@ def node_inputs(modifier: Any) -> list[tuple[str, Any]]:
     return [(name, modifier[name]) for name in names if name in modifier.keys()]  # noqa: SIM118  (no mapping)
 
 
-def set_node_input(modifier: Any, identifier: str, value: float) -> None:
-    """Set an input of a Geometry Nodes modifier."""
-    if hasattr(modifier, "properties"):
-        getattr(modifier.properties.inputs, identifier).value = value
-    else:
-        modifier[identifier] = value
-
-
-def node_input_property(modifier: Any, identifier: str) -> tuple[Any, str]:
-    """Where an input of a Geometry Nodes modifier is, for a panel: its owner and the path in it."""
-    if hasattr(modifier, "properties"):
+def input_field(modifier: Any, identifier: str) -> tuple[Any, str]:
+    """An input of a geometry nodes modifier as `layout.prop` takes it: what has it, and the path of the property."""
+    if hasattr(modifier, "properties"):  # from 5.2 on
         return getattr(modifier.properties.inputs, identifier), "value"
     return modifier, f'["{identifier}"]'
+
+
+def read_input(modifier: Any, identifier: str) -> Any:
+    """Value of an input of a geometry nodes modifier."""
+    owner, path = input_field(modifier, identifier)
+    return owner.value if path == "value" else owner.get(identifier)
+
+
+def write_input(modifier: Any, identifier: str, value: Any) -> None:
+    """Set an input of a geometry nodes modifier."""
+    owner, path = input_field(modifier, identifier)
+    if path == "value":
+        owner.value = value
+    else:
+        owner[identifier] = value
 
 
 def remove_scene(scene: bpy.types.Scene) -> None:
@@ -121,25 +128,3 @@ def show_in_sequencer(context: bpy.types.Context, scene: bpy.types.Scene) -> Non
     workspace: Any = context.workspace
     if workspace is not None and getattr(workspace, "sequencer_scene", scene) is None:
         workspace.sequencer_scene = scene
-
-
-def input_field(modifier: Any, identifier: str) -> tuple[Any, str]:
-    """An input of a geometry nodes modifier as `layout.prop` takes it: what has it, and the path of the property."""
-    if hasattr(modifier, "properties"):  # from 5.2 on
-        return getattr(modifier.properties.inputs, identifier), "value"
-    return modifier, f'["{identifier}"]'
-
-
-def read_input(modifier: Any, identifier: str) -> Any:
-    """Value of an input of a geometry nodes modifier."""
-    owner, path = input_field(modifier, identifier)
-    return owner.value if path == "value" else owner.get(identifier)
-
-
-def write_input(modifier: Any, identifier: str, value: Any) -> None:
-    """Set an input of a geometry nodes modifier."""
-    owner, path = input_field(modifier, identifier)
-    if path == "value":
-        owner.value = value
-    else:
-        owner[identifier] = value

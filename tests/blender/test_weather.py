@@ -54,7 +54,7 @@ def carrier(scene):
 def set_to(scene, **values):
     modifier = weather_modifier.modifier_of(carrier(scene))
     for name, identifier in weather.inputs_of(modifier).items():
-        compat.set_node_input(modifier, identifier, float(values.get(name, 1.0 if name == "Time Scale" else 0.0)))
+        compat.write_input(modifier, identifier, float(values.get(name, 1.0 if name == "Time Scale" else 0.0)))
     modifier.id_data.update_tag()
 
 
@@ -168,7 +168,7 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     assert values["Snowfall"] == pytest.approx(3.0)
     modifier = weather_modifier.modifier_of(ground)
     for name, identifier in weather.inputs_of(modifier).items():  # as the panel shows them
-        holder, path = compat.node_input_property(modifier, identifier)
+        holder, path = compat.input_field(modifier, identifier)
         assert holder.path_resolve(path) == values[name]
 
 

@@ -82,7 +82,7 @@ def set_preset(modifier: Any, preset: str) -> None:
 def _set(modifier: Any, values: Mapping[str, float]) -> None:
     for name, identifier in inputs_of(modifier).items():
         if name in values:
-            compat.set_node_input(modifier, identifier, float(values[name]))
+            compat.write_input(modifier, identifier, float(values[name]))
     modifier.id_data.update_tag()
 
 

@@ -39,7 +39,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         row.operator("softground.remove_weather", text="", icon="X")
         column = layout.column(align=True)
         for name, identifier in weather.inputs_of(modifier).items():
-            holder, path = compat.node_input_property(modifier, identifier)
+            holder, path = compat.input_field(modifier, identifier)
             column.prop(holder, path, text=name)
 
 
