@@ -61,9 +61,7 @@ def with_edits(left: BakeRecord, edits: Mapping[str, StepEdit], ground: SoftGrou
     InputError
         See `EditedSteps.pressed_again`.
     """
-    steps = EditedSteps(left.footprints, ground, cell_size)
-    again = steps.pressed_again(edits_by_number(left.footprints, edits))
-    return replace(left, edits=dict(edits), pressed_again=again)
+    return EditedSteps(left.footprints, ground, cell_size).left_with(left, edits)
 
 
 class EditedSteps:
@@ -88,6 +86,11 @@ class EditedSteps:
         self._met: dict[frozenset[frozenset[Change]], bool] = {}
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
         self._frames = np.array([(footprint.start_frame, footprint.end_frame) for footprint in footprints])
+
+    def left_with(self, left: BakeRecord, edits: Mapping[str, StepEdit]) -> BakeRecord:
+        """The record that the footprints are of, with other edits; errors as `pressed_again`."""
+        again = self.pressed_again(edits_by_number(left.footprints, edits))
+        return replace(left, edits=dict(edits), pressed_again=again)
 
     def pressed_again(self, edits: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
         """What stands for some of the footprints.

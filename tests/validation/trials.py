@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softground_addon.core.capture import c3d
-from softground_addon.core.capture.captured import Plate
+from softground_addon.core.capture.captured import Plate, bridged
 from softground_addon.core.capture.joint_centres import CapturedBody, captured_body
 from softground_addon.core.motion.motion import JOINTS, CharacterMotion, Sole, SoleMotion
 from softground_addon.core.numerics.intervals import runs
+from tests.validation.scoring import LOADED
 
 Array = NDArray[np.float64]
 
@@ -23,8 +24,6 @@ CSV_JOINTS = {"mid_hip": "hips"}
 """Joints that the files call otherwise than `JOINTS`."""
 MASSES = ("BODYMASS", "MASS", "WEIGHT")
 """Parameters of a C3D file that hold the subject's mass [kg]."""
-LOADED = 20.0
-"""Vertical force at which a plate is stepped on [N]."""
 KINDS = {"walk": "walk", "run": "run", "dj": "drop jump", "jump": "jump", "squat": "squat", "sts": "chair"}
 """Kinds of motion by a word in a trial's name; where there is none, the name says nothing ("other")."""
 
@@ -80,7 +79,7 @@ def read_trial(csv: Path) -> Trial:
         csv.stem,
         about["mass_kg"],
         about["rate_hz"],
-        {name: _bridged(vectors(name)) for name in names if not name.startswith("grf_")},
+        {name: bridged(vectors(name)) for name in names if not name.startswith("grf_")},
         np.nan_to_num(np.stack([vectors(f"grf_{side}") for side in SIDES], axis=1)),
         csv.with_suffix(".bvh"),
     )
@@ -137,15 +136,6 @@ def _distance(body: CapturedBody, side: str, place: Array, step: slice) -> Array
     """Along the ground from the middle of a foot, (F,) [m]."""
     middle = (body.joints[f"heel_{side}"][step] + body.joints[f"ball_{side}"][step]) / 2
     return np.asarray(np.linalg.norm((place - middle)[:, :2], axis=1))
-
-
-def _bridged(path: Array) -> Array:
-    """A path (F, 3) with straight lines where the marker was lost."""
-    seen = np.isfinite(path).all(axis=1)
-    if seen.all() or not seen.any():
-        return path
-    index = np.arange(len(path))
-    return np.stack([np.interp(index, index[seen], column[seen]) for column in path.T], axis=1)
 
 
 def motion_of_trial(trial: Trial) -> CharacterMotion:

@@ -13,7 +13,7 @@ from ...core.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record
-from ...core.record.edits import UNCHANGED, StepEdit, edits_by_number
+from ...core.record.edits import UNCHANGED, StepEdit
 from ...core.settings import BakeSettings
 from .. import jobs, settings
 from ..after import debris_object
@@ -49,8 +49,7 @@ class EditableBake:
 
     def with_edits(self, edits: Mapping[str, StepEdit]) -> record.BakeRecord:
         """The record with other edits in place of those that it has."""
-        again = self.steps.pressed_again(edits_by_number(self.left.footprints, edits))
-        return replace(self.left, edits=dict(edits), pressed_again=again)
+        return self.steps.left_with(self.left, edits)
 
 
 def editable(scene: bpy.types.Scene) -> EditableBake:

@@ -17,7 +17,7 @@ from ...core.capture.skeleton import skeleton_of
 from ...core.errors import InputError
 from ...core.files import files
 from ..operator_base import reports_errors
-from ..settings import scene_of, units_of
+from ..settings import frame_rate_of, scene_of, units_of
 from .captured_rig import new_plate, new_rig
 
 LARGEST = 2**31
@@ -82,7 +82,7 @@ class SOFTGROUND_OT_import_capture(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         scene = scene_of(context)
-        rate = scene.render.fps / scene.render.fps_base
+        rate = frame_rate_of(scene)
         first = scene.frame_start
 
         def frames(count: int, sampled: float) -> Any:

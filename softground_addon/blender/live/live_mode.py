@@ -73,9 +73,6 @@ class LiveMode:
         self._drawn_over: list[Window] = []
         self._owner = wanted.ground
         self._ground = _display_mesh(wanted, known)
-        self._begin(wanted, known)
-
-    def _begin(self, wanted: BakeSettings, known: analysis.Analysis) -> None:
         self._analysis, self._wanted = known, wanted
         self._playhead = Playhead(known.loads, ground_of(wanted, known.shot), wanted.cell_size_m)
 

@@ -51,14 +51,9 @@ def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> l
         )
         for number, sole in enumerate(character.motion.soles)
     ]
-    _write_text(path, opensim.storage(character.motion.name, time, feet))
+    files.write_text(path, opensim.storage(character.motion.name, time, feet))
     if path.suffix != ".mot":
         return [path]
     loads = path.with_suffix(".xml")
-    _write_text(loads, opensim.external_loads(character.motion.name, path.name, feet))
+    files.write_text(loads, opensim.external_loads(character.motion.name, path.name, feet))
     return [path, loads]
-
-
-def _write_text(path: Path, text: str) -> None:
-    with files.replacing(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")

@@ -88,6 +88,15 @@ class Capture:
             raise InputError(f"the file has a frame rate of {self.rate:g} Hz: export it again with its frame rate")
 
 
+def bridged(path: Array) -> Array:
+    """A path (F, 3) with straight lines where the marker was lost; one that was never seen stays as it is."""
+    seen = np.isfinite(path).all(axis=1)
+    if seen.all() or not seen.any():
+        return path
+    frames = np.arange(len(path))
+    return np.stack([np.interp(frames, frames[seen], column[seen]) for column in path.T], axis=1)
+
+
 def metres(unit: str) -> float:
     """Length of a unit [m].
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..numerics.rigid import unit
-from .captured import Capture, Plate
+from .captured import Capture, Plate, bridged
 from .marker_sets import places_of
 
 Array = NDArray[np.float64]
@@ -109,18 +109,11 @@ class _Places:
 
     def each(self, place: str) -> list[Array]:
         paths = [self._points[:, index] for index in self._indices.get(place, [])]
-        return [_bridged(path) for path in paths if np.isfinite(path).all(axis=1).any()]
+        return [bridged(path) for path in paths if np.isfinite(path).all(axis=1).any()]
 
     def get(self, place: str) -> Array | None:
         paths = self.each(place)
         return np.mean(paths, axis=0) if paths else None
-
-
-def _bridged(path: Array) -> Array:
-    """A path (F, 3) with straight lines where the marker was lost."""
-    seen = np.isfinite(path).all(axis=1)
-    frames = np.arange(len(path))
-    return np.stack([np.interp(frames, frames[seen], column[seen]) for column in path.T], axis=1)
 
 
 def _leg(points: _Places, side: str) -> dict[str, Array]:
