@@ -46,7 +46,7 @@ FRAME_LIMIT = 1_048_574
 MOST_LOOKED_AT = 100_000
 """Files and folders that the pattern of one shot may make us look at: a disk has millions, and a loop no end."""
 
-_FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report")
+_FROM_DEFAULTS = ("scene", "preset", "frames", "cell_size", "set", "edits", "save", "in_place", "report")
 _OF_A_SHOT = ("name", "file", "files", *_FROM_DEFAULTS)
 
 
@@ -70,6 +70,8 @@ class BatchShot:
         Size of the ground's cells [m]; None for what the shot has.
     settings : tuple of (str, str)
         Paths below `scene.softground` and their values, in order.
+    edits : Path or None
+        Changes of single steps, absolute; None for those that the shot has.
     save : Path or None
         Where the baked shot goes, absolute; None for nowhere or in place.
     in_place : bool
@@ -85,6 +87,7 @@ class BatchShot:
     frames: tuple[int, int] | None = None
     cell_size: float | None = None
     settings: tuple[tuple[str, str], ...] = ()
+    edits: Path | None = None
     save: Path | None = None
     in_place: bool = False
     report: Path | None = None
@@ -106,6 +109,8 @@ class BatchShot:
         if self.cell_size is not None:
             options.append(f"--cell-size={self.cell_size!r}")
         options += [f"--set={path}={value}" for path, value in self.settings]
+        if self.edits:
+            options.append(f"--edits={self.edits}")
         if self.save:
             options.append(f"--save={self.save}")
         if self.in_place:
@@ -291,11 +296,11 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
     in_place = values.get("in_place", False)
     if not isinstance(in_place, bool):
         raise InputError(f"{where}: 'in_place' must be true or false.")
-    save, report = (
+    edits, save, report = (
         _path(_text(values[key], f"{where}: '{key}'").replace("{name}", name), folder, f"{where}: '{key}'")
         if key in values
         else None
-        for key in ("save", "report")
+        for key in ("edits", "save", "report")
     )
     if in_place and save:
         raise InputError(f"{where}: give either 'save' or 'in_place', not both.")
@@ -314,6 +319,7 @@ def _shot(entry: Mapping[str, Any], defaults: Mapping[str, Any], file: Path, fol
         frames=_frames(values["frames"], where) if "frames" in values else None,
         cell_size=None if cell_size is None else float(cell_size),
         settings=tuple(overrides.items()),
+        edits=edits,
         save=save,
         in_place=in_place,
         report=report,
@@ -352,6 +358,8 @@ def check_places(
     for shot in shots:
         if shot.preset.lower().endswith(".json"):
             read[identity(Path(shot.preset))] = f"the preset of '{shot.name}'"
+        if shot.edits:
+            read[identity(shot.edits)] = f"the edits of '{shot.name}'"
     sources: dict[str, list[str]] = {}
     for shot in shots:
         sources.setdefault(identity(shot.file), []).append(shot.name)

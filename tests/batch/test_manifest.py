@@ -41,6 +41,7 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
         preset = "grounds/bog.json"
         frames = [-5, 1120]
         set.material.layer_depth = 0.5
+        edits = "edits/{name}.json"
         """
     )
     assert first == BatchShot(
@@ -59,6 +60,7 @@ def test_a_shot_takes_the_defaults_that_it_does_not_say_otherwise():
         "--cell-size=0.02",
         "--set=material.layer_depth=0.5",
         "--set=keep_forces=true",
+        f"--edits={FOLDER / 'edits/twenty.json'}",
         f"--save={FOLDER / 'baked/twenty.blend'}",
         f"--report={FOLDER / 'baked/twenty.json'}",
     ]
@@ -169,6 +171,8 @@ def test_a_manifest_that_is_a_pipe_or_never_ends_is_refused(tmp_path):
         ("{ file = 'a.blend', report = 'link/Night.TOML' }", "'a' would write over the manifest"),
         ("{ file = 'a.blend', report = 'bog.json' }, { file = 'b.blend', save = 'c', preset = 'bog.json' }",
          "'a' would write over the preset of 'b'"),
+        ("{ file = 'a.blend', report = 'e.json' }, { file = 'b.blend', save = 'c', edits = 'e.json' }",
+         "'a' would write over the edits of 'b'"),
         ("{ file = 'a.blend', save = 'link/B.blend' }, { file = 'b.blend', save = 'c' }", "'a' would write over"),
         ("{ file = 'a.blend', save = 'x/C' }, { file = 'b.blend', save = 'x/c' }", "'a' and 'b' both write"),
         ("{ file = 'a.blend', in_place = true }, { name = 'other', file = 'a.blend', scene = 'B', save = 'c' }",
@@ -199,7 +203,10 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
-KEYS = ("name", "file", "files", "scene", "preset", "frames", "cell_size", "set", "save", "in_place", "report", "other")
+KEYS = (
+    *("name", "file", "files", "scene", "preset", "frames", "cell_size", "set", "edits"),
+    *("save", "in_place", "report", "other"),
+)
 SHOTS = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 LIKELY = st.fixed_dictionaries({"shots": st.lists(SHOTS, max_size=3)}, optional={"defaults": SHOTS})
 

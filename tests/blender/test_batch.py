@@ -140,6 +140,30 @@ def test_a_shot_baked_in_place_is_baked_once(night):
 
 
 @pytest.mark.slow
+def test_changed_edits_bake_the_shot_again(night):
+    path = night(1)
+    edits, report = path.with_name("000.edits.json"), path.parent / "baked/000.json"
+    path.write_text(path.read_text().replace("shots =", "defaults.edits = '{name}.edits.json'\nshots =", 1))
+    edits.write_text('{"schema_version": 1, "steps": {}}')
+    plain = result_of(path, report, "done")
+    assert result_of(path, report, "skipped") == plain
+    step = plain["steps"][1]["id"]
+    edits.write_text(json.dumps({"schema_version": 1, "steps": {step: {"strength": 0.5}}}))
+    half = result_of(path, report, "done")
+    assert half["input_hash"] != plain["input_hash"]
+    assert half["steps"][1]["max_depth_m"] == pytest.approx(0.5 * plain["steps"][1]["max_depth_m"], rel=1e-3)
+    edits.write_text('{"schema_version": 1, "steps": {}}')
+    assert result_of(path, report, "done")["input_hash"] == plain["input_hash"]
+
+
+def result_of(path, report, status):
+    """The report of the only shot of a batch, which ends so."""
+    assert run(path, "--progress=none").returncode == 0
+    (outcome,) = json.loads(path.with_suffix(".batch").joinpath("batch.json").read_text())["shots"]
+    assert outcome["status"] == status
+    return json.loads(report.read_text())
+
+
 def test_a_changed_library_bakes_the_shot_again(night):
     manifest = night(1)
     rig = manifest.parent / "rig.blend"

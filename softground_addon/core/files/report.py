@@ -13,7 +13,7 @@ import numpy as np
 
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
-from ..record.edits import StepEdit, edit_as_json, edits_by_number, step_id
+from ..record.edits import StepEdit, edit_as_json, edits_by_number, step_id, to_json
 from ..record.footprints import Footprint
 from ..record.typical_depth import typical_of
 
@@ -45,7 +45,7 @@ def build(
     inputs : mapping
         The settings of the bake, in SI units.
     input_hash : str
-        From `hash_inputs`: equal for bakes with equal inputs.
+        From `hash_inputs`, of all inputs but the edits: with these, it is equal for bakes with equal inputs.
     footprints : sequence of Footprint
         In the order of their first contact, as they were baked.
     pressed_again, edits
@@ -82,7 +82,7 @@ def build(
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
-        "input_hash": input_hash,
+        "input_hash": hash_inputs(input_hash, to_json(edits)) if edits else input_hash,
         "steps": steps,
         "totals": {
             "steps": len(counted),
