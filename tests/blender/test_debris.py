@@ -176,6 +176,25 @@ def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
     assert fingerprints.of_mesh(scene.softground.ground.data) == ground
 
 
+def test_a_duplicate_of_the_ground_has_no_debris_and_cannot_take_the_first_ones_away(scene):
+    ground = scene.softground.ground
+    duplicate = ground.copy()
+    scene.collection.objects.link(duplicate)
+    assert debris_object.of(duplicate) is None
+    debris_object.remove(duplicate)
+    assert debris_object.of(ground) is not None
+
+
+def test_debris_that_was_deleted_in_the_viewport_goes_with_the_next_bake(scene):
+    ground = scene.softground.ground
+    deleted = debris_object.of(ground)
+    for collection in deleted.users_collection:
+        collection.objects.unlink(deleted)
+    assert debris_object.of(ground) is None
+    debris_object.remove(ground)
+    assert not any(one.name.startswith("SoftGround Debris") for one in bpy.data.objects)
+
+
 def test_off_costs_nothing_and_takes_the_older_away(scene):
     scene.softground.debris = False
     assert bpy.ops.softground.bake() == {"FINISHED"}

@@ -3,6 +3,7 @@
 import bpy
 import pytest
 
+from softground_addon.blender.after import debris_object
 from softground_addon.blender.settings import exists
 from tests.blender import grounds, responders
 from tests.blender.redraws import empty, fill, least_seconds, redraw, walk_over_all_objects
@@ -23,6 +24,13 @@ def baked_with_a_response(scene):
     responders.bake(scene)
 
 
+def baked_with_debris(scene):
+    scene.softground.debris = True
+    grounds.field(scene)
+    bpy.ops.softground.bake()
+    assert debris_object.of(scene.softground.ground) is not None
+
+
 def live(scene):
     grounds.field(scene)
     bpy.ops.softground.live()
@@ -35,7 +43,9 @@ def copy_deleted(scene):
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("set_up", [nothing_baked, baked_on_a_copy, baked_with_a_response, live, copy_deleted])
+@pytest.mark.parametrize(
+    "set_up", [nothing_baked, baked_on_a_copy, baked_with_a_response, baked_with_debris, live, copy_deleted]
+)
 def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, set_up):
     set_up(short_walk)
     bpy.ops.softground.predict_depth()

@@ -11,11 +11,14 @@ import numpy as np
 from ...core.after import flight
 from ...core.after.debris import Debris
 from .. import compat
+from ..settings import exists
 from . import debris_nodes as nodes
 from . import debris_shapes
 
 NAME = "SoftGround Debris"
 MODIFIER = "SoftGround Debris"
+THROWN = "softground_thrown"
+"""Property of the ground: its debris."""
 
 _AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0, "Shaped": nodes.SHAPED}
 
@@ -59,6 +62,7 @@ def put(
         collection.objects.link(obj)
     obj.parent = ground
     obj.matrix_parent_inverse = ground.matrix_world.inverted()
+    ground[THROWN] = obj
     shapes = debris_shapes.collection_of(surface)
     group = nodes.build(
         frame_rate=frame_rate * time_stretch,
@@ -75,8 +79,10 @@ def put(
 
 
 def of(ground: bpy.types.Object) -> bpy.types.Object | None:
-    """The debris of a ground's bake."""
-    return next((obj for obj in ground.children if obj.get(nodes.MARK)), None)
+    """The debris of a ground's bake; none of a ground that is a duplicate."""
+    debris = ground.get(THROWN)
+    belongs = exists(debris) and debris.get(nodes.MARK) and debris.parent == ground
+    return debris if belongs else None
 
 
 def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
@@ -103,7 +109,8 @@ def leave_out(ground: bpy.types.Object, steps: Collection[int]) -> None:
 
 def remove(ground: bpy.types.Object) -> None:
     """Take a ground's debris away; nothing happens where there is none."""
-    while obj := of(ground):
+    obj = ground.pop(THROWN, None)
+    if obj is not None and obj.get(nodes.MARK) and obj.parent == ground:
         groups = [modifier.node_group for modifier in obj.modifiers if modifier.type == "NODES" and modifier.node_group]
         mesh: Any = obj.data
         bpy.data.objects.remove(obj)
