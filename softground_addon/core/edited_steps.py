@@ -7,7 +7,7 @@ or an edit of a single step, gets the same footprints from them, bit for bit.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 import numpy as np
@@ -19,7 +19,7 @@ from .ground.soft_ground import SoftGround
 from .numerics.cell_keys import ROW, Keys, among
 from .numerics.rigid import rotation, turn_between, unit
 from .pressing.contact_layout import ContactLayout
-from .pressing.ground_cells import Timing, UndisturbedCells
+from .pressing.ground_cells import Imprints, Timing, UndisturbedCells
 from .pressing.open_contact import OpenContact
 from .pressing.prop_layout import PropLayout
 from .pressing.sole_layout import SoleLayout
@@ -82,6 +82,8 @@ class EditedSteps:
         undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
         self._solver = GroundSolver(ground, HeightField(cell_size), undisturbed)
         self._points: dict[int, SolePoints] = {}
+        self._layouts: dict[Change, _Layout] = {}
+        """Of the group that was pressed last: they take memory."""
         self._known: dict[frozenset[Change], _Group] = {}
         self._met: dict[frozenset[frozenset[Change]], bool] = {}
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
@@ -145,6 +147,7 @@ class EditedSteps:
             if not later:
                 break
             members |= dict.fromkeys(later, UNCHANGED)
+        self._layouts = {change: self._layouts[change] for change in members.items() if change in self._layouts}
         kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
         windows = [footprint.window for footprint in kept.values() if footprint]
         window = _union([*windows, *(self._footprints[n].window for n in kept)])
@@ -201,15 +204,14 @@ class EditedSteps:
     def _press(self, members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
         """The prints of some steps, on what all others leave."""
         moving = {n: edit for n, edit in sorted(members.items()) if not edit.mute}
-        layouts = {n: self._layout(self._footprints[n], edit) for n, edit in moving.items()}
+        layouts = {change[0]: self._layout(change) for change in moving.items()}
         prints: dict[int, Footprint | None] = dict.fromkeys(sorted(members))
         if layouts:
             prints |= self._run(layouts, members)
         return prints
 
-    def _run(
-        self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit]
-    ) -> dict[int, Footprint | None]:
+    def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
+        layouts = {n: one.layout for n, one in laid.items()}
         grid = _grid(self._footprints[next(iter(layouts))])
         start = min(layout.first for layout in layouts.values())
         end = max(layout.end for layout in layouts.values())
@@ -218,7 +220,7 @@ class EditedSteps:
         self._solver.state = HeightField(self._cell_size)
         for other in others:
             _add(self._solver.state, other.until(grid.frame(first - 1)))
-        contacts = {n: OpenContact(layout) for n, layout in layouts.items()}
+        contacts = {n: OpenContact(one.layout, laid_out=one.imprints) for n, one in laid.items()}
         prints: dict[int, Footprint | None] = {}
         for number in range(first, grid.number(end - 1) + 1):
             frame, steps = grid.frame(number), grid.steps(number)
@@ -247,7 +249,12 @@ class EditedSteps:
         near &= self._frames[:, 0] <= end
         return [_Baked(self._footprints[n]) for n in np.flatnonzero(near).tolist() if n not in members]
 
-    def _layout(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
+    def _layout(self, change: Change) -> _Layout:
+        if change not in self._layouts:
+            self._layouts[change] = _Layout(self._laid_out(self._footprints[change[0]], change[1]))
+        return self._layouts[change]
+
+    def _laid_out(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
         """A step where it is pressed now."""
         kept = footprint.pressed_by
         if kept is None:
@@ -276,6 +283,14 @@ class EditedSteps:
         if id(pressing) not in self._points:
             self._points[id(pressing)] = sole_points(pressing.sole, pressing.flat[None])
         return self._points[id(pressing)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """A contact to be pressed, and what was laid out of it, which is the same whatever lies there."""
+
+    layout: ContactLayout
+    imprints: dict[tuple[int, int], Imprints] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -378,7 +378,11 @@ class TerrainTiles:
 
 def _slope(before: Array, after: Array) -> Array:
     """Slope of cells from those to both sides, 0 where neither is known."""
-    before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
+    edges = np.isnan(before) | np.isnan(after)
+    if edges.any():
+        before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
+    elif not (before.any() or after.any()):
+        return np.zeros(before.shape)
     gentler = np.where(np.abs(before) < np.abs(after), before, after)
     return np.nan_to_num(np.where(before * after > 0, (before + after) / 2, gentler))
 

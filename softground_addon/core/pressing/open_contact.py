@@ -24,6 +24,9 @@ class OpenContact:
         The contact that this one goes on from without leaving the ground, where a long track is cut into several.
     pressed_by : ContactSteps, optional
         What its footprint keeps of it.
+    laid_out : dict, optional
+        The imprints that the layout gave on this ground when it was pressed before, by their steps; what is
+        missing is added.
 
     Attributes
     ----------
@@ -36,7 +39,11 @@ class OpenContact:
     """
 
     def __init__(
-        self, layout: ContactLayout, earlier: OpenContact | None = None, pressed_by: ContactSteps | None = None
+        self,
+        layout: ContactLayout,
+        earlier: OpenContact | None = None,
+        pressed_by: ContactSteps | None = None,
+        laid_out: dict[tuple[int, int], Imprints] | None = None,
     ) -> None:
         self.layout, self.earlier, self.pressed_by = layout, earlier, pressed_by
         self.recorder: FootprintRecorder | None = None
@@ -45,6 +52,7 @@ class OpenContact:
         self._load = self._area = self._sinkage = 0.0
         self._moment = np.zeros(3)
         self._imprints: Imprints | None = None
+        self._laid_out = laid_out
 
     def imprints(self, start: int, end: int, cells: GroundCells, timing: Timing) -> Imprints:
         """The imprints of steps that follow those pressed last, among others."""
@@ -52,7 +60,12 @@ class OpenContact:
         if imprints is None or imprints.end < end:
             if imprints is not None:
                 self._sinkage = imprints.reached
-            imprints = self._imprints = self.layout.lay_out(start, end, cells, timing, self._sinkage)
+            imprints = self._laid_out.get((start, end)) if self._laid_out is not None else None
+            if imprints is None:
+                imprints = self.layout.lay_out(start, end, cells, timing, self._sinkage)
+            if self._laid_out is not None:
+                self._laid_out[start, end] = imprints
+            self._imprints = imprints
         return imprints
 
     def add_loads(self, imprints: Imprints, first: int, last: int) -> None:

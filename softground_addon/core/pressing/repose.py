@@ -7,6 +7,7 @@ pairs at once, so that nothing overshoots and the volume is kept to rounding.
 
 from __future__ import annotations
 
+from functools import cache
 from math import ceil, sqrt, tan
 
 import numpy as np
@@ -27,13 +28,15 @@ Pair = tuple[tuple[slice, slice], tuple[slice, slice], float]
 """Slices of the one and the other cells of many pairs, and how many cells apart they are."""
 
 
+@cache
 def _pairs(row: int, column: int) -> tuple[Pair, ...]:
-    """Pairs of neighbours in eight disjoint sets, the same in the plane wherever a window starts."""
+    """Pairs of neighbours in eight disjoint sets, the same in the plane wherever a window starts: in a row or column
+    that is even (0) or odd (1)."""
     whole, ahead, behind = slice(None), slice(1, None), slice(None, -1)
     pairs: list[Pair] = []
     for number in (0, 1):
         (row_one, row_other), (column_one, column_other) = (
-            (slice(first, -1, 2), slice(first + 1, None, 2)) for first in ((number + row) % 2, (number + column) % 2)
+            (slice(first, -1, 2), slice(first + 1, None, 2)) for first in (number ^ row, number ^ column)
         )
         pairs += [((whole, column_one), (whole, column_other), 1.0), ((row_one, whole), (row_other, whole), 1.0)]
         pairs += [
@@ -90,7 +93,7 @@ def slid(
     base = ground - compression
     steepest = tan(angle) * cell_size
     pairs = []
-    for one, other, distance in _pairs(*corner):
+    for one, other, distance in _pairs(corner[0] % 2, corner[1] % 2):
         rest = np.maximum(np.abs(ground[one] - ground[other]), steepest * distance)
         rest[fixed[one] | fixed[other]] = np.inf
         pairs.append((one, other, base[one] - base[other], rest))
@@ -101,7 +104,7 @@ def slid(
             difference += drop
             excess = np.abs(difference)
             excess -= rest
-            largest = float(excess.max(initial=0.0))
+            largest = np.maximum.reduce(excess, axis=None, initial=0.0)  # max() takes twice as long to call
             if largest <= AT_REST * steepest:
                 continue
             most = max(most, largest)
