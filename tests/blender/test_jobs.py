@@ -1,8 +1,6 @@
 """Jobs compute in slices, so that Blender answers between them."""
 
-import ast
 import time
-from pathlib import Path
 
 import bpy
 import pytest
@@ -11,8 +9,6 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.jobs import Progress, meanwhile, run
 from softground_addon.core.numerics.slices import sliced
 from tests.blender.shots import walker
-
-ADDON = Path(__file__).parents[2] / "softground_addon"
 
 LONGEST_STEP = 0.1
 """Longest time that a step of a bake may take of the processor [s]."""
@@ -53,22 +49,6 @@ def test_what_goes_wrong_in_a_slice_is_told():
         run(meanwhile(NOW, failing.slices()))
     with pytest.raises(ZeroDivisionError):
         failing()
-
-
-def imports(path):
-    """Names of the modules that a file imports."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (name.name for name in node.names)
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            yield node.module
-
-
-def test_nothing_starts_a_thread():
-    """Blender does not support threads in extensions ("Python Threads are Not Supported" in its reference)."""
-    starts_threads = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
-    modules = [path for path in ADDON.rglob("*.py") if starts_threads & {name.split(".")[0] for name in imports(path)}]
-    assert modules == []
 
 
 def steps_of(job):
