@@ -34,6 +34,9 @@ from ..core.files.files import identity, read_regular
 LONGEST_NAME = 150
 """Most bytes of a shot's name in UTF-8: file systems take 255, of which the names of partial files need some."""
 
+_NOT_IN_NAMES = '/\\<>:"|?*' if os.name == "nt" else "/\\"
+"""Letters that no part of a file's name may have; on Windows a colon would even hide the file within another."""
+
 LARGEST = 2**24
 """Size of a manifest that is read [bytes]: a hundred thousand shots."""
 
@@ -391,10 +394,10 @@ def _check_names(shots: Iterable[BatchShot], origin: str) -> None:
 
 def _name(value: object, where: str) -> str:
     name = _text(value, f"{where}: 'name'")
-    if name in (".", "..") or "/" in name or "\\" in name or len(name.encode()) > LONGEST_NAME:
+    if name in (".", "..") or set(name) & set(_NOT_IN_NAMES) or len(name.encode()) > LONGEST_NAME:
         raise InputError(
-            f"{where}: the name {name!r} cannot be part of a file's name: give a 'name' without slashes, of at most "
-            f"{LONGEST_NAME} bytes."
+            f"{where}: the name {name!r} cannot be part of a file's name: give a 'name' without any of {_NOT_IN_NAMES} "
+            f"and of at most {LONGEST_NAME} bytes."
         )
     return name
 

@@ -26,8 +26,9 @@ from .manifest import BatchShot
 
 try:
     import fcntl
-except ImportError:  # Windows: two batches over one manifest are not kept apart there
+except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
+    import msvcrt
 
 ATTEMPTS = 2
 """How often a shot is tried whose process crashes."""
@@ -212,7 +213,7 @@ class _Batch:
 
     def run(self, shots: Sequence[BatchShot]) -> list[Outcome]:
         waiting = deque(shots)
-        with tempfile.TemporaryDirectory(prefix="softground-") as folder:
+        with tempfile.TemporaryDirectory(prefix="softground-", ignore_cleanup_errors=True) as folder:
             self._printed = Path(folder)
             try:
                 while waiting or self._running:
@@ -338,14 +339,22 @@ def _locked(path: Path) -> IO[bytes]:
     """The lock file, locked; waits for a worker that a killed batch has left behind and that is about to end."""
     lock = path.open("ab")
     deadline = time.monotonic() + PATIENCE
-    while fcntl is not None:
+    while True:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            _try_lock(lock)
+        except (BlockingIOError, PermissionError):
             if time.monotonic() > deadline:
                 lock.close()
                 raise OSError(0, "another process is baking this shot", str(path)) from None
             time.sleep(POLL)
         else:
-            break
-    return lock
+            return lock
+
+
+def _try_lock(lock: IO[bytes]) -> None:
+    """Lock a file; BlockingIOError (PermissionError on Windows) where another process has."""
+    if fcntl is not None:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    else:
+        lock.seek(0)  # the same byte for everybody
+        msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)

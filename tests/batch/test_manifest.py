@@ -117,8 +117,8 @@ def test_a_pattern_is_a_shot_for_each_file(tmp_path):
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = inf }", "'a' is inf"),
         ("[[shots]]\nfile = 'a.blend'\nin_place = true\nset = { a = [1] }", r"'a' is \[1\]"),
         (f"[[shots]]\nfile = 'a.blend'\nin_place = true\nset.{'a.' * 3000}b = 1", "within more than 10 others"),
-        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = 'a/b'", "without slashes"),
-        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '..'", "without slashes"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = 'a/b'", "without any of /"),
+        ("[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '..'", "without any of /"),
         (f"[[shots]]\nfile = 'a.blend'\nin_place = true\nname = '{'ä' * 76}'", "150 bytes"),
         ("[[shots]]\nfiles = '*.nothing'\nin_place = true", r"no file fits the pattern '\*.nothing'"),
         ("[[shots]]\nfiles = '*.blend'\nname = 'a'\nin_place = true", "leave 'name' out"),
@@ -132,6 +132,14 @@ def test_a_broken_manifest_is_refused_with_the_place_and_what_is_wrong(text, say
     with pytest.raises(InputError, match=says) as error:
         parse(text)
     assert str(error.value).startswith("night.toml")
+
+
+def test_on_windows_a_name_has_no_colon_that_would_hide_its_files_in_others(monkeypatch):
+    text = "[[shots]]\nfile = 'a.blend'\nin_place = true\nname = 'a:b'"
+    assert parse(text)[0].name == "a:b"
+    monkeypatch.setattr("softground_addon.batch.manifest._NOT_IN_NAMES", '/\\<>:"|?*')
+    with pytest.raises(InputError, match="'a:b' cannot be part of a file's name"):
+        parse(text)
 
 
 def test_all_missing_shots_are_named_at_once(tmp_path):

@@ -253,6 +253,35 @@ def test_two_batches_do_not_bake_the_same_shot_at_the_same_time(batch, monkeypat
     assert len(batch.runs(shot)) == 1
 
 
+class Msvcrt:
+    """Locks as on Windows: one byte of a file, refused with PermissionError while another handle has it."""
+
+    LK_NBLCK = 2
+
+    def __init__(self, refused):
+        self.refused, self.locked = refused, []
+
+    def locking(self, handle, mode, size):
+        assert (mode, size, os.lseek(handle, 0, os.SEEK_CUR)) == (self.LK_NBLCK, 1, 0)
+        if self.refused:
+            self.refused -= 1
+            raise PermissionError(13, "Permission denied")
+        self.locked.append(handle)
+
+
+def test_on_windows_a_shot_is_locked_too(batch, monkeypatch):
+    windows = Msvcrt(refused=2)
+    monkeypatch.setattr("softground_addon.batch.runner.fcntl", None)
+    monkeypatch.setattr("softground_addon.batch.runner.msvcrt", windows, raising=False)
+    assert statuses(batch.run(batch.shot("a"))) == ["done"]
+    assert len(windows.locked) == 1
+    windows.refused = 10**6
+    monkeypatch.setattr("softground_addon.batch.runner.PATIENCE", 0.2)
+    (outcome,) = batch.run(batch.shot("b"))
+    assert outcome.status == "refused"
+    assert "another process is baking this shot" in outcome.message
+
+
 def test_what_a_killed_worker_left_behind_is_removed(batch):
     shot = batch.shot("a")
     (batch.folder / "baked").mkdir()

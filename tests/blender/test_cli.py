@@ -1,5 +1,7 @@
 """The command line: one shot in, a baked shot and a report out, and exit codes that a farm can trust."""
 
+import contextlib
+import io
 import json
 import os
 import signal
@@ -283,6 +285,14 @@ def test_an_output_that_nobody_reads_stops_no_bake(shot, tmp_path, output):
     assert process.returncode == 0, errors
     assert "Traceback" not in errors
     assert json.loads(report.read_text())["steps"]
+
+
+def test_letters_that_an_output_does_not_have_stop_no_bake():
+    """A pipe on Windows takes those of one code page."""
+    pipe = io.TextIOWrapper(io.BytesIO(), encoding="cp1252", newline="")
+    with contextlib.redirect_stdout(cli._Unbroken(pipe)):
+        print("Läufer 雪: 3 steps", flush=True)
+    assert pipe.buffer.getvalue() == "Läufer \\u96ea: 3 steps\n".encode("cp1252")
 
 
 def test_a_library_of_the_shot_is_not_written_over(scene, tmp_path, capfd):

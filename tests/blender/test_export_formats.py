@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import bpy
@@ -98,6 +99,14 @@ def test_opensim_gets_the_forces_that_bear_the_body_y_up(scene, tmp_path):
     assert np.abs(heights).max() < 0.05
     assert bpy.ops.softground.export(filepath=str(tmp_path / "walk"), format="OPENSIM_STO") == {"FINISHED"}
     assert opensim_table(tmp_path / "walk.sto").keys() == columns.keys()
+
+
+def test_opensim_files_of_several_characters_differ_also_where_case_does_not_count(tmp_path, monkeypatch):
+    everybody = [SimpleNamespace(motion=SimpleNamespace(name=name)) for name in ("A 1", "a_1", "A:1", "B")]
+    monkeypatch.setattr(opensim_exports.analysis, "read", lambda _scene: SimpleNamespace(loads=everybody))
+    monkeypatch.setattr(opensim_exports, "_write_one", lambda _who, path, _start, _end: [path])
+    written = opensim_exports.write(bpy.context.scene, tmp_path / "walk.mot", 1, 2)
+    assert [path.name for path in written] == ["walk_A_1.mot", "walk_a_1_2.mot", "walk_A_1_3.mot", "walk_B.mot"]
 
 
 def test_a_point_cache_holds_the_frames_asked_for_and_plays_on_the_ground(scene, tmp_path):

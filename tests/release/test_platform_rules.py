@@ -118,6 +118,12 @@ def test_files_are_written_whole_and_nowhere_else():
     assert {path for path, tree in TREES.items() if any(writes(tree))} == set(WRITERS)
 
 
+def test_text_has_the_same_line_ends_on_every_system():
+    """`Path.write_text` writes others on Windows."""
+    written = {ast.unparse(call.func) for tree in TREES.values() for call, name in calls(tree) if name == "write_text"}
+    assert written <= {"files.write_text", "write_text"}
+
+
 def test_the_manifest_says_what_the_platform_wants_to_know():
     assert set(ABOUT["permissions"]) == {"files"}
     for line in (ABOUT["tagline"], *ABOUT["permissions"].values()):

@@ -50,14 +50,18 @@ def _run(arguments: Sequence[str], *, standalone: bool) -> int:
 
 
 class _Unbroken(io.TextIOBase):
-    """An output that goes on where nobody reads it any more, as before `| head`, or where it has no room."""
+    """An output that goes on where nobody reads it any more, as before `| head`, or where it has no room or no letter.
+
+    On Windows a pipe takes the letters of one code page only, unless Python is told otherwise.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
+        encoding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
-            self._stream.write(text)
+            self._stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
         except OSError:
             self._hush()
         return len(text)
@@ -177,7 +181,7 @@ def _clean(options: argparse.Namespace) -> None:
             _save_copy(results.enter_context(files.replacing(target)))
         if options.report:
             path = results.enter_context(files.replacing(Path(os.path.realpath(options.report))))
-            path.write_text(report.dump(cleaned.as_dict()), encoding="utf-8")
+            path.write_bytes(report.dump(cleaned.as_dict()).encode())
     print(cleaned.summary, flush=True)
     for warning in cleaned.warnings:
         print(f"softground: {warning}", file=sys.stderr)
@@ -241,7 +245,7 @@ def _write_results(
         if options.report:
             path = Path(os.path.realpath(options.report))
             wrote[path] = results.enter_context(files.replacing(path))
-            wrote[path].write_text(report.dump(content), encoding="utf-8")
+            wrote[path].write_bytes(report.dump(content).encode())
         if receipt:
             content_of_receipt = receipts.dump(
                 made_by=program.made_by(),
@@ -250,7 +254,7 @@ def _write_results(
                 wrote={str(path): receipts.checksum(partial) for path, partial in wrote.items()},
                 totals=content["totals"],
             )
-            receipt.write_text(content_of_receipt, encoding="utf-8")
+            receipt.write_bytes(content_of_receipt.encode())
 
 
 def _open(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 
 import bpy
@@ -27,10 +28,16 @@ def write(scene: bpy.types.Scene, path: Path, start: int, end: int) -> list[Path
         If the shot cannot be read, or a file cannot be written.
     """
     everybody = analysis.read(scene).loads
-    written = []
+    written: list[Path] = []
+    taken: set[str] = set()
     for character in everybody:
-        own = f"_{bpy.path.clean_name(character.motion.name)}" if len(everybody) > 1 else ""
-        written += _write_one(character, path.with_stem(path.stem + own), start, end)
+        own = path
+        if len(everybody) > 1:
+            stem = f"{path.stem}_{bpy.path.clean_name(character.motion.name)}"
+            numbered = (f"{stem}_{number}" if number > 1 else stem for number in count(1))
+            own = path.with_stem(next(name for name in numbered if name.casefold() not in taken))
+            taken.add(own.stem.casefold())
+        written += _write_one(character, own, start, end)
     return written
 
 

@@ -10,6 +10,7 @@ import re
 import secrets
 import shutil
 import stat
+import time
 import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -74,7 +75,7 @@ def replacing(path: Path) -> Iterator[Path]:
             os.fsync(written.fileno())
         if path.exists():
             shutil.copymode(path, partial)
-        partial.replace(path)
+        _rename(partial, path)
         _sync_folder(path.parent)  # without which a power cut may take the new name back
     except OSError as error:
         raise _not_written(path, error) from error
@@ -141,7 +142,7 @@ def remove_leftovers(path: Path) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all (see `replacing`)."""
     with replacing(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+        partial.write_bytes(text.encode())  # the same bytes on every system
 
 
 def _partial(path: Path) -> Path:
@@ -152,6 +153,27 @@ def _partial(path: Path) -> Path:
         raise InputError(f"'{path}' is write-protected: choose another name, or let it be written.")
     # Containers share process ids, and some writers go by the suffix.
     return path.with_name(f".{path.stem}.{_MACHINE}-{secrets.token_hex(8)}.partial{path.suffix}")
+
+
+_IN_USE = (5, 32)
+"""What Windows calls a file that another program has open, as scanners and sync clients do with new ones."""
+
+_PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""Before a file in use is tried again [s]."""
+
+
+def _rename(partial: Path, path: Path) -> None:
+    """Give a file its name; where Windows says that it is in use, wait for whoever only looks at it."""
+    for pause in _PAUSES:
+        try:
+            partial.replace(path)
+        except PermissionError as error:
+            if getattr(error, "winerror", None) not in _IN_USE:
+                raise
+            time.sleep(pause)
+        else:
+            return
+    partial.replace(path)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -36,6 +36,48 @@ def test_text_is_written(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
 
 
+class InUseError(PermissionError):
+    """As Windows raises it for a file that another program has open."""
+
+    winerror = 32
+
+
+@pytest.mark.parametrize("times", [0, 3, 100])
+def test_a_file_that_a_scanner_looks_at_for_a_moment_is_replaced(tmp_path, monkeypatch, times):
+    rename, tries = Path.replace, []
+
+    def replace(self, target):
+        tries.append(self)
+        if len(tries) <= times:
+            raise InUseError(13, "in use", str(target))
+        return rename(self, target)
+
+    path, pauses = tmp_path / "a.json", []
+    path.write_text("old")
+    monkeypatch.setattr(Path, "replace", replace)
+    monkeypatch.setattr("softground_addon.core.files.files.time.sleep", pauses.append)
+    if times < 100:
+        write_text(path, "new")
+        assert path.read_text() == "new"
+        assert len(pauses) == times
+    else:
+        with pytest.raises(InputError, match="could not be written"):
+            write_text(path, "new")
+        assert path.read_text() == "old"
+        assert 1.0 < sum(pauses) < 3.0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_where_writing_is_forbidden_nobody_waits(tmp_path, monkeypatch):
+    def replace(self, target):
+        raise PermissionError(1, "not permitted", str(target))
+
+    monkeypatch.setattr(Path, "replace", replace)
+    monkeypatch.setattr("softground_addon.core.files.files.time.sleep", lambda pause: pytest.fail("waits"))
+    with pytest.raises(InputError, match="not permitted"):
+        write_text(tmp_path / "a.json", "new")
+
+
 def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path):
     path = tmp_path / "a.json"
     path.write_text("old")
