@@ -1,4 +1,4 @@
-"""A layer of keys above an object's own animation, as NLA tracks; taking it away restores everything as it was.
+"""Layers of keys above an object's own animation, as NLA tracks; taking one away restores everything as it was.
 
 The user's active action moves, as it is, onto a track of its own below the layer, since Blender evaluates an active
 action above all tracks. Channels that the layer changes but nothing animates get their standing value on a third track
@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import bpy
 import numpy as np
@@ -24,12 +25,49 @@ RESPONSE = "SoftGround Response"
 EXTRA = "SoftGround Response +"
 SOURCE = "SoftGround Source"
 STANDING = "SoftGround Standing Pose"
-OWN_TRACKS = (RESPONSE, EXTRA, SOURCE, STANDING)
 
 
-def has_layer(obj: bpy.types.Object) -> bool:
+@dataclass(frozen=True)
+class LayerKind:
+    """What a layer is for: a kind lies on an object once, above those that were put on before.
+
+    Attributes
+    ----------
+    name : str
+        Of its action.
+    tracks : tuple of str
+        Of its keys; with two its strength goes to 2.
+    source, standing : str
+        Tracks of the user's action, and of the standing values.
+    extrapolation : 'NOTHING' or 'HOLD'
+        What it does before its first frame and after its last.
+    """
+
+    name: str
+    tracks: tuple[str, ...]
+    source: str
+    standing: str
+    extrapolation: Literal["NOTHING", "HOLD"]
+
+    @property
+    def all_tracks(self) -> tuple[str, ...]:
+        """All that it may have."""
+        return (*self.tracks, self.source, self.standing)
+
+
+ANSWER = LayerKind("Response", (RESPONSE, EXTRA), SOURCE, STANDING, "NOTHING")
+"""What the ground does to a character, as it is baked, above all else."""
+TRAVEL = LayerKind(
+    "Root Motion", ("SoftGround Root Motion",), "SoftGround Root Source", "SoftGround Root Standing", "HOLD"
+)
+"""Root motion: a part of the animation, for bakes."""
+OWN_TRACKS = (*ANSWER.all_tracks, *TRAVEL.all_tracks)
+SOURCES = (ANSWER.source, TRAVEL.source)
+
+
+def has_layer(obj: bpy.types.Object, kind: LayerKind = ANSWER) -> bool:
     """Whether a layer lies on the object's animation."""
-    return _track(obj, RESPONSE) is not None or copied_action.is_on(obj)
+    return _track(obj, kind.tracks[0]) is not None or (kind is ANSWER and copied_action.is_on(obj))
 
 
 def check_layerable(obj: bpy.types.Object) -> None:
@@ -54,10 +92,11 @@ def add_layer(
     curves: Sequence[LayerCurve],
     frames: tuple[float, float],
     notes: Mapping[str, str] | None = None,
+    kind: LayerKind = ANSWER,
 ) -> None:
-    """Put curves above the object's animation; a layer that is there already goes first.
+    """Put curves above the object's animation; a layer of the kind that is there already goes first.
 
-    Where the object's NLA is switched off, the object gets a copy of its action with the curves in it.
+    Where the object's NLA is switched off, the object gets a copy of its action with the response in it.
 
     Parameters
     ----------
@@ -68,6 +107,8 @@ def add_layer(
         First and last frame, as the animation counts them; the layer acts between them only.
     notes : mapping of str to str, optional
         Kept with the layer's action, for `notes_of`.
+    kind : LayerKind
+        All but the response wants the object's NLA switched on.
 
     Raises
     ------
@@ -75,13 +116,13 @@ def add_layer(
         If the object can take no layer.
     """
     check_layerable(obj)
-    strength = strength_of(obj)
-    remove_layer(obj)
-    if obj.animation_data is not None and not obj.animation_data.use_nla:
+    strength = strength_of(obj) if kind is ANSWER else 1.0
+    remove_layer(obj, kind)
+    if kind is ANSWER and obj.animation_data is not None and not obj.animation_data.use_nla:
         copied_action.put(obj, curves, frames, notes or {}, 1.0 if strength is None else strength)
         return
     standing = _standing_values(obj, curves)
-    action = new_action(f"{obj.name} Response", obj, curves)
+    action = new_action(f"{obj.name} {kind.name}", obj, curves)
     for key, text in (notes or {}).items():
         action[key] = text
     animation = obj.animation_data or obj.animation_data_create()
@@ -91,43 +132,49 @@ def add_layer(
         settings = (animation.action_blend_type, animation.action_extrapolation, animation.action_influence)
         slot = slot_of(animation)
         animation.action = None
-        strip = _add_strip(animation, SOURCE, own, slot, span)
+        strip = _add_strip(animation, kind.source, own, slot, span)
         strip.blend_type, strip.extrapolation = settings[:2]
         if settings[2] != 1.0:
             _set_influence(strip, settings[2])
     if standing:
         below = new_action(f"{obj.name} Standing Pose", obj, standing)
-        strip = _add_strip(animation, STANDING, below, slot_of_action(below), span, bottom=True)
+        strip = _add_strip(animation, kind.standing, below, slot_of_action(below), span, bottom=True)
         strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
-    for name in (RESPONSE, EXTRA):
+    for name in kind.tracks:
         strip = _add_strip(animation, name, action, slot_of_action(action), frames)
-        strip.blend_type, strip.extrapolation = "COMBINE", "NOTHING"
-    set_strength(obj, 1.0 if strength is None else strength)
+        strip.blend_type, strip.extrapolation = "COMBINE", kind.extrapolation
+    if kind is ANSWER:
+        set_strength(obj, 1.0 if strength is None else strength)
 
 
-def notes_of(obj: bpy.types.Object) -> dict[str, str]:
+def notes_of(obj: bpy.types.Object, kind: LayerKind = ANSWER) -> dict[str, str]:
     """What was noted with the layer; nothing where there is none."""
-    if copied_action.is_on(obj):
+    if kind is ANSWER and copied_action.is_on(obj):
         return copied_action.notes_of(obj)
-    strip = _strip(obj, RESPONSE)
+    strip = _strip(obj, kind.tracks[0])
     action = strip.action if strip else None
     return {key: str(action[key]) for key in action.keys()} if action else {}  # noqa: SIM118
 
 
-def remove_layer(obj: bpy.types.Object) -> None:
-    """Take the layer off; the object is animated as before. Nothing happens where there is none."""
+def remove_layer(obj: bpy.types.Object, kind: LayerKind = ANSWER) -> None:
+    """Take the layer off, and a response that lies on it; the object is animated as before. Nothing happens where there
+    is none."""
     copied_action.remove(obj)
-    if not has_layer(obj):
+    if kind is not ANSWER:
+        remove_layer(obj)
+    if not has_layer(obj, kind):
         return
     animation = obj.animation_data
     assert animation is not None
-    source, standing = _strip(obj, SOURCE), _strip(obj, STANDING)
+    source, standing = _strip(obj, kind.source), _strip(obj, kind.standing)
     values = _constants(standing) if standing else []
     restored = None
     if source is not None and source.action is not None:
         restored = (source.action, slot_of(source), source.blend_type, source.extrapolation, _influence(source))
-    left_over = {strip.action for name in (RESPONSE, STANDING) if (strip := _strip(obj, name)) and strip.action}
-    for name in OWN_TRACKS:
+    left_over = {
+        strip.action for name in (kind.tracks[0], kind.standing) if (strip := _strip(obj, name)) and strip.action
+    }
+    for name in kind.all_tracks:
         track = _track(obj, name)
         if track is not None:
             animation.nla_tracks.remove(track)
@@ -186,8 +233,8 @@ def without_layer(obj: bpy.types.Object) -> Iterator[None]:
 
 
 def moved_action(obj: bpy.types.Object) -> bpy.types.Action | None:
-    """The user's action where it waits on a track below the layer; None where it is still the active one."""
-    strip = _strip(obj, SOURCE)
+    """The user's action where it waits on a track below a layer; None where it is still the active one."""
+    strip = next((strip for name in SOURCES if (strip := _strip(obj, name))), None)
     return strip.action if strip else None
 
 

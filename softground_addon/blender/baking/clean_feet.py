@@ -123,8 +123,8 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
         )
     if treadmill_speed(loads.motion, loads.contacts) > 0:
         raise InputError(
-            f"'{motion.name}' walks on the spot, and feet that stood still would tear its legs: key its travel on its "
-            "hips or its armature first."
+            f"'{motion.name}' walks on the spot, and feet that stood still would tear its legs: press Root Motion "
+            "first, or key its travel."
         )
 
 

@@ -50,7 +50,7 @@ def _of_data(animation: bpy.types.AnimData) -> Iterator[Range]:
     ]
     for track in tracks:
         strips = [strip for strip in track.strips if not strip.mute]
-        if track.name == nla_layer.SOURCE:  # the user's action under our layer, held on beyond its keys
+        if track.name in nla_layer.SOURCES:  # the user's action under our layer, held on beyond its keys
             yield from (one for strip in strips if strip.action for one in _of_action(strip.action, slot_of(strip)))
         elif track.name not in nla_layer.OWN_TRACKS:
             yield from ((strip.frame_start, strip.frame_end) for strip in strips)

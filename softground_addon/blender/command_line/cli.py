@@ -23,7 +23,7 @@ from ...core.ground import presets
 from ...core.record.archive import LARGEST_TEXT
 from ...core.record.edits import StepEdit, from_json
 from .. import jobs, settings
-from ..baking import bake_job, clean_feet
+from ..baking import bake_job, clean_feet, root_motion
 from ..characters.selection import set_up_automatically
 from ..output import export_formats
 from ..settings import user_folder
@@ -175,14 +175,17 @@ def _clean(options: argparse.Namespace) -> None:
     set_up_automatically(scene)
     if options.frames:
         scene.softground.frame_start, scene.softground.frame_end = options.frames
+    travels = jobs.run(root_motion.root_motion(scene)) if options.root_motion else ()
     cleaned = jobs.run(clean_feet.clean_feet(scene))
+    content = cleaned.as_dict() | {"root_motion": {travel.character: travel.as_dict() for travel in travels}}
     with contextlib.ExitStack() as results:
         if target:
             _save_copy(results.enter_context(files.replacing(target)))
         if options.report:
             path = results.enter_context(files.replacing(Path(os.path.realpath(options.report))))
-            path.write_bytes(report.dump(cleaned.as_dict()).encode())
-    print(cleaned.summary, flush=True)
+            path.write_bytes(report.dump(content).encode())
+    for line in (*(travel.summary for travel in travels), cleaned.summary):
+        print(line, flush=True)
     for warning in cleaned.warnings:
         print(f"softground: {warning}", file=sys.stderr)
 

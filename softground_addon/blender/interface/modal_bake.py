@@ -11,7 +11,7 @@ import bpy
 from ...core.errors import InputError, SoftGroundError
 from ...core.settings import ObjectName
 from .. import jobs, session, settings
-from ..baking import bake_job, clean_feet, sink_feet
+from ..baking import bake_job, clean_feet, root_motion, sink_feet
 from ..characters.character_setup import characters_of
 from ..operator_base import reports_errors
 from ..reading import analysis
@@ -323,6 +323,47 @@ class SOFTGROUND_OT_clean_feet(_Bake):
             self.report({"WARNING"}, warning)
 
 
+class SOFTGROUND_OT_root_motion(_Bake):
+    """Let a cycle on the spot travel as fast as its resting feet imply: keys on the root bone, or else on the armature,
+    in a layer of their own. Esc cancels"""
+
+    bl_idname = "softground.root_motion"
+    bl_label = "Root Motion"
+    cancelled = "Root Motion cancelled: nothing was changed"
+    stage_names: ClassVar[dict[str, str]] = STAGE_NAMES | {
+        "simulate": "Measuring the feet",
+        "write": "Writing the layer",
+    }
+
+    def _changing(self, scene: bpy.types.Scene) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[tuple[root_motion.Travel, ...]]:
+        return root_motion.root_motion(scene)
+
+    def _show(self, result: tuple[root_motion.Travel, ...]) -> None:
+        for travel in result:
+            self.report({"INFO"}, travel.summary)
+
+
+class SOFTGROUND_OT_remove_root_motion(bpy.types.Operator):
+    """Take the travel off again, and the response that lies on it: the animation is as it was"""
+
+    bl_idname = "softground.remove_root_motion"
+    bl_label = "Remove Root Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether somebody travels by it, and no job runs."""
+        cls.poll_message_set("Nobody has root motion")
+        return not session.current().is_baking and root_motion.has_root_motion(settings.scene_of(context))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        root_motion.remove_root_motion(settings.scene_of(context))
+        return {"FINISHED"}
+
+
 class SOFTGROUND_OT_hold_window(bpy.types.Operator):
     """Let nothing be changed from a window while a bake runs in another one"""
 
@@ -426,6 +467,8 @@ CLASSES = (
     SOFTGROUND_OT_bake_again,
     SOFTGROUND_OT_sink_feet,
     SOFTGROUND_OT_clean_feet,
+    SOFTGROUND_OT_root_motion,
+    SOFTGROUND_OT_remove_root_motion,
     SOFTGROUND_OT_hold_window,
     SOFTGROUND_OT_cancel_bake,
 )

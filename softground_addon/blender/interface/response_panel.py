@@ -10,6 +10,7 @@ from bpy.props import EnumProperty, FloatProperty
 from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
 from .. import settings
 from ..animation_layer import nla_layer
+from ..baking import root_motion
 from ..response import response_job
 from .character_editing import active_character
 from .panel_base import ADVANCED, SidebarPanel
@@ -107,7 +108,13 @@ class SOFTGROUND_PT_response(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         scene = settings.scene_of(context)
         options, character = scene.softground, active_character(scene)
-        layout.operator("softground.clean_feet", icon="CON_FLOOR")
+        row = layout.row(align=True)
+        row.operator("softground.clean_feet", icon="CON_FLOOR")
+        row.operator("softground.root_motion", icon="CON_FOLLOWPATH")
+        if character and root_motion.speed_of(character.armature):
+            row = layout.row()
+            row.label(text=f"Travels at {root_motion.speed_of(character.armature):.2f} m/s", translate=False)
+            row.operator("softground.remove_root_motion", text="", icon="X")
         layout.prop(options, "output")
         column = _group(layout, options.grounding, ("align", "lock"))
         column.separator()

@@ -83,6 +83,17 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     return controls
 
 
+def travelling_bone(armature: bpy.types.Object, evaluated: bpy.types.Object, mapping: RigMapping) -> str:
+    """The bone without a parent whose location moves the whole rig, IK targets and all; empty where there is none."""
+    rig = _Rig(armature, evaluated)
+    names = [bone for bone, _ in mapping.joints.values() if bone] + [sole.bone for sole in mapping.soles if sole.bone]
+    behind = [set(rig.behind(bone)) for bone in (*names, *rig.targets())]
+    if not behind:
+        return ""
+    free = [bone for bone in rig.behind(names[0]) if all(bone in chain for chain in behind) and rig.is_placed(bone)]
+    return next(iter([bone for bone in free if rig.is_shaped(bone)] or free), "")
+
+
 def _body_control(rig: _Rig, mapping: RigMapping) -> str:
     """The nearest bone behind the hips that also carries both thighs and the head, and that can be moved."""
     joints = mapping.joints
@@ -179,6 +190,18 @@ class _Rig:
             for constraint in self._active(bone)
             if constraint.type == "IK" and constraint.target is not None and constraint.chain_count != 1
         ]
+
+    def targets(self) -> set[str]:
+        """Bones that limbs reach for, and toward which their knees and elbows point."""
+        solved = [solver for bone in self._bones for solver in self.solvers(bone)]
+        aims = [(ik.target, ik.subtarget) for ik in solved] + [(ik.pole_target, ik.pole_subtarget) for ik in solved]
+        return {bone for target, bone in aims if target == self.armature and bone in self._bones}
+
+    def is_placed(self, bone: str) -> bool:
+        """Whether the bone's location alone says where it is in its armature."""
+        pose_bone = self._bones[bone]
+        top = pose_bone.parent is None and pose_bone.bone.use_local_location and not pose_bone.constraints
+        return top and not any(pose_bone.lock_location)
 
     def control_behind(self, bone: str, trunk: set[str]) -> str | None:
         """The nearest bone behind another, off the trunk, that an animator keys; else the nearest with a shape."""

@@ -155,12 +155,22 @@ def lock(sole: Underside, touching: Mask) -> Array:
 def _steps(points: Array, weight: Array, length: float) -> tuple[Array, Array, bool]:
     """Turns (K - 1,) and shifts (K - 1, 2) that bring each frame's bearing points back to where they were in the frame
     before, and whether the foot turns on purpose."""
-    both = np.sqrt(weight[1:] * weight[:-1])
-    both = np.where(both.sum(axis=1, keepdims=True) > 1e-3, both, weight[1:] + weight[:-1])
+    both = _bearing_in_both(weight)
     turns, shifts = _fitted(points[1:], points[:-1], both, AXLE * length)
     if abs(turns.sum()) > TWIST:
         return (*_fitted(points[1:], points[:-1], both, np.inf), True)
     return turns, shifts, False
+
+
+def rolled(points: Array, weight: Array) -> Array:
+    """How far what bears moves along the floor from frame to frame (K - 1, 2), of points (K, Q, 2) [m]."""
+    return -_fitted(points[1:], points[:-1], _bearing_in_both(weight), np.inf)[1]
+
+
+def _bearing_in_both(weight: Array) -> Array:
+    """How much points bear (K - 1, Q) in a frame and the one before."""
+    both = np.sqrt(weight[1:] * weight[:-1])
+    return np.where(both.sum(axis=1, keepdims=True) > 1e-3, both, weight[1:] + weight[:-1])
 
 
 def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:

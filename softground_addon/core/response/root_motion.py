@@ -1,0 +1,62 @@
+"""The travel that a cycle on the spot lacks, by what rests: root motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import Terrain
+from ..motion.motion import CharacterMotion
+from ..numerics.intervals import runs
+from ..numerics.slices import Slices, sliced
+from ..record.ground_history import GroundHistory
+from .foot_lock import rolled, underside_on
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+AGREES = 0.05
+"""What moves as the median does, to about this part of its speed, rests on the belt; the rest lands or leaves."""
+
+
+@sliced
+def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[Array]:
+    """Velocity (2,) that makes what bears rest: against that of the belt under it [m/s].
+
+    A foot rolls over heel, ball and toes, so that its velocity is that of the points that bear. Each frame has one
+    vote, however many feet stand: the hips of a cycle may be held where the walk would have them surge.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        At scene frames.
+    touching : (F, S) bool array
+    terrain : Terrain
+    """
+    floor = GroundHistory(terrain)
+    frames, moves = [np.zeros(0, np.intp)], [np.zeros((0, 2))]
+    for number, sole in enumerate(motion.soles):
+        yield
+        if not touching[:, number].any():
+            continue
+        under = underside_on(sole, floor, motion.frames)
+        weight = under.bearing()
+        for first, end in zip(*runs(touching[:, number]), strict=True):
+            frames.append(np.arange(first + 1, end))
+            moves.append(rolled(under.points[first:end, :, :2], weight[first:end]))
+    frame, move = np.concatenate(frames), np.concatenate(moves)
+    if not len(frame):
+        return np.zeros(2)
+    belt = np.median(move, axis=0)
+    off = np.linalg.norm(move - belt, axis=1) / max(AGREES * float(np.linalg.norm(belt)), 1e-12)
+    agrees = np.exp(-(off**2) / 2)
+    total, resting, count = (
+        np.zeros((len(motion.frames), 2)),
+        np.zeros(len(motion.frames)),
+        np.zeros(len(motion.frames)),
+    )
+    np.add.at(total, frame, agrees[:, None] * move)
+    np.add.at(resting, frame, agrees)
+    np.maximum.at(count, frame, agrees)
+    of_frame = total / np.maximum(resting, 1e-12)[:, None]
+    return np.asarray(-(count[:, None] * of_frame).sum(axis=0) / max(float(count.sum()), 1e-12) / motion.time_step)

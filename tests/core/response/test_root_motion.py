@@ -1,0 +1,52 @@
+"""The travel that resting feet imply, against belts whose speed is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.response.root_motion import travel_velocity
+from tests.core.walkers import walk
+
+BELT = np.array([-1.1, 0.4])
+
+
+def on_a_belt(motion, velocity):
+    way = np.concatenate([motion.times[:, None] * velocity, np.zeros((len(motion.frames), 1))], axis=1)
+    soles = []
+    for sole in motion.soles:
+        poses = sole.transforms.copy()
+        poses[..., :3, 3] += way[:, None]
+        soles.append(replace(sole, transforms=poses))
+    return replace(motion, soles=tuple(soles))
+
+
+def test_feet_that_roll_over_heel_and_toes_have_the_velocity_of_the_belt_that_they_roll_on():
+    motion = walk(steps=8).motion
+    touching = detect_contacts(motion, FlatTerrain()).touching
+    rolling = travel_velocity(motion, touching, FlatTerrain())
+    assert np.linalg.norm(rolling) < 0.02
+    np.testing.assert_allclose(
+        travel_velocity(on_a_belt(motion, BELT), touching, FlatTerrain()), -BELT, atol=0.01 * np.linalg.norm(BELT)
+    )
+
+
+def test_feet_that_slip_while_they_land_and_leave_are_outvoted():
+    motion = walk(steps=1).motion
+    still = replace(
+        motion, soles=tuple(replace(s, transforms=np.repeat(s.transforms[:1], 40, axis=0)) for s in motion.soles)
+    )
+    still = replace(still, frames=np.arange(40.0) + 1, joints={})
+    moving = on_a_belt(still, BELT)
+    for sole in moving.soles:
+        sole.transforms[:8, :, 0, 3] += np.linspace(-0.1, 0.0, 8)[:, None]
+    touching = np.ones((40, len(still.soles)), bool)
+    np.testing.assert_allclose(travel_velocity(moving, touching, FlatTerrain()), -BELT, rtol=1e-6, atol=1e-6)
+
+
+def test_what_never_touches_has_no_travel():
+    motion = walk(steps=2).motion
+    nothing = np.zeros((len(motion.frames), len(motion.soles)), bool)
+    assert travel_velocity(motion, nothing, FlatTerrain()) == pytest.approx(np.zeros(2))
