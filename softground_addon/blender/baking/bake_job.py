@@ -332,7 +332,7 @@ def _press(
         footprints, forces = yield from _simulate(wanted, shot, loads)
     check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
     left = _edited(wanted, shot, footprints, edits)
-    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, left.edited, asked)
+    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, left, asked)
     return loads, left, forces, responses
 
 

@@ -17,7 +17,9 @@ from ...core.ground.heightfield import Terrain
 from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
 from ...core.record.footprints import Footprint
+from ...core.record.record import BakeRecord
 from ...core.response.grounding import Response, responding
+from ...core.response.moved_steps import Followed, OutOfReach, follow
 from ...core.response.performance import suggested_speed
 from ...core.response.response import (
     Gaps,
@@ -64,6 +66,8 @@ class CharacterResponse:
     before, after : Gaps
     sinkage : float
         Mean depth of the character's prints [m].
+    out_of_reach : tuple of OutOfReach
+        Moved steps that its legs do not reach.
     """
 
     motion: CharacterMotion
@@ -71,6 +75,7 @@ class CharacterResponse:
     before: Gaps
     after: Gaps
     sinkage: float
+    out_of_reach: tuple[OutOfReach, ...] = ()
 
 
 def rigged(characters: Iterable[CharacterSettings]) -> list[tuple[CharacterSettings, bpy.types.Object]]:
@@ -163,10 +168,10 @@ def responses_of(
     loads: Sequence[CharacterLoads],
     motions: Sequence[CharacterMotion],
     terrain: Terrain,
-    footprints: Sequence[Footprint],
+    left: BakeRecord,
     options: ResponseOptions | None,
 ) -> Job[list[CharacterResponse]]:
-    """Each rigged character's response to the pressed ground, on top of its source."""
+    """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps."""
     responses: list[CharacterResponse] = []
     now = Progress("simulate", 1.0)
     if options is None:
@@ -175,12 +180,14 @@ def responses_of(
         if motion.centre is not None:
             continue
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        pressed = touching, terrain, footprints
-        work = respond.slices(motion, *pressed, tilt=options.tilt, grounding=options.grounding)
+        pressed = touching, terrain, left.edited
+        followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
+        work = respond.slices(motion, *pressed, tilt=options.tilt, grounding=options.grounding, followed=followed)
         response = yield from meanwhile(now, work)
         before = yield from meanwhile(now, gaps.slices(motion, *pressed))
         after = yield from meanwhile(now, gaps.slices(responding(motion, response), *pressed))
-        responses.append(CharacterResponse(motion, response, before, after, mean_sinkage(footprints, motion.name)))
+        sinkage = mean_sinkage(left.edited, motion.name)
+        responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
     return responses
 
 
@@ -347,7 +354,7 @@ def worst_gaps(responses: Sequence[CharacterResponse]) -> list[dict[str, object]
 
 def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
     """What the user should know about the responses."""
-    return [
+    without_legs = [
         Finding(
             "no_legs",
             "warning",
@@ -357,6 +364,18 @@ def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
         for character in responses
         if not character.response.legs
     ]
+    too_far = [
+        Finding(
+            "step_out_of_reach",
+            "warning",
+            f"The leg of '{character.motion.name}' cannot follow step '{short.step}' to where it was moved: the foot "
+            f"goes {short.part:.0%} of the way, and its print lies apart from it.",
+            "Move the step less, or move the hips nearer by keys.",
+        )
+        for character in responses
+        for short in character.out_of_reach
+    ]
+    return without_legs + too_far
 
 
 def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
 from ..motion.motion import CharacterMotion
-from ..numerics.plane_fit import smoothed
 from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_lock import lock, moved, rim_points, slides, underside_on
 from .foot_placement import Placement, place_sole
-from .grounding import HIPS_TIME, LOAD_TIME, Response, leg_soles, mean_over_time, settle
+from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -64,9 +63,8 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
         lying = moved(motion.soles[number], first.carry)
         locked = lock(underside_on(lying, floor, motion.frames), touches) @ first.carry
         held = moved(motion.soles[number], locked)
-        soles = tuple(held if index == number else other for index, other in enumerate(motion.soles))
         placed = place_sole(
-            replace(motion, soles=soles), number, touches, floor, floor, align=0.0, points=rim_points(held)
+            with_sole(motion, number, held), number, touches, floor, floor, align=0.0, points=rim_points(held)
         )
         lift = first.lift + placed.lift
         placements[side] = number, Placement(placed.carry @ locked, lift, np.zeros_like(lift), placed.room)
@@ -74,20 +72,10 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
         ankle = motion.joints[f"ankle_{side}"]
         offsets.append((carried(carry, ankle) - ankle)[:, :2])
     yield
-    level = _hips_go_along(motion, [number for number, _ in placements.values()], offsets, touching)
+    soles = [number for number, _ in placements.values()]
+    level = hips_go_along(motion, soles, offsets, touching, HIPS_TIME)
     upright = np.zeros((len(motion.frames), 2))
     return (yield from settle.slices(motion, placements, touching, upright, level=level, source_pace=True))
-
-
-def _hips_go_along(motion: CharacterMotion, soles: list[int], offsets: list[Array], touching: Mask) -> Array:
-    """How far the hips move along the floor (F, 2) [m]: as the feet that stand, smoothly."""
-    if not soles:
-        return np.zeros((len(motion.frames), 2))
-    stands = touching[:, soles]
-    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
-    width = HIPS_TIME * motion.adult_second
-    of_feet = np.stack(offsets, axis=1)
-    return np.stack([mean_over_time(of_feet[..., i], load, width) for i in range(2)], axis=-1)
 
 
 @sliced

@@ -136,15 +136,31 @@ def lock(sole: Underside, touching: Mask) -> Array:
     sole : Underside
     touching : (F,) bool array
     """
-    if not touching.any():
-        return np.broadcast_to(np.eye(4), (len(touching), 4, 4))
     points, weight, length = sole.points, sole.bearing(), sole.length
     turn, move = np.zeros(len(points)), np.zeros((len(points), 2))
     middle = points[..., :2].mean(axis=1)
     for first, end in zip(*runs(touching), strict=True):
         during = slice(first, end)
         turn[during], shift = _held(points[during, :, :2], weight[during], length)
-        move[during] = _turned(turn[during], middle[during]) + shift - middle[during]
+        move[during] = turned_level(turn[during], middle[during]) + shift - middle[during]
+    return eased(middle, turn, move, touching)
+
+
+def eased(middle: Array, turn: Array, move: Array, touching: Mask) -> Array:
+    """Level displacements (F, 4, 4) of contacts, passing smoothly from each to the next.
+
+    Parameters
+    ----------
+    middle : (F, 2) float array
+        Of the sole [m].
+    turn : (F,) float array
+        Counter-clockwise [rad], as `move` of what it is in contacts only.
+    move : (F, 2) float array
+        How far the middle moves [m].
+    touching : (F,) bool array
+    """
+    if not touching.any():
+        return np.broadcast_to(np.eye(4), (len(touching), 4, 4))
     turn = between_contacts(turn, touching)
     move = np.stack([between_contacts(move[:, i], touching) for i in range(2)], axis=-1)
     start = np.concatenate([middle, np.zeros((len(middle), 1))], axis=1)
@@ -177,12 +193,12 @@ def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:
     """Turn (K,) and shift (K, 2) of one contact's frames: x goes to R(turn)·x + shift, and what bears stays."""
     turns, shifts, _ = _steps(points, weight, length)
     turn = np.concatenate([[0.0], np.cumsum(turns)])
-    shift = np.concatenate([np.zeros((1, 2)), np.cumsum(_turned(turn[:-1], shifts), axis=0)])
+    shift = np.concatenate([np.zeros((1, 2)), np.cumsum(turned_level(turn[:-1], shifts), axis=0)])
     slid = np.linalg.norm(np.gradient(shift, axis=0), axis=1) if len(shift) > 1 else np.zeros(1)
     slow = (1.0 / (1.0 + (slid / (STILL * length)) ** 2))[:, None] * weight
-    held = _turned(turn[:, None], points) + shift[:, None]
+    held = turned_level(turn[:, None], points) + shift[:, None]
     back, away = _fitted(held.reshape(1, -1, 2), points.reshape(1, -1, 2), slow.reshape(1, -1), AXLE * length)
-    return turn + back, _turned(back, shift) + away
+    return turn + back, turned_level(back, shift) + away
 
 
 def _fitted(start: Array, end: Array, weight: Array, axle: float) -> tuple[Array, Array]:
@@ -194,11 +210,11 @@ def _fitted(start: Array, end: Array, weight: Array, axle: float) -> tuple[Array
     sine = np.einsum("kq,kq->k", weight, p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0])
     cosine = np.einsum("kq,kq->k", weight, p[..., 0] * q[..., 0] + p[..., 1] * q[..., 1])
     turn = np.zeros(len(start)) if np.isinf(axle) else np.arctan2(sine, np.maximum(cosine, 0.0) + axle**2)
-    return turn, b - _turned(turn, a)
+    return turn, b - turned_level(turn, a)
 
 
-def _turned(turn: Array, points: Array) -> Array:
-    """Points (..., 2) turned about the origin by angles (...) [rad]."""
+def turned_level(turn: Array, points: Array) -> Array:
+    """Level points (..., 2) turned about the origin by angles (...) [rad]."""
     cosine, sine = np.cos(turn), np.sin(turn)
     x, y = points[..., 0], points[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)

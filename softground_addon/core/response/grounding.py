@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -132,6 +132,29 @@ def hips_follow(motion: CharacterMotion, placements: Mapping[int, Placement], to
     return mean_over_time(unsunk, load, width) - mean_over_time(sinkage, load * deeper, width)
 
 
+def hips_go_along(
+    motion: CharacterMotion, soles: Sequence[int], offsets: Sequence[Array], touching: Mask, width: float
+) -> Array:
+    """How far the hips move along the ground (F, 2) [m]: as the feet that stand, smoothly.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+    soles : sequence of int
+    offsets : sequence of (F, 2) float arrays
+        How far the foot on each moves [m].
+    touching : (F, S) bool array
+    width : float
+        Standard deviation of the smoothing [s], for an adult.
+    """
+    if not soles:
+        return np.zeros((len(motion.frames), 2))
+    stands = touching[:, list(soles)]
+    load = smoothed(stands.astype(float), LOAD_TIME * motion.adult_second) ** 2 * stands
+    of_feet = np.stack(list(offsets), axis=1)
+    return np.stack([mean_over_time(of_feet[..., i], load, width * motion.adult_second) for i in range(2)], axis=-1)
+
+
 def mean_over_time(values: Array, weights: Array, width: float) -> Array:
     """Weighted mean (F,) of values (F, S) under a Gaussian over time, straight where nothing has weight for long."""
     total = smoothed(weights.sum(axis=1), width)
@@ -171,15 +194,13 @@ def settle(
     source_pace : bool
         Whether knees may turn as fast as the fastest of the source, and no faster.
     """
-    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
-    if level is not None:
-        raised[:, :2] += level
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch, level)
     legs = {side: leg_of(motion, side, sole) for side, (sole, _) in placements.items()}
     ankles = {side: carried(placement.carry, legs[side].ankle) for side, (_, placement) in placements.items()}
     short = np.zeros(len(motion.frames))
     for side, leg in legs.items():
         hip = carried(tilted, leg.hip) + raised
-        short = np.maximum(short, touching[:, placements[side][0]] * _out_of_reach(leg, hip, ankles[side]))
+        short = np.maximum(short, touching[:, placements[side][0]] * out_of_reach(leg, hip, ankles[side]))
     reach = round(REACH_TIME * motion.adult_second)
     raised[:, 2] -= upper_envelope(short, max(1, reach))
     if legs:
@@ -221,9 +242,10 @@ def heel_rises(
     lean: Array,
     *,
     crouch: Array | None = None,
+    level: Array | None = None,
 ) -> dict[str, Array]:
     """How far each foot that trails rolls over its toes to stay in reach (F,) [rad], by side; see `settle`."""
-    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch)
+    tilted, raised = _hips_moved(motion, placements, touching, lean, crouch, level)
     trial = np.linspace(0.0, HEEL_RISE, 8)
     width = round(HEEL_TIME * motion.adult_second)
     rises = {}
@@ -234,7 +256,7 @@ def heel_rises(
         toes = carried(placement.carry, motion.soles[sole].landmark_positions()[:, -1])
         short = np.stack(
             [
-                _out_of_reach(leg, hip, carried(displacement(rotation(angle * foot[..., 1]), toes, toes), ankle))
+                out_of_reach(leg, hip, carried(displacement(rotation(angle * foot[..., 1]), toes, toes), ankle))
                 for angle in trial
             ]
         )
@@ -252,22 +274,25 @@ def _hips_moved(
     touching: Mask,
     lean: Array,
     crouch: Array | None,
+    level: Array | None,
 ) -> tuple[Array, Array]:
     """The body's tilt about the ground below the hips (F, 4, 4), and how far the hips move after it (F, 3) [m]."""
     raised = np.zeros((len(motion.frames), 3))
     raised[:, 2] = hips_follow(motion, dict(placements.values()), touching)
     if crouch is not None:
         raised[:, 2] -= crouch
+    if level is not None:
+        raised[:, :2] += level
     turn = rotation(np.stack([-lean[:, 1], lean[:, 0], np.zeros(len(lean))], axis=-1))
     pivot = motion.hips - (0.0, 0.0, motion.leg_length)
     return displacement(turn, pivot, pivot), raised
 
 
-def _out_of_reach(leg: Leg, hip: Array, ankle: Array) -> Array:
-    """How far the hip must come down for the ankle to be in reach, (F,) [m]."""
-    reach = reach_of(leg)
-    level = np.linalg.norm((ankle - hip)[:, :2], axis=1)
-    below = hip[:, 2] - ankle[:, 2]
+def out_of_reach(leg: Leg, hip: Array, ankle: Array, during: slice = slice(None)) -> Array:
+    """How far the hip must come down for the ankle to be in reach, (..., F) [m], of places (..., F, 3)."""
+    reach = reach_of(leg)[during]
+    level = np.linalg.norm((ankle - hip)[..., :2], axis=-1)
+    below = hip[..., 2] - ankle[..., 2]
     return np.asarray(np.where(below > 0, below - np.sqrt(np.maximum(reach**2 - level**2, 0.0)), 0.0).clip(min=0.0))
 
 
@@ -298,6 +323,12 @@ def responding(motion: CharacterMotion, response: Response) -> CharacterMotion:
         carry = response.legs[worn_by].foot if worn_by else response.body
         soles.append(SoleMotion(sole.sole, carry[:, None] @ sole.transforms))
     return dataclasses.replace(motion, joints=joints, soles=tuple(soles))
+
+
+def with_sole(motion: CharacterMotion, number: int, sole: SoleMotion) -> CharacterMotion:
+    """The motion with another course of one of its soles."""
+    soles = tuple(sole if index == number else other for index, other in enumerate(motion.soles))
+    return dataclasses.replace(motion, soles=soles)
 
 
 def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:

@@ -16,8 +16,10 @@ from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
+from .foot_lock import moved
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
-from .grounding import Response, heel_rises, leg_soles, responding, settle
+from .grounding import Response, heel_rises, leg_soles, responding, settle, with_sole
+from .moved_steps import Followed
 from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
 
@@ -97,6 +99,7 @@ def respond(
     *,
     tilt: TiltOptions | None,
     grounding: GroundingOptions | None,
+    followed: Followed | None = None,
 ) -> Slices[Response]:
     """The response to a ground that has been pressed.
 
@@ -111,6 +114,8 @@ def respond(
     footprints : sequence of Footprint
         All that the ground holds, of all characters.
     tilt, grounding : options, or None to leave that out
+    followed : Followed, optional
+        Where moved steps take the feet; only with grounding.
     """
     history = GroundHistory(terrain, footprints)
     undisturbed = GroundHistory(terrain)
@@ -124,23 +129,24 @@ def respond(
         in_place = np.ones_like(touching)  # feet stay where they are, in swings too
         return (yield from settle.slices(motion, unmoved, in_place, leaning))
 
+    followed = followed or Followed()
+
     def place(side: str, heel_rise: Array | None = None, change: Array | None = None) -> Slices[None]:
         yield
         sole = feet[side]
-        placements[side] = (
+        carry = followed.carries.get(sole)
+        placed = place_sole(
+            motion if carry is None else with_sole(motion, sole, moved(motion.soles[sole], carry)),
             sole,
-            place_sole(
-                motion,
-                sole,
-                touching[:, sole],
-                history,
-                undisturbed,
-                align=grounding.align,
-                lock=grounding.lock,
-                heel_rise=heel_rise,
-                change=change,
-            ),
+            touching[:, sole],
+            history,
+            undisturbed,
+            align=grounding.align,
+            lock=grounding.lock,
+            heel_rise=heel_rise,
+            change=change,
         )
+        placements[side] = sole, placed if carry is None else replace(placed, carry=placed.carry @ carry)
 
     placements: dict[str, tuple[int, Placement]] = {}
     for side in feet:
@@ -148,11 +154,11 @@ def respond(
     acted, crouch, arms = _acted(motion, touching, placements, grounding.performance)
     for side, change in acted.items():
         yield from place(side, change=change)
-    rises = heel_rises(motion, placements, touching, leaning, crouch=crouch)
+    rises = heel_rises(motion, placements, touching, leaning, crouch=crouch, level=followed.hips)
     for side, rise in rises.items():
         if rise.any():
             yield from place(side, rise, acted.get(side))
-    settled = yield from settle.slices(motion, placements, touching, leaning, crouch=crouch)
+    settled = yield from settle.slices(motion, placements, touching, leaning, crouch=crouch, level=followed.hips)
     return replace(settled, arms=arms)
 
 

@@ -1,0 +1,166 @@
+"""Where the artist's moved and turned steps take the feet, and how far the legs reach there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import CharacterMotion
+from ..numerics.intervals import runs
+from ..numerics.rigid import carried
+from ..record.edits import StepEdit, edits_by_number, step_id
+from ..record.footprints import Footprint
+from .foot_lock import eased, turned_level
+from .grounding import hips_go_along, leg_of, leg_soles, out_of_reach
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HIPS_TIME = 0.2
+"""Standard deviation of the smoothing of hips that go along with moved steps [s], for an adult: half of a step."""
+DEEPEST = 0.1
+"""The hips come down by at most so much for a moved step, in leg lengths."""
+_PARTS = np.linspace(1.0, 0.0, 101)
+"""Parts of the way to a moved step that are tried."""
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """A step that was moved further than the leg can follow.
+
+    Attributes
+    ----------
+    step : str
+        Its id.
+    part : float
+        Part of the way that the foot goes.
+    """
+
+    step: str
+    part: float
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What takes feet to their moved steps.
+
+    Attributes
+    ----------
+    carries : mapping of int to (F, 4, 4) float array
+        By sole, its level displacement.
+    hips : (F, 2) float array
+        How far the hips go along [m].
+    out_of_reach : tuple of OutOfReach
+    """
+
+    carries: Mapping[int, Array] = field(default_factory=dict)
+    hips: Array | None = None
+    out_of_reach: tuple[OutOfReach, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Moved:
+    step: str
+    side: str
+    sole: int
+    during: slice
+    pivot: Array
+    move: Array
+    turn: float
+    part: float = 1.0
+
+    def shifts(self, points: Array, part: Array) -> Array:
+        """How far it takes level points (K, 2), going parts (P,) of the way, (P, K, 2)."""
+        turned = turned_level(part[:, None] * self.turn, points - self.pivot)
+        return np.asarray(turned + self.pivot - points + part[:, None, None] * self.move)
+
+
+def follow(
+    motion: CharacterMotion, touching: Mask, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
+) -> Followed:
+    """What takes a character's feet where their steps were moved, as far as its legs reach.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    touching : (F, S) bool array
+    footprints : sequence of Footprint
+        As they were baked, of all characters.
+    edits : mapping of step id to StepEdit
+    """
+    moved = list(_moved(motion, touching, footprints, edits))
+    if not moved:
+        return Followed()
+    wanted = _hips(motion, touching, moved)
+    moved = [replace(one, part=_reached(motion, one, wanted)) for one in moved]
+    carries = _carries(motion, touching, moved)
+    short = tuple(OutOfReach(one.step, one.part) for one in moved if one.part < 1.0)
+    return Followed(carries, _hips(motion, touching, moved), short)
+
+
+def _moved(
+    motion: CharacterMotion, touching: Mask, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
+) -> Iterable[_Moved]:
+    feet = leg_soles(motion)
+    of_name = {motion.soles[sole].sole.name: (side, sole) for side, sole in feet.items()}
+    for number, edit in edits_by_number(footprints, edits).items():
+        footprint = footprints[number]
+        stays = edit.mute or (edit.move_m == (0.0, 0.0) and edit.turn_deg == 0.0)
+        if stays or footprint.character != motion.name or footprint.sole not in of_name:
+            continue
+        side, sole = of_name[footprint.sole]
+        contact = _contact(motion.frames, touching[:, sole], footprint)
+        if contact is not None:
+            move, turn = np.array(edit.move_m), float(np.radians(edit.turn_deg))
+            yield _Moved(step_id(footprint), side, sole, contact, footprint.position[:2], move, turn)
+
+
+def _contact(frames: Array, touching: Mask, footprint: Footprint) -> slice | None:
+    """The samples of the contact that left a print."""
+    middle = (footprint.start_frame + footprint.end_frame) / 2
+    spans = [slice(first, end) for first, end in zip(*runs(touching), strict=True)]
+    nearest = min(spans, key=lambda span: abs(frames[span].mean() - middle), default=None)
+    if nearest is None or not frames[nearest][0] - 1 <= middle <= frames[nearest][-1] + 1:
+        return None
+    return nearest
+
+
+def _carries(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> dict[int, Array]:
+    """The displacement of each sole: as its steps, eased between contacts."""
+    carries = {}
+    for sole in {one.sole for one in moved}:
+        middle = motion.soles[sole].landmark_positions()[..., :2].mean(axis=1)
+        turn, shift = np.zeros(len(middle)), np.zeros_like(middle)
+        for one in moved:
+            if one.sole == sole:
+                turn[one.during] = one.part * one.turn
+                shift[one.during] = one.shifts(middle[one.during], np.array([one.part]))[0]
+        carries[sole] = eased(middle, turn, shift, touching[:, sole])
+    return carries
+
+
+def _hips(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> Array:
+    """How far the hips go along, (F, 2) [m]."""
+    carries, offsets = _carries(motion, touching, moved), []
+    feet = leg_soles(motion)
+    for side, sole in feet.items():
+        ankle = motion.joints[f"ankle_{side}"]
+        offsets.append((carried(carries[sole], ankle) - ankle)[:, :2] if sole in carries else np.zeros((len(ankle), 2)))
+    return hips_go_along(motion, list(feet.values()), offsets, touching, HIPS_TIME)
+
+
+def _reached(motion: CharacterMotion, one: _Moved, hips: Array) -> float:
+    """The largest part of the way to a step for which the hips need not come down too far."""
+    leg, during = leg_of(motion, one.side, one.sole), one.during
+    part = _PARTS[:, None, None]
+    aside, along = one.shifts(leg.ankle[during, :2], _PARTS), part * hips[during]
+    level = np.zeros((*aside.shape[:2], 1))
+    hip = leg.hip[during] + np.concatenate([along, level], axis=-1)
+    ankle = leg.ankle[during] + np.concatenate([aside, level], axis=-1)
+    farther = out_of_reach(leg, hip, ankle, during) - out_of_reach(leg, leg.hip[during], leg.ankle[during], during)
+    within = farther.max(axis=1) <= DEEPEST * motion.leg_length
+    return float(_PARTS[within.argmax()])
