@@ -83,6 +83,12 @@ def input_field(modifier: Any, identifier: str) -> tuple[Any, str]:
     return modifier, f'["{identifier}"]'
 
 
+def input_path(modifier: Any, identifier: str) -> str:
+    """The data path of an input of a geometry nodes modifier, as curves of its object have it."""
+    owner, path = input_field(modifier, identifier)
+    return owner.path_from_id(path) if path == "value" else owner.path_from_id() + path
+
+
 def read_input(modifier: Any, identifier: str) -> Any:
     """Value of an input of a geometry nodes modifier."""
     owner, path = input_field(modifier, identifier)

@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 from . import session
 from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
+from .ground import baked_ground, weather_keys
 from .interface import modal_bake, overlay
 from .interface.outdated import compare_bake
 from .live import live
@@ -18,6 +19,9 @@ from .reading import analysis
 
 EDITED = ("ACTION", "ARMATURE", "KEY")
 """Kinds of data whose edits change what a character does; edited meshes may be what it steps on, or what prints."""
+
+KEYED = ("ACTION", "OBJECT")
+"""Kinds of data whose edits may change the keys of weather."""
 
 SETTLED = 0.3
 """Time without edits after which what takes a while is worked out anew [s]."""
@@ -36,6 +40,8 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     live.watch()
     if scene.softground.ground is not None and not bpy.app.background:
         _later(compare_bake)
+    if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
+        _follow_weather_keys(scene)
     if analysis.is_empty() or depsgraph is None:
         return
     if any(depsgraph.id_type_updated(kind) for kind in EDITED):
@@ -46,6 +52,11 @@ def notice_edits(scene: Any, depsgraph: Any = None) -> None:
         return
     elif depsgraph.id_type_updated("MESH") and not live.is_on():  # which writes a mesh at each frame
         _later(compare_prediction)
+
+
+def _follow_weather_keys(scene: Any) -> None:
+    if scene.softground.ground is not None:
+        weather_keys.follow(baked_ground.display_mesh_of(scene.softground.ground))
 
 
 def compare_prediction() -> float | None:
@@ -65,9 +76,11 @@ def _later(job: Callable[[], float | None]) -> None:
 
 
 @persistent
-def begin_render(*_: Any) -> None:
-    """Live mode stands still during renders."""
+def begin_render(scene: Any = None, *_: Any) -> None:
+    """Live mode stands still during renders, and weather has all keys."""
     live.rendering(True)
+    if scene is not None:
+        _follow_weather_keys(scene)
 
 
 @persistent
@@ -88,6 +101,7 @@ def after_undo(*_: Any) -> None:
     _remove_left_over_scenes()
     analysis.look_again()
     live.after_undo()
+    _follow_weather_keys(bpy.context.scene)
 
 
 @persistent

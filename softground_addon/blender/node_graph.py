@@ -130,6 +130,29 @@ class NodeGraph:
         self.link(number, node.inputs["Curve Index"])
         return node
 
+    def accumulated(self, parts: Any, kind: str = "FLOAT") -> Any:
+        """A node with sums of a field over points: those before each, those up to and with it, and of all."""
+        node = self.node("GeometryNodeAccumulateField")
+        node.data_type, node.domain = kind, "POINT"
+        self.link(parts, node.inputs["Value"])
+        return node
+
+    def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
+        """What a field is at one of a geometry's points, or at the last of them."""
+        node = self.node("GeometryNodeSampleIndex")
+        node.data_type, node.domain, node.clamp = kind, "POINT", True
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(value, node.inputs["Value"])
+        self.link(index, node.inputs["Index"])
+        return node.outputs["Value"]
+
+    def combined(self, *parts: Any) -> Any:
+        """A vector of up to three numbers."""
+        node = self.node("ShaderNodeCombineXYZ")
+        for part, socket in zip(parts, node.inputs, strict=False):
+            self.link(part, socket)
+        return node.outputs["Vector"]
+
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
         node = self.node("GeometryNodeSwitch")
         node.input_type = kind
@@ -200,6 +223,9 @@ class Number:
 
     def root(self) -> Number:
         return self._with("SQRT", 0.0)
+
+    def floor(self) -> Number:
+        return self._with("FLOOR", 0.0)
 
     def _with(self, operation: str, other: Number | float) -> Number:
         value = other.socket if isinstance(other, Number) else other

@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import compat
-from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_modifier
+from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_keys, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
+from softground_addon.core.after.weather import matter_of
+from softground_addon.core.after.weather_course import Weather
 from softground_addon.core.after.weather_places import section_of
-from softground_addon.core.after.weathered_ground import Weather, WeatherPlaces, matter_of, weathered
+from softground_addon.core.after.weathered_ground import WeatherPlaces, weathered
 from tests.blender import shots
 
 FRAMES = (1, 20, 34, 300)
 SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}
+SOME |= {"Water Table": 2.0, "Halo": 0.8}
+DEFAULTS = {name: value for name, value, *_ in nodes.INPUTS}
+MAY_LACK = (*nodes.OF_HOLLOWS, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)
+"""What is not stored where no water stands, and where there is no weather."""
 HOUR = 3600.0
 
 
@@ -53,14 +59,29 @@ def carrier(scene):
 
 def set_to(scene, **values):
     modifier = weather_modifier.modifier_of(carrier(scene))
-    for name, identifier in weather.inputs_of(modifier).items():
-        compat.write_input(modifier, identifier, float(values.get(name, 1.0 if name == "Time Scale" else 0.0)))
+    for name, identifier in weather_modifier.inputs_of(modifier).items():
+        compat.write_input(modifier, identifier, float(values.get(name, DEFAULTS[name])))
     modifier.id_data.update_tag()
 
 
+def in_core(values):
+    """Sliders, each a number or one for each part of the time, as the core has them."""
+    values = DEFAULTS | values
+    return Weather(
+        values["Snowfall"] * 0.01 / HOUR,
+        values["Temperature"],
+        values["Wind"],
+        values["Rain"] * 1e-3 / HOUR,
+        values["Drying"] * 1e-3 / HOUR,
+        values["Time Scale"],
+        values["Water Table"] * 0.01,
+        values["Halo"],
+    )
+
+
 def read(mesh, name, width=1):
-    if name in nodes.OF_HOLLOWS and name not in mesh.attributes:  # no water stands there
-        return np.zeros((len(mesh.vertices), width))
+    if name in MAY_LACK and name not in mesh.attributes:
+        return np.zeros((len(mesh.vertices), width)).squeeze()
     attribute = mesh.attributes[name]
     values = np.empty(len(attribute.data) * width, dtype=np.float32)
     attribute.data.foreach_get("value" if width == 1 else "vector", values)
@@ -90,7 +111,7 @@ def contents(mesh):
     return held
 
 
-@pytest.mark.parametrize("surface", ["snow", "sand", "mud"])
+@pytest.mark.parametrize("surface", ["snow", "sand", "mud", "wet_sand"])
 def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
     scene = opened(surface)
     before = {frame: positions(scene, frame) for frame in FRAMES}
@@ -98,26 +119,13 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
     ground = carrier(scene)
     mesh = ground.data
     footprints, about = baked_ground.load(scene.softground.ground)
-    places = WeatherPlaces(
-        read(mesh, nodes.BLUR, 3),
-        read(mesh, nodes.TRODDEN, 3),
-        read(mesh, nodes.TIMES, 3),
-        read(mesh, nodes.POOL, 3),
-        np.concatenate([read(mesh, name, 3) for name in nodes.LEVELS], axis=1),
-    )
+    places = held(mesh)
     matter = matter_of(surface, about["inputs"]["material"]["layer_depth"], section_of(footprints))
     rest = ground_mesh.rest_positions(mesh)
     alone = [{name: value} for name, value in SOME.items() if name != "Time Scale"]
     for values in ({"Time Scale": 900.0, **one} for one in (*alone, SOME)):
         set_to(scene, **values)
-        said = Weather(
-            values.get("Snowfall", 0.0) * 0.01 / HOUR,
-            values.get("Temperature", 0.0),
-            values.get("Wind", 0.0),
-            values.get("Rain", 0.0) * 1e-3 / HOUR,
-            values.get("Drying", 0.0) * 1e-3 / HOUR,
-            values["Time Scale"],
-        )
+        said = in_core(values)
         for frame in (*FRAMES[::2], *FRAMES[1::2]):
             wanted = weathered(
                 places,
@@ -125,18 +133,123 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
                 said,
                 matter,
                 frame=frame,
-                first_frame=about["inputs"]["frames"][0],
-                frame_rate=24.0,
+                span=weather_keys.span_of(*about["inputs"]["frames"], 24.0),
             )
             now = shown(scene, frame)
             moved = (read(now, "position", 3) - before[frame])[:, 2]
             scale = max(float(np.abs(wanted.height).max()), 1e-3)
             assert moved == pytest.approx(wanted.height, abs=1e-5 * scale + 1e-8), (values, frame)
-            assert read(now, nodes.WETNESS) == pytest.approx(wanted.wetness, abs=1e-3)
+            if not matter.wet or nodes.WETNESS in now.attributes:
+                assert read(now, nodes.WETNESS) == pytest.approx(wanted.wetness, abs=1e-3)
             assert read(now, nodes.FRESH) == pytest.approx(wanted.fresh, abs=1e-3)
-            assert not set(nodes.NOW) & set(now.attributes.keys())
+            if matter.wet:
+                assert read(now, nodes.DRIED) == pytest.approx(wanted.dried, abs=1e-3)
             if matter.soaking and not about["inputs"].get("relief_look"):
                 assert read(now, nodes.WATER) == pytest.approx(wanted.water, abs=1e-5)
+
+
+def key(scene, name, values, interpolation="LINEAR"):
+    """Key a slider: its values by frame."""
+    ground = carrier(scene)
+    modifier = weather_modifier.modifier_of(ground)
+    path = compat.input_path(modifier, weather_modifier.inputs_of(modifier)[name])
+    for frame, value in values.items():
+        compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], float(value))
+        ground.keyframe_insert(path, frame=frame)
+    curves = compat.action_curves(ground.animation_data.action)
+    curve = next(one for one in curves if one.data_path == path)
+    for point in curve.keyframe_points:
+        point.interpolation = interpolation
+    curve.update()
+    ground.animation_data.action.update_tag()
+    bpy.context.view_layer.update()
+    return curve
+
+
+def held(mesh):
+    return WeatherPlaces(
+        read(mesh, nodes.BLUR, 3),
+        read(mesh, nodes.TRODDEN, 3),
+        read(mesh, nodes.TIMES, 3),
+        read(mesh, nodes.POOL, 3),
+        np.concatenate([read(mesh, name, 3) for name in nodes.LEVELS], axis=1),
+    )
+
+
+KEYS = {
+    "Snowfall": {1: 0.0, 60: 4.0, 61: 0.0, 200: 0.0, 280: 6.0},
+    "Temperature": {1: -6.0, 90: 8.0, 150: -3.0, 400: 3.0},
+    "Wind": {1: 0.0, 100: 9.0},
+    "Rain": {1: 30.0, 120: 0.0},
+    "Time Scale": {1: 600.0, 200: 1800.0},
+}
+
+
+@pytest.mark.parametrize("surface", ["snow", "sand", "mud"])
+def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_add_on(opened, surface, tmp_path):
+    scene = opened(surface)
+    before = {frame: positions(scene, frame) for frame in FRAMES}
+    bpy.ops.softground.add_weather()
+    set_to(scene, Drying=0.3)  # which is not keyed
+    for name, values in KEYS.items():
+        key(scene, name, values, "CONSTANT" if name == "Wind" else "LINEAR")
+    mesh = carrier(scene).data
+    footprints, about = baked_ground.load(scene.softground.ground)
+    span = weather_keys.span_of(about["inputs"]["frames"][0], 400, 24.0)
+    assert span.step == 2.0
+    frames = np.arange(span.first, span.last + 1)
+    parts = (frames[:-1] + 0.5).reshape(-1, 2)
+    sliders = {}
+    for name, keys in KEYS.items():  # by hand, not by Blender's curves
+        at = list(keys)
+        linear = np.interp(parts, at, list(keys.values()))
+        values = np.where(parts < 100, 0.0, 9.0) if name == "Wind" else linear
+        sliders[name] = np.append(values.mean(axis=1), list(keys.values())[-1])
+    matter = matter_of(surface, about["inputs"]["material"]["layer_depth"], section_of(footprints))
+    rest, places = ground_mesh.rest_positions(mesh), held(mesh)
+    seen = {}
+    for frame in (300, 1, 34, 20, 300):
+        wanted = weathered(
+            places,
+            (before[frame] - rest)[:, 2].astype(float),
+            in_core(sliders | {"Drying": 0.3}),
+            matter,
+            frame=frame,
+            span=span,
+        )
+        now = positions(scene, frame)
+        assert (now - before[frame])[:, 2] == pytest.approx(wanted.height, abs=1e-4 * max(wanted.height.max(), 1e-3))
+        assert seen.setdefault(frame, now.tobytes()) == now.tobytes()
+    assert alone(scene, tmp_path, 300) == seen[300]
+
+
+def test_a_changed_and_a_removed_key_count_at_once(opened):
+    scene = opened()
+    bpy.ops.softground.add_weather()
+    set_to(scene, **{"Snowfall": 3.0, "Temperature": -5.0, "Time Scale": 900.0})
+    steady = positions(scene, 300)
+    curve = key(scene, "Snowfall", {1: 0.0, 150: 0.0, 151: 3.0}, "CONSTANT")
+    late = positions(scene, 300)
+    assert 0.4 < late[:, 2].max() / steady[:, 2].max() < 0.6
+    for point in curve.keyframe_points:
+        point.co[1] = 3.0
+    curve.update()
+    carrier(scene).animation_data.action.update_tag()
+    bpy.context.view_layer.update()
+    assert positions(scene, 300) == pytest.approx(steady, abs=1e-5)
+    carrier(scene).animation_data_clear()
+    set_to(scene)
+    bpy.context.view_layer.update()
+    assert positions(scene, 300)[:, 2].max() < 0.1 * steady[:, 2].max()
+
+
+def test_keys_stay_through_a_bake(opened):
+    scene = opened()
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    key(scene, "Snowfall", {1: 0.0, 34: 5.0})
+    before = positions(scene, 300)
+    bpy.ops.softground.bake()
+    assert positions(scene, 300).tobytes() == before.tobytes()
 
 
 def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
@@ -167,7 +280,7 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     values = weather.values_of(scene.softground.ground)
     assert values["Snowfall"] == pytest.approx(3.0)
     modifier = weather_modifier.modifier_of(ground)
-    for name, identifier in weather.inputs_of(modifier).items():  # as the panel shows them
+    for name, identifier in weather_modifier.inputs_of(modifier).items():  # as the panel shows them
         holder, path = compat.input_field(modifier, identifier)
         assert holder.path_resolve(path) == values[name]
 
@@ -230,18 +343,21 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
 def test_it_plays_without_the_add_on(opened, tmp_path):
     scene = opened()
     bpy.ops.softground.add_weather(preset="SNOWFALL")
-    with_it = positions(scene, 300)
-    name = carrier(scene).name
-    path = tmp_path / "alone.blend"
+    assert alone(scene, tmp_path, 300) == positions(scene, 300).tobytes()
+
+
+def alone(scene, tmp_path, frame):
+    """Positions at a frame in a Blender that does not know the add-on, as bytes."""
+    name, path = carrier(scene).name, tmp_path / "alone.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     script = (
         "import bpy, numpy as np\n"
         f"bpy.ops.wm.open_mainfile(filepath={str(path)!r}, use_scripts=False)\n"
-        "bpy.context.scene.frame_set(300)\n"
+        f"bpy.context.scene.frame_set({frame})\n"
         f"mesh = bpy.data.objects[{name!r}].evaluated_get(bpy.context.evaluated_depsgraph_get()).data\n"
         "values = np.empty(len(mesh.vertices) * 3, dtype=np.float32)\n"
         "mesh.attributes['position'].data.foreach_get('vector', values)\n"
         f"np.save({str(tmp_path / 'alone.npy')!r}, values)\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, cwd=tmp_path)
-    assert np.load(tmp_path / "alone.npy").tobytes() == with_it.tobytes()
+    return np.load(tmp_path / "alone.npy").tobytes()

@@ -9,13 +9,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.weather_places import section_of, weather_places
-from ...core.after.weathered_ground import matter_of
+from ...core.after.weather import matter_of
+from ...core.after.weather_places import NOT_YET, section_of, weather_places
+from ...core.after.weathered_ground import WeatherPlaces, soaking_shares
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
 from .. import compat
-from . import baked_ground, ground_mesh, own_data, weather_modifier
+from . import baked_ground, ground_mesh, own_data, weather_keys, weather_modifier
 from . import playback_nodes as played
 from . import weather_nodes as nodes
 
@@ -52,7 +53,9 @@ def add(ground: bpy.types.Object) -> Any:
     except BaseException:
         weather_modifier.remove_unused()
         raise
-    return there or weather_modifier.put(display_mesh, tree)
+    modifier = there or weather_modifier.put(display_mesh, tree)
+    weather_keys.follow(display_mesh)
+    return modifier
 
 
 def values_of(ground: bpy.types.Object) -> dict[str, float]:
@@ -61,7 +64,7 @@ def values_of(ground: bpy.types.Object) -> dict[str, float]:
     if modifier is None:
         return {}
     values = dict(compat.node_inputs(modifier))
-    return {name: values[key] for name, key in inputs_of(modifier).items() if key in values}
+    return {name: values[key] for name, key in weather_modifier.inputs_of(modifier).items() if key in values}
 
 
 def renew(ground: bpy.types.Object, values: Mapping[str, float]) -> None:
@@ -80,17 +83,10 @@ def set_preset(modifier: Any, preset: str) -> None:
 
 
 def _set(modifier: Any, values: Mapping[str, float]) -> None:
-    for name, identifier in inputs_of(modifier).items():
+    for name, identifier in weather_modifier.inputs_of(modifier).items():
         if name in values:
             compat.write_input(modifier, identifier, float(values[name]))
     modifier.id_data.update_tag()
-
-
-def inputs_of(modifier: Any) -> dict[str, str]:
-    """Identifier of each of the inputs that set the weather, by its name."""
-    sockets = [one for one in modifier.node_group.interface.items_tree if one.item_type == "SOCKET"]
-    known = {name for name, *_ in nodes.INPUTS}
-    return {one.name: one.identifier for one in sockets if one.in_out == "INPUT" and one.name in known}
 
 
 def _check_names(display_mesh: bpy.types.Object) -> None:
@@ -107,16 +103,20 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
         inputs = about["inputs"]
         material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
         stretch, rate = float(inputs["time_stretch"]), float(inputs["frame_rate"])
-        first, surface = float(inputs["frames"][0]), str(inputs["surface"])
+        first, last = (float(frame) * stretch for frame in inputs["frames"])
+        surface = str(inputs["surface"])
         cell_size, unit_scale = float(inputs["cell_size_m"]), float(inputs["unit_scale_m"])
     except (KeyError, TypeError, ValueError, IndexError):
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
     up = ground_mesh.up_of(display_mesh, unit_scale)
-    _write(display_mesh, footprints, up, stretch, cell_size=cell_size, unit_scale=unit_scale, **material)
+    places = _write(display_mesh, footprints, up, stretch, cell_size=cell_size, unit_scale=unit_scale, **material)
     matter = matter_of(surface, material["layer_depth"], section_of(footprints))
     if matter.soaking is None:  # no water stands there
         own_data.remove(ground_mesh.mesh_of(display_mesh), nodes.OF_HOLLOWS)
-    nodes.build(tree, matter=matter, up=up.tolist(), first_frame=first * stretch, frame_rate=rate * stretch)
+    since = places.times[:, 1]
+    span = weather_keys.span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
+    nodes.build(tree, matter=matter, up=up.tolist(), span=span, soaking=soaking_shares(places))
+    tree[weather_keys.LAST] = span.last
 
 
 def _write(
@@ -127,7 +127,7 @@ def _write(
     *,
     unit_scale: float,
     **of_bake: float,
-) -> None:
+) -> WeatherPlaces:
     mesh = ground_mesh.mesh_of(display_mesh)
     position = ground_mesh.undisturbed_surface(display_mesh, unit_scale).vertices
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
@@ -144,6 +144,7 @@ def _write(
         attribute = own_data.attribute(mesh, name, "FLOAT_VECTOR")
         attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
     mesh.update()
+    return places
 
 
 def _values(mesh: bpy.types.Mesh, name: str) -> Array:

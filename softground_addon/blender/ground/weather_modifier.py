@@ -21,6 +21,13 @@ def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     return None
 
 
+def inputs_of(modifier: Any) -> dict[str, str]:
+    """Identifier of each of the inputs that set the weather, by its name."""
+    sockets = [one for one in modifier.node_group.interface.items_tree if one.item_type == "SOCKET"]
+    known = {name for name, *_ in nodes.INPUTS}
+    return {one.name: one.identifier for one in sockets if one.in_out == "INPUT" and one.name in known}
+
+
 def put(ground: bpy.types.Object, tree: bpy.types.NodeTree) -> Any:
     """Have weather act on an object, right behind its playback; the modifier that is active stays so."""
     active = ground.modifiers.active

@@ -12,10 +12,12 @@ from typing import Any
 
 import bpy
 
-from ...core.after import weather as w
-from ...core.after.weathered_ground import BOUNDS, COVERED, KNOTS, Matter
+from ...core.after.weather import Matter
+from ...core.after.weather_course import Span
+from ...core.after.weathered_ground import BOUNDS, COVERED, KNOTS, NEAR
 from ..node_graph import NodeGraph, Number, new_group
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
+from .weather_course_nodes import CourseNodes
 
 GROUP = "SoftGround Weather"
 MARK = "softground_weather"
@@ -32,10 +34,11 @@ WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softgr
 """What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
 was wet is 0 to 1."""
 
-NOW = ("softground_weather_now_1", "softground_weather_now_2")
-"""Vectors that are there only while the group works."""
+HEIGHT, KEPT = "height", "kept"
+"""Names of what is worked out with that, and not stored."""
 
-CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
+NEVER_FULL = 1e9
+"""Of a sixth knot of the levels, which is none."""
 
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds what it drapes over"),
@@ -55,10 +58,17 @@ INPUTS = (
         50.0,
         "What the air takes up, in millimetres of water per hour: 0.2 mild, 0.5 in sun and wind",
     ),
+    (
+        "Water Table",
+        100.0,
+        0.0,
+        100.0,
+        "In centimetres below the brim of each print: water seeps in from below, up to it",
+    ),
+    ("Halo", 0.0, 0.0, 1.0, "How pale wet sand turns around a loaded foot; it is wet again after seconds"),
     ("Time Scale", 1.0, 0.0, 1e7, "How many times faster than the animation: 2880 shows 8 hours in 10 seconds"),
 )
 """Name, value, least, most and description of each of the group's inputs."""
-CONSTANT = ". The same over the whole shot: keys change all that has fallen so far"
 
 
 def new() -> Any:
@@ -69,7 +79,7 @@ def new() -> Any:
     for name, value, least, most, description in INPUTS:
         socket = tree.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
         socket.default_value, socket.min_value, socket.max_value = value, least, most
-        socket.description = description + CONSTANT
+        socket.description = description
     return tree
 
 
@@ -78,7 +88,9 @@ def is_weather(tree: bpy.types.NodeTree) -> bool:
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
 
 
-def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float, frame_rate: float) -> None:
+def build(
+    tree: Any, *, matter: Matter, up: Sequence[float], span: Span, soaking: tuple[float, float] = (1.0, 1.0)
+) -> None:
     """Fill a group, in place of what is in it; its inputs stay.
 
     Parameters
@@ -89,77 +101,89 @@ def build(tree: Any, *, matter: Matter, up: Sequence[float], first_frame: float,
         What the ground is.
     up : (3,) floats
         World up in the ground's own space and units, of the length of one metre.
-    first_frame : float
-        Scene frame at which the weather begins.
-    frame_rate : float
-        Frames of the scene per second [Hz].
+    span : Span
+        In frames of the scene.
+    soaking : (float, float)
+        Of the hollows; see `core.after.weathered_ground.soaking_shares`.
     """
     tree.nodes.clear()
     graph = NodeGraph(tree)
     group = graph.node("NodeGroupInput")
-    sky = _Sky(graph, group)
-    frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+    said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
+    course = CourseNodes(graph, said, matter, span, soaking)
 
     graph.next_row()
-    pace = sky.time_scale / frame_rate
-    of_all = (frame - first_frame).at_least(0.0) * pace
     pressed, since, compression = (graph.number(part) for part in graph.separated(_vector(graph, TIMES)))
-    age = (frame - since).at_least(0.0) * pace
-    cover_around, cover_within = sky.cover(of_all), sky.cover(age)
-
-    graph.next_row()
-    share = _shares(graph, sky.variance(age, cover_within, matter))
+    aged = course.since(since, course.of_places)
+    share = _shares(graph, aged["variance"])
     relief = _relief(graph, up)
-    blurred = relief + graph.number(graph.dot(_vector(graph, BLUR), share))
-    kept = None
+    soft = relief + graph.number(graph.dot(_vector(graph, BLUR), share))
     if matter.blown:
-        rate = sky.flux(matter.blown) * (1.0 / (max(matter.section, 1e-9) * matter.blown.bulk_density))
-        kept = (age * rate * -1.0).exp()
-        blurred = blurred * kept
-    inside = graph.number(graph.dot(_vector(graph, TRODDEN), graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0))))
-    inside = inside.within_one() * (1.0 - pressed.above(frame))
+        soft = soft * aged["kept"]
+    trodden = _vector(graph, TRODDEN)
+    begun = 1.0 - pressed.above(course.frame)
+    inside = graph.number(graph.dot(trodden, graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0)))).within_one() * begun
 
     graph.next_row()
-    cover = cover_around + (cover_within - cover_around) * inside
-    height = blurred - relief + cover
+    cover = course.around["cover"] + (aged["cover"] - course.around["cover"]) * inside
+    height = soft - relief + cover
     if matter.snow_depth:
-        left = (blurred + matter.snow_depth).at_least(0.0)
+        left = (soft + matter.snow_depth).at_least(0.0)
         ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
-        around, within = sky.thawed(of_all).at_most(left), (sky.thawed(age) * ratio * ratio).at_most(left)
+        around, within = course.around["thawed"].at_most(left), (aged["thawed"] * ratio * ratio).at_most(left)
         height = height - around - (within - around) * inside
-    fresh = (cover * (1.0 / COVERED)).within_one()
-    wetness = sky.wetness(of_all, of_all + (age - of_all) * inside, matter)
+    wetness = course.around["wet"]
+    if matter.wet:
+        wetness = wetness + (aged["wet"] - wetness) * inside
     water = None
     if matter.soaking:
         graph.next_row()
-        water = sky.standing(age, height, matter.soaking)
+        water = _standing(graph, course, said["Water Table"] * 0.01, height)
         height = height + water
         wetness = wetness.at_least(water.above(0.0))
 
     graph.next_row()
-    geometry = group.outputs["Geometry"]
-    seen = [height, wetness, fresh, *filter(None, (water, kept))]
-    changed, (height, wetness, fresh, *more) = _worked_out(graph, geometry, seen)
-    stored = {WETNESS: wetness, FRESH: fresh} | ({WATER: more.pop(0)} if water else {})
+    seen = {HEIGHT: height, FRESH: (cover * (1.0 / COVERED)).within_one()}
+    if matter.wet or water:  # elsewhere it is the same everywhere
+        seen[WETNESS] = wetness
+    if matter.blown:
+        seen[KEPT] = aged["kept"]
+    if water:
+        seen[WATER] = water
+    if matter.pales:
+        near = graph.number(graph.dot(trodden, (NEAR,) * 3)).within_one() * begun
+        seen[DRIED] = (1.0 - wetness).at_least(said["Halo"] * near * aged["pale"])
+    changed = _changed(graph, group.outputs["Geometry"], seen, wetness, matter, up)
+    graph.finish(graph.choose("GEOMETRY", course.is_any.above(0.0).socket, group.outputs["Geometry"], changed))
+
+
+def _changed(
+    graph: NodeGraph,
+    geometry: Any,
+    seen: Mapping[str, Number],
+    wetness: Number,
+    matter: Matter,
+    up: Sequence[float],
+) -> Any:
+    """The geometry under weather; `wetness` is that of places of which `seen` has none."""
     # Before anything moves: all of it follows from where the playback has the vertices.
-    changed = _with(graph, changed, _seen(graph, stored, more.pop() if kept else None, matter))
-    changed = graph.forgotten(_moved(graph, changed, up, height), *NOW[: 1 + (len(seen) > 3)])
-    graph.finish(graph.choose("GEOMETRY", sky.is_any().above(0.0).socket, geometry, changed))
+    changed, known = _worked_out(graph, geometry, seen)
+    height, kept = known.pop(HEIGHT), known.pop(KEPT, None)
+    known.setdefault(WETNESS, wetness)
+    changed = _with(graph, changed, _seen(graph, known, kept, matter))
+    return _moved(graph, changed, up, height)
 
 
-def _worked_out(graph: NodeGraph, geometry: Any, values: Sequence[Number]) -> tuple[Any, list[Number]]:
+def _worked_out(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> tuple[Any, dict[str, Number]]:
     """A geometry that keeps some numbers, and these as they are kept: who asks for one does not work it out again."""
-    kept = []
-    for number, name in enumerate(NOW):
-        together = values[3 * number : 3 * number + 3]
-        if not together:
-            break
-        pack = graph.node("ShaderNodeCombineXYZ")
-        for value, socket in zip(together, pack.inputs, strict=False):
-            graph.link(value.socket, socket)
-        geometry = graph.store(geometry, name, pack.outputs["Vector"], True, "FLOAT_VECTOR")
-        kept += [graph.number(part) for part in graph.separated(_vector(graph, name))][: len(together)]
-    return geometry, kept
+    node = graph.node("GeometryNodeCaptureAttribute")
+    node.domain = "POINT"
+    graph.link(geometry, node.inputs[0])
+    for number, (name, value) in enumerate(values.items()):
+        node.capture_items.new("FLOAT", name)
+        graph.link(value.socket, node.inputs[number + 1])
+    kept = {name: graph.number(node.outputs[number + 1]) for number, name in enumerate(values)}
+    return node.outputs[0], kept
 
 
 def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:
@@ -167,7 +191,7 @@ def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matt
     if WATER in stored:
         stored[WATER] = graph.number(graph.attribute(WATER)).at_least(stored[WATER])  # the bake's own stays
     if matter.wet:
-        stored[DRIED] = 1.0 - stored[WETNESS]
+        stored.setdefault(DRIED, 1.0 - stored[WETNESS])
     if kept:  # what is blown full looks trodden no more
         stored |= {name: graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM)}
     return stored
@@ -188,92 +212,21 @@ def _moved(graph: NodeGraph, geometry: Any, up: Sequence[float], height: Number)
     return node.outputs["Geometry"]
 
 
-class _Sky:
-    """The group's inputs in SI units, and what they do; what a method is given and gives is per vertex."""
-
-    def __init__(self, graph: NodeGraph, group: Any) -> None:
-        self.graph = graph
-        said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
-        self.snowfall = said["Snowfall"] * CENTIMETRES_AN_HOUR
-        self.warmth = said["Temperature"].at_least(0.0)
-        self.cold = said["Temperature"].at_most(0.0)
-        self.wind = said["Wind"]
-        self.rain = said["Rain"] * MILLIMETRES_AN_HOUR
-        self.drying = said["Drying"] * MILLIMETRES_AN_HOUR
-        self.time_scale = said["Time Scale"]
-        least, more, fall, most = w.NEW_SNOW
-        self._density = ((said["Temperature"] * (1.0 / fall)).exp() * more + least).at_most(most)
-        rate, warmth, self._slowing = w.SETTLING
-        self._settling = (self.cold * warmth).exp() * self._density * (self._slowing * rate)
-        self._falling = self.snowfall * self._density * (1.0 / w.WATER_DENSITY)
-        self._melting = self.warmth * w.DEGREE_DAY
-
-    def is_any(self) -> Number:
-        """More than 0 where there is any weather."""
-        return (self.snowfall + self.warmth + self.wind + self.rain + self.drying) * self.time_scale
-
-    def _fallen(self, age: Number) -> Number:
-        """As `weather.snow_cover`."""
-        kept: Number | None = None
-        for at, weight in w.GAUSS:
-            density = (age * self._settling * at + 1.0).log() * (1.0 / self._slowing) + self._density
-            part = self._density * weight / density
-            kept = part if kept is None else kept + part
-        assert kept is not None
-        return age * self.snowfall * kept
-
-    def cover(self, age: Number) -> Number:
-        """New snow that has not melted."""
-        return self._fallen(age) * (1.0 - self._melting / self._falling).within_one()
-
-    def thawed(self, age: Number) -> Number:
-        """As `weather.thawed_depth`."""
-        return age * (self._melting - self._falling).at_least(0.0) * (w.WATER_DENSITY / w.SNOW.bulk_density)
-
-    def flux(self, blown: w.Blown) -> Number:
-        """As `weather.blown_flux`."""
-        speed = self.wind * float(w.friction_velocity(1.0))
-        return speed * speed * speed * (w.BAGNOLD * w.AIR_DENSITY / w.GRAVITY) * speed.above(blown.threshold)
-
-    def variance(self, age: Number, cover: Number, matter: Matter) -> Number:
-        """What edges have lost."""
-        spread = self.rain * w.RAIN_ROUNDING
-        if matter.blown:
-            spread = spread + self.flux(matter.blown) * (2.0 * w.HOP / matter.blown.bulk_density)
-        under = cover + self.thawed(age) if matter.snow_depth else cover
-        return under * w.DRAPE + spread * age
-
-    def wetness(self, of_all: Number, exposed: Number, matter: Matter) -> Number:
-        """How wet the ground looks where no water stands on it."""
-        melting = self._melting if matter.snow_depth else self._melting.at_most(self._falling)
-        wet = 1.0 - (of_all * (self.rain + melting) * (-1.0 / w.SHINE)).exp()
-        if not matter.wet:
-            return wet
-        films = exposed * self.drying * (1.0 / w.SURFACE_FILM)
-        lost = films.at_most(1.0) + (films.at_least(1.0).root() - 1.0) * 2.0
-        return wet.at_least(1.0 - lost * (1.0 / w.DRY_AT))
-
-    def standing(self, age: Number, height: Number, soaking: w.Soaking) -> Number:
-        """Depth of water where the ground has changed by a height."""
-        graph = self.graph
-        capacity, above, left = (graph.number(part) for part in graph.separated(_vector(graph, POOL)))
-        filled = (self._excess(age, left, soaking) / capacity).within_one().root() * KNOTS
-        rise: Number | None = None
-        for number, name in enumerate(LEVELS):
-            steps = graph.vector("SUBTRACT", filled.socket, tuple(3.0 * number + step for step in range(3)))
-            steps = graph.vector("MINIMUM", graph.vector("MAXIMUM", steps, (0.0,) * 3), (1.0,) * 3)
-            part = graph.number(graph.dot(steps, _vector(graph, name)))
-            rise = part if rise is None else rise + part
-        assert rise is not None
-        return (rise - above - height).at_least(0.0) * rise.above(0.0)
-
-    def _excess(self, age: Number, left: Number, soaking: w.Soaking) -> Number:
-        """As `weather.rain_excess`."""
-        over = (self.rain - left * soaking.final).at_least(0.0)
-        drop = left * (soaking.first - soaking.final)
-        begin = ((over / drop).at_most(1.0).at_least(1e-30).log() * (-1.0 / soaking.decay)).at_most(age)
-        soaked = (begin * -soaking.decay).exp() - (age * -soaking.decay).exp()
-        return (over * (age - begin) - drop * soaked * (1.0 / soaking.decay)).at_least(0.0)
+def _standing(graph: NodeGraph, course: CourseNodes, table: Number, height: Number) -> Number:
+    """Depth of water where the ground has changed by a height; `table` is how far below the brim it comes by itself."""
+    capacity, above, left = (graph.number(part) for part in graph.separated(_vector(graph, POOL)))
+    rises = [_vector(graph, name) for name in LEVELS]
+    aged = course.since(graph.number(graph.separated(rises[1])[2]), course.of_hollows)
+    excess = aged["low"] + (aged["high"] - aged["low"]) * course.between(left)
+    filled = (excess / capacity).within_one().root() * KNOTS
+    parts = []
+    for rise, begin in zip(rises, ((0.0, 1.0, 2.0), (3.0, 4.0, NEVER_FULL)), strict=True):
+        steps = graph.vector("SUBTRACT", filled.socket, begin)
+        steps = graph.vector("MINIMUM", graph.vector("MAXIMUM", steps, (0.0,) * 3), (1.0,) * 3)
+        parts.append(graph.number(graph.dot(steps, rise)))
+    brim = graph.number(graph.dot(rises[0], (1.0,) * 3)) + graph.number(graph.dot(rises[1], (1.0, 1.0, 0.0)))
+    level = (parts[0] + parts[1]).at_least((brim - table).at_least(0.0) * aged["seeped"])
+    return (level - above - height).at_least(0.0) * level.above(0.0)
 
 
 def _vector(graph: NodeGraph, name: str) -> Any:

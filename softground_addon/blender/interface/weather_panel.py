@@ -38,7 +38,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         row.menu("SOFTGROUND_MT_weather", text="Presets")
         row.operator("softground.remove_weather", text="", icon="X")
         column = layout.column(align=True)
-        for name, identifier in weather.inputs_of(modifier).items():
+        for name, identifier in weather_modifier.inputs_of(modifier).items():
             holder, path = compat.input_field(modifier, identifier)
             column.prop(holder, path, text=name)
 

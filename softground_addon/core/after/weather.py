@@ -1,6 +1,6 @@
-"""What weather does to a print as it ages, each process as a closed form of its rate and of time.
+"""What weather does to ground, process by process: rates, and what follows from their integrals over time.
 
-All in SI units (temperatures in °C), elementwise over arrays. At age 0 and at rate 0 nothing has happened, exactly.
+All in SI units (temperatures in °C), elementwise over arrays. Where an integral is 0 nothing has happened, exactly.
 
 References
 ----------
@@ -60,11 +60,10 @@ SHINE = 1e-3
 """Water that wets a dry surface by 63 % [m]."""
 HALO = 2.0
 """Time in which pale sand around a loaded foot is wet again [s] (Reynolds dilatancy)."""
+LEAST_SECTION = 1e-9
+"""A print that holds no more is full [m²]."""
 SEALING = 5.0
 """How much less ground takes up the more it is compressed: exp(-5·compression/layer depth)."""
-
-GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
-"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -93,19 +92,20 @@ SNOW = Blown(0.27, 150.0)
 class Soaking:
     """How fast ground takes up water: at first and in the end [m/s], and how fast it goes from one to the other [1/s].
 
-    As Horton's f = final + (first - final)·exp(-decay·t).
+    As Horton's f = final + (first - final)·exp(-decay·t). Water from below fills a print over a time `seep` [s].
     """
 
     first: float
     final: float
     decay: float
+    seep: float
 
 
 SOAKING = {
-    "sand": Soaking(127e-3 / HOUR, 10e-3 / HOUR, 4.0 / HOUR),
-    "wet_sand": Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR),
-    "soil": Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR),
-    "mud": Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR),
+    "sand": Soaking(127e-3 / HOUR, 10e-3 / HOUR, 4.0 / HOUR, 2.0),
+    "wet_sand": Soaking(30e-3 / HOUR, 8e-3 / HOUR, 4.0 / HOUR, 5.0),
+    "soil": Soaking(76e-3 / HOUR, 5e-3 / HOUR, 4.0 / HOUR, 30.0),
+    "mud": Soaking(25e-3 / HOUR, 1e-3 / HOUR, 4.0 / HOUR, 30.0),
 }
 """Sand, loam and clay, dry; wet sand has had its first rain. Snow takes up what falls."""
 
@@ -122,62 +122,21 @@ def new_snow_density(temperature: Any) -> Array:
     return np.minimum(least + more * np.exp(np.asarray(temperature, dtype=np.float64) / fall), most)
 
 
-def settled_density(age: Any, temperature: Any, density: Any) -> Array:
-    """Density of snow that was laid down with a density [kg/m³] some time ago [s]."""
-    rate, warmth, slowing = SETTLING
-    speed = slowing * np.asarray(density) * rate * np.exp(warmth * np.minimum(temperature, 0.0))
-    return np.asarray(density + np.log1p(speed * np.asarray(age, dtype=np.float64)) / slowing)
+def settling_rate(temperature: Any) -> Array:
+    """How fast snow settles at an air temperature [1/s]."""
+    rate, warmth, _ = SETTLING
+    return np.asarray(rate * np.exp(warmth * np.minimum(temperature, 0.0)))
 
 
-def snow_cover(age: Any, rate: Any, temperature: Any) -> Array:
-    """Depth of what has fallen over a time [s] at a rate [m/s of new snow], each layer settled by its own age [m]."""
-    age, density = np.asarray(age, dtype=np.float64), new_snow_density(temperature)
-    kept = sum(weight * density / settled_density(at * age, temperature, density) for at, weight in GAUSS)
-    return np.asarray(rate * age * kept)
+def settled_density(settling: Any, density: Any) -> Array:
+    """Density of snow that was laid down with a density [kg/m³], after an integral of `settling_rate` over time."""
+    slowing = SETTLING[2]
+    return np.asarray(density + np.log1p(slowing * np.asarray(density) * settling) / slowing)
 
 
-def snow_water(age: Any, rate: Any, temperature: Any) -> Array:
-    """Water in what has fallen over a time [s] at a rate [m/s of new snow] [m]."""
-    return np.asarray(np.asarray(age) * rate * new_snow_density(temperature) / WATER_DENSITY)
-
-
-def melted_water(age: Any, temperature: Any) -> Array:
-    """What warmth melts over a time [s], as water [m]."""
-    return np.asarray(DEGREE_DAY * np.maximum(temperature, 0.0) * np.asarray(age))
-
-
-def thawed_depth(age: Any, rate: Any, temperature: Any, density: float = SNOW.bulk_density) -> Array:
-    """Depth of untrodden ground that melts once the new snow is gone [m], were it deep enough."""
-    over = melted_water(age, temperature) - snow_water(age, rate, temperature)
-    return np.asarray(np.maximum(over, 0.0) * WATER_DENSITY / density)
-
-
-def level_of_snow(
-    age: Any, rate: Any, temperature: Any, *, depth: Any, compression: Any = 0.0, left: Any = None
-) -> Array:
-    """Change of a surface's height by what falls on it and what melts [m]: new snow first, then the ground's own.
-
-    Parameters
-    ----------
-    age : array
-        Time [s].
-    rate, temperature : float
-        Of new snow [m/s], and of the air [°C].
-    depth : array
-        Depth of the snow that the ground is made of [m], 0 where it is something else.
-    compression : array
-        What was trodden down of it [m]. It melts the less the denser it is, as fewer of its grains are open to the
-        air, and stands up in the end. That this goes with 1/density is by the pictures it gives.
-    left : array, optional
-        What there is to melt [m]; by default the depth without the compression.
-    """
-    fallen, water = snow_cover(age, rate, temperature), snow_water(age, rate, temperature)
-    melted = melted_water(age, temperature)
-    share = np.clip(1.0 - np.divide(melted, water, out=np.ones_like(melted), where=water > 0), 0.0, 1.0)
-    trodden = np.maximum(depth - np.asarray(compression, dtype=np.float64), 0.0)
-    ratio = np.divide(trodden, depth, out=np.ones_like(trodden), where=np.asarray(depth) > 0)
-    below = thawed_depth(age, rate, temperature) * ratio**2
-    return np.asarray(fallen * share - np.minimum(below, trodden if left is None else left))
+def melting_rate(temperature: Any) -> Array:
+    """What warmth melts, as water [m/s]."""
+    return np.asarray(DEGREE_DAY * np.maximum(temperature, 0.0))
 
 
 def friction_velocity(wind: Any) -> Array:
@@ -191,54 +150,35 @@ def blown_flux(wind: Any, blown: Blown) -> Array:
     return np.where(speed > blown.threshold, BAGNOLD * AIR_DENSITY / GRAVITY * speed**3, 0.0)
 
 
-def filled_share(age: Any, wind: Any, section: Any, blown: Blown) -> Array:
-    """Share of a print that is blown full after a time [s]; `section` is its volume over its width [m²]."""
-    rate = blown_flux(wind, blown) / (np.asarray(section) * blown.bulk_density)
-    return np.asarray(-np.expm1(-np.asarray(age) * rate))
+def fill_rate(flux: Any, section: float, blown: Blown) -> Array:
+    """Rate at which what is open of a print is blown full [1/s]; `section` is its volume over its width [m²]."""
+    return np.asarray(flux) / (max(section, LEAST_SECTION) * blown.bulk_density)
 
 
-def blown_variance(age: Any, wind: Any, blown: Blown) -> Array:
-    """Variance by which creeping grains have blurred edges after a time [s] [m²]."""
-    return np.asarray(2.0 * HOP * blown_flux(wind, blown) / blown.bulk_density * np.asarray(age))
+def spread_rate(flux: Any, blown: Blown) -> Array:
+    """Growth of the variance by which creeping grains blur edges [m²/s]."""
+    return np.asarray(2.0 * HOP / blown.bulk_density * np.asarray(flux))
 
 
-def drape_variance(cover: Any) -> Array:
-    """Variance by which edges are blurred under a depth of new snow, or by the melt of one [m] [m²]."""
-    return np.asarray(DRAPE * np.maximum(cover, 0.0))
+def soaked(wet: Any, soaking: Soaking) -> Array:
+    """What open ground can have taken up after it was rained on for a time [s] [m]: the integral of Horton's rate."""
+    more = (soaking.first - soaking.final) / soaking.decay
+    return np.asarray(soaking.final * np.asarray(wet) - more * np.expm1(-soaking.decay * np.asarray(wet)))
 
 
-def rain_variance(age: Any, rate: Any) -> Array:
-    """Variance by which rain at a rate [m/s] has rounded edges after a time [s] [m²]."""
-    return np.asarray(RAIN_ROUNDING * np.asarray(rate) * np.asarray(age))
+def seeped(age: Any, soaking: Soaking) -> Array:
+    """Share of its full height that water from below has reached in a print after a time [s]."""
+    return np.asarray(-np.expm1(-np.asarray(age) / soaking.seep))
 
 
-def rain_excess(age: Any, rate: Any, soaking: Soaking, share: Any = 1.0) -> Array:
-    """Rain at a rate [m/s] that the ground has not taken up after a time [s], as a depth [m].
-
-    `share` is how much of its soaking is left under a sole, see `SEALING`.
-    """
-    age, first, final = np.asarray(age, dtype=np.float64), share * soaking.first, share * soaking.final
-    drop = np.asarray(first - final, dtype=np.float64)
-    over = np.maximum(rate - final, 0.0)
-    part = np.clip(np.divide(over, drop, out=np.ones_like(over * drop), where=drop > 0), 1e-30, 1.0)
-    begin = np.minimum(-np.log(part) / soaking.decay, age)  # when rain first exceeds what soaks in
-    soaked = drop / soaking.decay * (np.exp(-soaking.decay * begin) - np.exp(-soaking.decay * age))
-    return np.asarray(np.where(over > 0, np.maximum(over * (age - begin) - soaked, 0.0), 0.0))
-
-
-def seep_level(age: Any, table: Any, time: Any) -> Array:
-    """Water that has seeped into a print from below after a time [s], up to the water table [m]; 2-30 s on a beach."""
-    return np.asarray(table * -np.expm1(-np.asarray(age) / time))
-
-
-def wetness(age: Any, evaporation: Any) -> Array:
-    """How wet ground looks, 1 to 0, that dries for a time [s] at an evaporation [m/s].
+def wetness(lost: Any) -> Array:
+    """How wet ground looks, 1 to 0, that would have lost so much water [m] by now, had it stayed a film.
 
     The surface film goes as fast as the air takes it; after that what was lost grows with the square root of time.
     """
-    films = np.asarray(age, dtype=np.float64) * evaporation / SURFACE_FILM
-    lost = np.where(films > 1.0, 2.0 * np.sqrt(np.maximum(films, 1.0)) - 1.0, films)
-    return np.asarray(np.maximum(1.0 - lost / DRY_AT, 0.0))
+    films = np.asarray(lost, dtype=np.float64) / SURFACE_FILM
+    dried = np.minimum(films, 1.0) + 2.0 * (np.sqrt(np.maximum(films, 1.0)) - 1.0)
+    return np.asarray(np.maximum(1.0 - dried / DRY_AT, 0.0))
 
 
 def wetted(water: Any) -> Array:
@@ -249,3 +189,43 @@ def wetted(water: Any) -> Array:
 def halo(age: Any) -> Array:
     """How much paler wet sand around a foot is, 1 to 0, some time after the load [s]."""
     return np.asarray(np.exp(-np.asarray(age) / HALO))
+
+
+@dataclass(frozen=True)
+class Matter:
+    """How a ground takes weather.
+
+    Attributes
+    ----------
+    snow_depth : float
+        Depth of the snow that it is made of [m], 0 of all else.
+    blown : Blown or None
+        What wind does to it.
+    soaking : Soaking or None
+        How it takes up rain; None where no water stands.
+    section : float
+        Volume of a print over its width [m²].
+    wet : bool
+        Whether it is wet to begin with.
+    pales : bool
+        Whether it is wet sand, which turns pale around a loaded foot.
+    """
+
+    snow_depth: float
+    blown: Blown | None
+    soaking: Soaking | None
+    section: float
+    wet: bool
+    pales: bool
+
+
+def matter_of(surface: str, layer_depth: float, section: float) -> Matter:
+    """How a surface of the presets takes weather; `layer_depth` of its loose layer [m]."""
+    return Matter(
+        snow_depth=layer_depth if surface == "snow" else 0.0,
+        blown={"snow": SNOW, "sand": SAND}.get(surface),
+        soaking=SOAKING.get(surface),
+        section=section,
+        wet=surface in ("wet_sand", "mud"),
+        pales=surface == "wet_sand",
+    )

@@ -67,8 +67,8 @@ def weather_places(
     heights = [relief, *(rim - compression for compression, rim in at_sigma)]
     bounds = [_blurred(trodden, sigma).sample(*places) for sigma in SIGMAS]
     inside = [share for share, *_ in bounds]
-    first, last = (_mean_frame([(one[0], one[k]) for one in bounds]) * time_stretch for k in (1, 2))
-    pool, levels = _pools(footprints, position, relief, cell_size, blur_sigma, layer_depth)
+    first, last = (_mean_frame([(one[0], one[k] * time_stretch) for one in bounds]) for k in (1, 2))
+    pool, levels = _pools(footprints, position, relief, cell_size, blur_sigma, layer_depth, time_stretch)
     return WeatherPlaces(
         blur=np.diff(heights, axis=0).T,
         trodden=np.stack([inside[0], inside[1] - inside[0], inside[2] - inside[1]], axis=-1),
@@ -125,9 +125,10 @@ def _pools(
     cell_size: float,
     blur_sigma: float,
     layer_depth: float,
+    time_stretch: float,
 ) -> tuple[Array, Array]:
     """`WeatherPlaces.pool` and `levels`: of the latest print whose hollow each place lies in."""
-    pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), KNOTS))
+    pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), KNOTS + 1))
     ground = recompose(footprints, cell_size=cell_size)
     row, column = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (1, 0))
     for footprint in sorted(footprints, key=lambda one: one.end_frame):
@@ -151,7 +152,7 @@ def _pools(
             pool[wet, 0] = hollow.capacity / hollow.catchment
             pool[wet, 1] = position[wet, 2] + relief[wet] - hollow.bottom
             pool[wet, 2] = np.exp(-SEALING * pressed)
-            levels[wet] = np.diff(known)
+            levels[wet] = [*np.diff(known), footprint.end_frame * time_stretch]
     return pool, levels
 
 

@@ -1,91 +1,32 @@
 """A ground under weather: from what a bake left at each place, its age, and the rates, to heights and shading.
 
-z = rest + (1 - filled)·relief(sigma) + level. The level is that of untouched ground, which the weather has acted on
-from the start, and in a print that of its own age; relief and bounds of prints lose their edges as variances add up.
+z = rest + kept·relief(sigma) + level. The level is that of untouched ground, which the weather has acted on from the
+start, and in a print that since it was made; relief and bounds of prints lose their edges as variances add up.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import weather as w
+from .weather_course import Course, Span, Weather, course_of
 
 Array = NDArray[np.float64]
 
 SIGMAS = (0.01, 0.03, 0.09)
 """Standard deviations at which the relief is known besides its own [m]; in between, linear in the variance."""
 BOUNDS = (0.0, *(sigma**2 for sigma in SIGMAS))
-KNOTS = 6
+KNOTS = 5
 """Shares of a hollow's depth that are known: at even steps of the root of what it holds."""
-
-
-@dataclass(frozen=True)
-class Weather:
-    """Rates that stay the same, from the first frame of a bake on.
-
-    Attributes
-    ----------
-    snowfall : float
-        New snow [m/s].
-    temperature : float
-        Of the air [°C].
-    wind : float
-        At 10 m [m/s].
-    rain : float
-        [m/s].
-    drying : float
-        Evaporation [m/s].
-    time_scale : float
-        How many times faster it goes than the animation.
-    """
-
-    snowfall: float = 0.0
-    temperature: float = 0.0
-    wind: float = 0.0
-    rain: float = 0.0
-    drying: float = 0.0
-    time_scale: float = 1.0
-
-
-@dataclass(frozen=True)
-class Matter:
-    """How a ground takes weather.
-
-    Attributes
-    ----------
-    snow_depth : float
-        Depth of the snow that it is made of [m], 0 of all else.
-    blown : Blown or None
-        What wind does to it.
-    soaking : Soaking or None
-        How it takes up rain; None where no water stands.
-    section : float
-        Volume of a print over its width [m²].
-    wet : bool
-        Whether it is wet to begin with.
-    """
-
-    snow_depth: float
-    blown: w.Blown | None
-    soaking: w.Soaking | None
-    section: float
-    wet: bool
-
-
-def matter_of(surface: str, layer_depth: float, section: float) -> Matter:
-    """How a surface of the presets takes weather; `layer_depth` of its loose layer [m]."""
-    snow = surface == "snow"
-    return Matter(
-        snow_depth=layer_depth if snow else 0.0,
-        blown={"snow": w.SNOW, "sand": w.SAND}.get(surface),
-        soaking=w.SOAKING.get(surface),
-        section=section,
-        wet=surface in ("wet_sand", "mud"),
-    )
+NEAR = 4.0
+"""Of the contact that is within `SIGMAS[-1]`, for sand that turns pale: all of it along the edges of a foot."""
+LEAST_RANGE = 1e-6
+"""Shares of soaking that differ by less are one."""
+COVERED = 0.01
+"""New snow that hides what is below [m]."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +46,8 @@ class WeatherPlaces:
         What the hollow there holds as a depth of water on it [m], 0 where there is none; height above its bottom [m];
         how much of its soaking is left.
     levels : (K, 6) float array
-        Rise of the water at each sixth of the root of the share of what the hollow holds [m].
+        Rise of the water at each fifth of the root of the share of what the hollow holds [m], and the frame from
+        which on it is there.
     """
 
     blur: Array
@@ -125,79 +67,90 @@ class Weathered:
         What weather changed of it [m].
     wetness, fresh, water : arrays
         How wet it looks and how much of it new snow covers, 0 to 1; depth of standing water [m].
+    dried : array
+        How dry it looks where it was wet to begin with, 0 to 1.
     """
 
     height: Array
     wetness: Array
     fresh: Array
     water: Array
-
-
-COVERED = 0.01
-"""New snow that hides what is below [m]."""
+    dried: Array
 
 
 def weathered(
-    places: WeatherPlaces,
-    relief: Array,
-    weather: Weather,
-    matter: Matter,
-    *,
-    frame: float,
-    first_frame: float,
-    frame_rate: float,
+    places: WeatherPlaces, relief: Array, weather: Weather, matter: w.Matter, *, frame: float, span: Span
 ) -> Weathered:
     """The ground under weather at a frame; `relief` (K,) is what the bake shows there at that frame [m]."""
-    pace = weather.time_scale / frame_rate
+    course = course_of(weather, matter, frame=frame, span=span)
     pressed, since, compression = places.times.T
-    age = np.maximum(frame - since, 0.0) * pace
-    of_all = np.full_like(age, max(frame - first_frame, 0.0) * pace)
-    fall = {"rate": weather.snowfall, "temperature": weather.temperature}
-
-    cover = np.maximum(w.level_of_snow(age, **fall, depth=0.0), 0.0)
-    thawed = w.thawed_depth(age, **fall) if matter.snow_depth else 0.0
-    variance = w.drape_variance(cover + thawed) + w.rain_variance(age, weather.rain)
-    gone = np.zeros_like(age)
-    if matter.blown:
-        variance = variance + w.blown_variance(age, weather.wind, matter.blown)
-        gone = w.filled_share(age, weather.wind, matter.section, matter.blown)
-    share = shares(variance)
-    soft = (1.0 - gone) * (relief + (places.blur * share).sum(axis=-1))
+    share = shares(course.since(since, course.variance))
+    kept = course.since(since, course.kept)
+    soft = kept * (relief + (places.blur * share).sum(axis=-1))
 
     inside = places.trodden[:, 0] + (places.trodden[:, 1:] * share[:, 1:]).sum(axis=-1)
     inside = np.where(frame >= pressed, np.clip(inside, 0.0, 1.0), 0.0)
-    left = np.maximum(matter.snow_depth + soft, 0.0) if matter.snow_depth else 0.0
-    snow: dict[str, Any] = {**fall, "depth": matter.snow_depth, "left": left}
-    around = w.level_of_snow(of_all, **snow)
-    level = (1.0 - inside) * around + inside * w.level_of_snow(age, **snow, compression=compression)
+    cover = course.cover[0] + inside * (course.since(since, course.cover) - course.cover[0])
+    change = soft - relief + cover
+    if matter.snow_depth:
+        # Trodden snow melts the less the denser it is, as fewer of its grains are open to the air, and stands up in
+        # the end. That this goes with 1/density is by the pictures it gives.
+        ratio = np.maximum(1.0 - compression / matter.snow_depth, 0.0)
+        left = np.maximum(matter.snow_depth + soft, 0.0)
+        around = np.minimum(course.thawed[0], left)
+        within = np.minimum(course.since(since, course.thawed) * ratio**2, left)
+        change = change - around - inside * (within - around)
 
-    water = _standing(places, soft - relief + level, weather, matter, age)
+    water = _standing(places, change, weather, matter, course)
+    looks = course.wet[0] + inside * (course.since(since, course.wet) - course.wet[0])
+    wetness = np.where(water > 0, 1.0, looks)
     return Weathered(
-        height=soft - relief + level + water,
-        wetness=np.where(water > 0, 1.0, _wetness(weather, matter, of_all, (1.0 - inside) * of_all + inside * age)),
-        fresh=np.clip(level / COVERED, 0.0, 1.0),
+        height=change + water,
+        wetness=wetness,
+        fresh=np.clip(cover / COVERED, 0.0, 1.0),
         water=water,
+        dried=_dried(places, wetness, weather, matter, course, frame),
     )
 
 
-def _standing(places: WeatherPlaces, change: Array, weather: Weather, matter: Matter, age: Array) -> Array:
+def _dried(
+    places: WeatherPlaces, wetness: Array, weather: Weather, matter: w.Matter, course: Course, frame: float
+) -> Array:
+    """How much of ground that was wet looks dry, 0 to 1."""
+    if not matter.wet:
+        return np.zeros_like(wetness)
+    dried = 1.0 - wetness
+    if matter.pales:
+        pressed, since, _ = places.times.T
+        near = np.clip(places.trodden.sum(axis=-1) * NEAR, 0.0, 1.0) * (frame >= pressed)
+        dried = np.maximum(dried, weather.halo * near * course.since(since, course.pale))
+    return dried
+
+
+def _standing(places: WeatherPlaces, change: Array, weather: Weather, matter: w.Matter, course: Course) -> Array:
     """Depth of the water above ground that has changed by so much (K,) [m]."""
     if matter.soaking is None:
-        return np.zeros_like(age)
+        return np.zeros_like(change)
     capacity, above, left = places.pool.T
-    excess = w.rain_excess(age, weather.rain, matter.soaking, left)
-    full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(age), where=capacity > 0), 0.0, 1.0))
-    rise = (np.clip(full[:, None] * KNOTS - np.arange(KNOTS), 0.0, 1.0) * places.levels).sum(axis=-1)
-    return np.where(rise > 0, np.maximum(rise - above - change, 0.0), 0.0)
+    since, rises = places.levels[:, KNOTS], places.levels[:, :KNOTS]
+    low, high = soaking_shares(places)
+    at_low, at_high = (course.since(since, course.excess(share)) for share in (low, high))
+    excess = at_low + (at_high - at_low) * np.clip((left - low) / max(high - low, LEAST_RANGE), 0.0, 1.0)
+    full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(change), where=capacity > 0), 0.0, 1.0))
+    rain = (np.clip(full[:, None] * KNOTS - np.arange(KNOTS), 0.0, 1.0) * rises).sum(axis=-1)
+    seep = np.maximum(rises.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)
+    level = np.maximum(rain, seep)
+    return np.where(level > 0, np.maximum(level - above - change, 0.0), 0.0)
 
 
-def _wetness(weather: Weather, matter: Matter, of_all: Array, exposed: Array) -> Array:
-    """How wet the ground itself looks; `exposed` is how long each place has dried [s]."""
-    dried = w.wetness(exposed, weather.drying) if matter.wet else np.zeros_like(exposed)
-    melted = w.melted_water(of_all, weather.temperature)
-    if not matter.snow_depth:  # there is no more of it than has fallen
-        melted = np.minimum(melted, w.snow_water(of_all, weather.snowfall, weather.temperature))
-    return np.maximum(dried, w.wetted(weather.rain * of_all + melted))
+def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
+    """Least and largest share of their soaking that the hollows have left; in between, puddles are interpolated.
+
+    What a hollow gathers is linear in this share from when all ground there takes up less than falls.
+    """
+    capacity, _, left = places.pool.T
+    known = left[capacity > 0]
+    return (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
 
 
 def shares(variance: Array) -> Array:

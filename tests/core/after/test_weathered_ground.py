@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from softground_addon.core.after import weather as w
+from softground_addon.core.after.weather import DEGREE_DAY, SNOW, WATER_DENSITY, matter_of
+from softground_addon.core.after.weather_course import Span, Weather, course_of
 from softground_addon.core.after.weather_places import section_of, weather_places
-from softground_addon.core.after.weathered_ground import SIGMAS, Weather, matter_of, weathered
+from softground_addon.core.after.weathered_ground import KNOTS, SIGMAS, WeatherPlaces, weathered
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import recompose
 from tests.core.walkers import pressed, walk
 
 CELL, BLUR, RATE = 0.01, 0.005, 30.0
 MATERIAL = GroundMaterial(200e3, 0.3, 0.1, blur_sigma=BLUR)
-HOUR = 3600.0
+HOUR, DAY = 3600.0, 86_400.0
+SPAN = Span(1.0, 600.0, RATE)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def left(track):
 def at(left, weather, frame, surface="snow", section=0.01):
     _, relief, places = left
     matter = matter_of(surface, 0.3, section)
-    result = weathered(places, relief.ravel(), weather, matter, frame=frame, first_frame=1.0, frame_rate=RATE)
+    result = weathered(places, relief.ravel(), weather, matter, frame=frame, span=SPAN)
     return replace(result, height=result.height.reshape(relief.shape))
 
 
@@ -88,8 +90,58 @@ def test_a_print_is_gone_under_a_night_of_snow(left):
     away = places.times[:, 1].reshape(relief.shape) > 1e6
     depths = [float(height[away].mean() - height[deep].mean()) for height in heights]
     assert depths[0] > depths[1] > depths[2]
-    cover = float(w.snow_cover((400 - 1) / RATE * 2880.0, snow.snowfall, -5.0))
+    cover = course_of(snow, matter_of("snow", 0.3, 0.01), frame=400.0, span=SPAN).cover[0]
     assert heights[-1][away] == pytest.approx(cover, rel=1e-9)
+
+
+def lone(depth, *, capacity=0.0, rises=(0.0,) * KNOTS):
+    """A flat-bottomed print of a depth, deep within it, made at the first frame."""
+    times = np.array([[1.0, 1.0, depth]])
+    pool, levels = np.array([[capacity, 0.0, 1.0]]), np.array([[*rises, 1.0]])
+    return WeatherPlaces(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), times, pool, levels)
+
+
+def test_a_print_stands_up_as_a_pedestal_in_a_thaw():
+    thaw, matter = Weather(temperature=5.0), matter_of("snow", 0.3, 0.01)
+    span = Span(0.0, 3 * DAY, 1.0)
+    days = np.linspace(2.0, 3 * DAY, 200)
+    within = np.array(
+        [weathered(lone(0.12), np.array([-0.12]), thaw, matter, frame=day, span=span).height[0] for day in days]
+    )
+    around = -np.minimum(0.3, DEGREE_DAY * 5.0 * days * WATER_DENSITY / SNOW.bulk_density)
+    above = -0.12 + within - around
+    assert above[0] == pytest.approx(-0.12, abs=1e-4)
+    turned = days[np.argmax(above > 0)]
+    # When what is around has lost depth/(1 + (depth - compression)/depth).
+    loss = 0.3 / (1 + 0.18 / 0.3)
+    assert turned == pytest.approx(loss * SNOW.bulk_density / 1000 / (DEGREE_DAY * 5.0), rel=0.02)
+    assert above.max() == pytest.approx(0.3 * 0.6 * 0.4, rel=0.02)  # as the ground around comes bare
+
+
+def test_water_from_below_comes_up_to_its_table_in_seconds():
+    matter, span = matter_of("wet_sand", 0.3, 0.01), Span(1.0, 600.0, RATE)
+    places = lone(0.05, capacity=0.03, rises=(0.01,) * KNOTS)  # 5 cm deep
+    for table, full in ((0.02, 0.03), (0.06, 0.0)):
+        for seconds in (0.0, 5.0, 30.0):
+            frame = 1.0 + seconds * RATE
+            now = weathered(places, np.array([-0.05]), Weather(water_table=table), matter, frame=frame, span=span)
+            assert now.water == pytest.approx([full * (1 - np.exp(-seconds / 5.0))], rel=1e-3)
+            assert now.height == pytest.approx(now.water)
+
+
+def test_sand_is_pale_around_a_loaded_foot_and_wet_again_seconds_after(left):
+    _, _, places = left
+    first, last, _ = places.times.T
+    foot = (places.trodden[:, 0] > 0.9) & (last < 60.0)
+    before, loaded, after = (
+        at(left, Weather(halo=1.0), frame, "wet_sand").dried
+        for frame in (first[foot].min() - 1, last[foot].max(), last[foot].max() + 10 * RATE)
+    )
+    assert not before[foot].any()
+    assert loaded[foot].max() == pytest.approx(1.0, abs=0.05)
+    assert after[foot].max() < 0.01
+    assert not loaded[first > 1e6].any()
+    assert not at(left, Weather(halo=1.0), 60.0, "mud").dried.any()
 
 
 def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(left):
@@ -112,6 +164,16 @@ def test_puddles_are_level_and_spill_no_higher_than_their_brim(left):
     for capacity in np.unique(pools[:, 0]):
         assert np.ptp(surface[pools[:, 0] == capacity]) < 1e-9
     assert surface.max() < relief.max()
+
+
+def test_puddles_are_level_while_they_fill(left):
+    _, relief, places = left
+    rain = at(left, Weather(rain=30e-3 / HOUR, time_scale=20.0), 400.0, "mud")
+    wet = rain.water > 0
+    surface, since = (relief + rain.height).ravel()[wet.ravel()], places.levels[wet.ravel(), KNOTS]
+    assert 0.0 < rain.water.max() < 0.5 * np.ptp(relief)
+    for one in np.unique(since):
+        assert np.ptp(surface[since == one]) < 1e-9
 
 
 def test_a_section_is_that_of_the_prints(track):

@@ -1,0 +1,258 @@
+"""`core.after.weather_course` as nodes: sums over parts of the time, on points of which each begins one.
+
+They are a few hundred, whatever the ground has of vertices. Each of these looks up what has happened since it was
+stepped on. A slider's value is that of the group's input, or of a curve if it is keyed, for each part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...core.after import weather as w
+from ...core.after.weather_course import GAUSS, NO_WATER, PARTS, Span
+from ...core.after.weathered_ground import LEAST_RANGE
+from ..node_graph import NodeGraph, Number
+
+CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
+
+SUMMED = ("Snowfall", "Temperature", "Wind", "Rain", "Drying", "Time Scale")
+"""The inputs that are summed up over time, of which keys count."""
+FIRST, STEP = "First Frame", "Frames in a Part"
+"""Nodes with the span."""
+ENDLESS = 1e9
+LOWEST = "lowest"
+
+
+def keys_of(name: str) -> str:
+    """Name of the node with an input's value in each part."""
+    return f"{name} Keys"
+
+
+def switch_of(name: str) -> str:
+    """Name of the node that says whether the input is keyed."""
+    return f"{name} Is Keyed"
+
+
+class CourseNodes:
+    """What has happened since the points' moments, and since those of vertices.
+
+    Parameters
+    ----------
+    graph : NodeGraph
+    said : mapping
+        The group's inputs by name.
+    matter : Matter
+    span : Span
+    soaking : (float, float)
+        Least and largest share of its soaking that a hollow has left.
+    """
+
+    def __init__(
+        self, graph: NodeGraph, said: Mapping[str, Number], matter: w.Matter, span: Span, soaking: tuple[float, float]
+    ) -> None:
+        self.graph, self._matter, self._soaking = graph, matter, soaking
+        self.frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
+        self._first, self._step = self._value(FIRST, span.first), self._value(STEP, span.step)
+        points = graph.node("GeometryNodePoints")
+        points.inputs["Count"].default_value = PARTS + 2
+        self._points = points.outputs[0]
+        self._index = graph.number(graph.node("GeometryNodeInputIndex").outputs["Index"])
+        self._number = (self.frame - self._first) / self._step
+
+        past = (self._number - self._index).at_least(0.0).at_most(self._index.above(PARTS - 0.5) * ENDLESS + 1.0)
+        past = past * (1.0 - self._index.above(PARTS + 0.5))
+        rates = {name: self._rate(name, said[name]) for name in SUMMED}
+        self._time = past * self._step * rates["Time Scale"] * (1.0 / span.frame_rate)
+        self._sum(said, rates)
+
+    def since(self, frame: Number, packed: Mapping[str, tuple[str, int]]) -> dict[str, Number]:
+        """What has happened since frames of the vertices; what has not begun is as if it began now."""
+        graph = self.graph
+        number = ((frame.at_most(self.frame) - self._first) / self._step).at_least(0.0)
+        part = number.floor().at_most(PARTS)
+        through = ((number - part) / (self._number - part).at_most(1.0)).at_most(1.0)
+        looked_up = {}
+        for name in dict.fromkeys(stored for stored, _ in packed.values()):
+            value = graph.attribute(name, "FLOAT_VECTOR")
+            begin, end = (graph.at_index(self._points, value, one.socket) for one in (part, part + 1.0))
+            more = graph.scaled(graph.vector("SUBTRACT", end, begin), through.socket)
+            looked_up[name] = graph.separated(graph.vector("ADD", begin, more))
+        return {key: graph.number(looked_up[name][place]) for key, (name, place) in packed.items()}
+
+    def between(self, left: Number) -> Number:
+        """How far a share of soaking is through those for which there are sums."""
+        low, high = self._soaking
+        return ((left - low) * (1.0 / max(high - low, LEAST_RANGE))).within_one()
+
+    def _value(self, name: str, value: float) -> Number:
+        node = self.graph.node("ShaderNodeValue")
+        node.name = node.label = name
+        node.outputs[0].default_value = value
+        return self.graph.number(node.outputs[0])
+
+    def _rate(self, name: str, given: Number) -> Number:
+        """An input, or what its keys say of each part."""
+        graph = self.graph
+        curve = graph.node("ShaderNodeFloatCurve")
+        curve.name = curve.label = keys_of(name)
+        curve.mapping.use_clip = False
+        graph.link((self._index * (1.0 / PARTS)).at_most(1.0).socket, curve.inputs["Value"])
+        chosen = graph.choose("FLOAT", False, given.socket, curve.outputs["Value"])
+        chosen.node.name = chosen.node.label = switch_of(name)
+        return graph.number(chosen)
+
+    def _sum(self, said: Mapping[str, Number], rates: Mapping[str, Number]) -> None:
+        graph, matter, time = self.graph, self._matter, self._time
+        graph.next_row()
+        temperature = rates["Temperature"]
+        least, more, fall, most = w.NEW_SNOW
+        density = ((temperature * (1.0 / fall)).exp() * more + least).at_most(most)
+        rate, warmth, _ = w.SETTLING
+        settling = (temperature.at_most(0.0) * warmth).exp() * rate * time
+        fallen = rates["Snowfall"] * density * (CENTIMETRES_AN_HOUR / w.WATER_DENSITY) * time
+        melted = temperature.at_least(0.0) * w.DEGREE_DAY * time
+        rained = rates["Rain"] * MILLIMETRES_AN_HOUR * time
+        dried = rates["Drying"] * MILLIMETRES_AN_HOUR * time
+        drier = dried - rained - melted if matter.snow_depth else dried - rained
+
+        sums = graph.accumulated(
+            graph.combined((fallen - melted).socket, settling.socket, drier.socket), "FLOAT_VECTOR"
+        )
+        lowest, following = self._lowest(sums.outputs["Trailing"])
+        reserve, *_ = self._parts(sums.outputs["Trailing"])
+        reserve_now, settled_now, water_now = self._parts(sums.outputs["Total"])
+        since = settled_now - self._parts(sums.outputs["Leading"])[1]
+
+        graph.next_row()
+        depth = self._depth((following[0] - lowest[0]) * w.WATER_DENSITY, density, settling, since)
+        spread, filling = rained * w.RAIN_ROUNDING, graph.number(0.0)
+        any_ = rates["Snowfall"] + temperature.at_least(0.0) + rates["Rain"] + rates["Drying"]
+        if matter.blown:
+            flux = self._flux(rates["Wind"], matter.blown.threshold) * time
+            spread = spread + flux * float(w.spread_rate(1.0, matter.blown))
+            filling = flux * float(w.fill_rate(1.0, matter.section, matter.blown))
+            any_ = any_ + rates["Wind"]
+        cover, rounding, filled = self._to_now(depth, spread, filling)
+        thawed = (reserve - lowest[0]) * (w.WATER_DENSITY / w.SNOW.bulk_density)
+        wet = self._wet(water_now - lowest[2])
+        gone = melted if matter.snow_depth else fallen
+        got, gone, any_ = self._totals(rained, gone, any_ * rates["Time Scale"])
+        if not matter.snow_depth:
+            gone = gone - (reserve_now - lowest[0])
+        if not matter.wet:
+            wet = wet * (1.0 - ((got + gone) * (-1.0 / w.SHINE)).exp())
+
+        graph.next_row()
+        under = cover + thawed if matter.snow_depth else cover
+        aged = {"cover": cover, "variance": under * w.DRAPE + rounding}
+        if matter.blown:
+            aged["kept"] = (filled * -1.0).exp()
+        if matter.snow_depth:
+            aged["thawed"] = thawed
+        if matter.wet:
+            aged["wet"] = wet
+        self._keep(aged, {"wet": wet, "any": any_}, rained, rates["Rain"])
+        self.is_any = self._at_first(self._whole["any"])
+        if matter.soaking:
+            self.is_any = self.is_any + (100.0 * NO_WATER - said["Water Table"])
+        if matter.pales:
+            self.is_any = self.is_any + said["Halo"]
+
+    def _keep(self, aged: dict[str, Number], whole: Mapping[str, Number], rained: Number, rain: Number) -> None:
+        """Keep with the points what vertices look up."""
+        of_hollows: dict[str, Number] = {}
+        if soaking := self._matter.soaking:
+            low, high, age = self._hollows(rained, rain, soaking)
+            of_hollows = {"low": low, "high": high, "seeped": 1.0 - (age * (-1.0 / soaking.seep)).exp()}
+            if self._matter.pales:
+                aged["pale"] = (age * (-1.0 / w.HALO)).exp()
+        self.of_places = self._stored("place", aged)
+        self.of_hollows = self._stored("hollow", of_hollows)
+        self._whole = self._stored("whole", whole)
+        known = {**self.of_places, "wet": self._whole["wet"]}
+        self.around = {key: self._at_first(packed) for key, packed in known.items()}
+
+    def _depth(self, left: Number, density: Number, settling: Number, since: Number) -> Number:
+        """Depth of the snow of each part [kg/m²] that settles within it, and from its end on."""
+        slowing, depth = w.SETTLING[2], None
+        for at, weight in GAUSS:
+            compaction = since + settling * (1.0 - at)
+            settled = (density * slowing * compaction + 1.0).log() * (1.0 / slowing) + density
+            part = left * weight / settled
+            depth = part if depth is None else depth + part
+        assert depth is not None
+        return depth
+
+    def _flux(self, wind: Number, threshold: float) -> Number:
+        """As `weather.blown_flux`."""
+        speed = wind * float(w.friction_velocity(1.0))
+        return speed * speed * speed * (w.BAGNOLD * w.AIR_DENSITY / w.GRAVITY) * speed.above(threshold)
+
+    def _wet(self, lost: Number) -> Number:
+        """As `weather.wetness`."""
+        films = lost * (1.0 / w.SURFACE_FILM)
+        dried = films.at_most(1.0) + (films.at_least(1.0).root() - 1.0) * 2.0
+        return (1.0 - dried * (1.0 / w.DRY_AT)).at_least(0.0)
+
+    def _hollows(self, rained: Number, rain: Number, soaking: w.Soaking) -> list[Number]:
+        """Rain that has not soaked in at either share, and time, from each moment to now."""
+        graph = self.graph
+        sums = graph.accumulated((self._time * rain.above(0.0)).socket)
+        more = (soaking.first - soaking.final) / soaking.decay
+        begin, end = (
+            wet * soaking.final - (wet * -soaking.decay).exp() * more
+            for wet in (graph.number(sums.outputs[name]) for name in ("Trailing", "Leading"))
+        )
+        low, high = ((rained - (end - begin) * share).at_least(0.0) for share in self._soaking)
+        return self._to_now(low, high, self._time)
+
+    def _lowest(self, sums: Any) -> tuple[list[Number], list[Number]]:
+        """The least of each sum from a moment on, and from the next one on."""
+        graph = self.graph
+        self._points = graph.store(self._points, LOWEST, sums, True, "FLOAT_VECTOR")
+        ahead = 1
+        while ahead < PARTS + 2:
+            graph.next_row()
+            here, there = self._ahead(ahead)
+            lower = graph.vector("MINIMUM", here, there)
+            self._points = graph.store(self._points, LOWEST, lower, True, "FLOAT_VECTOR")
+            ahead *= 2
+        here, there = self._ahead(1)
+        return self._parts(here), self._parts(there)
+
+    def _ahead(self, count: int) -> tuple[Any, Any]:
+        """What is stored as the lowest at each point, and so many further on."""
+        stored = self.graph.attribute(LOWEST, "FLOAT_VECTOR")
+        return stored, self.graph.at_index(self._points, stored, (self._index + float(count)).socket)
+
+    def _to_now(self, *parts: Number) -> list[Number]:
+        """Sums of up to three numbers from each moment on."""
+        graph = self.graph
+        sums = graph.accumulated(graph.combined(*(part.socket for part in parts)), "FLOAT_VECTOR")
+        return self._parts(graph.vector("SUBTRACT", sums.outputs["Total"], sums.outputs["Trailing"]))
+
+    def _totals(self, *parts: Number) -> list[Number]:
+        """Sums of three numbers over all."""
+        sums = self.graph.accumulated(self.graph.combined(*(part.socket for part in parts)), "FLOAT_VECTOR")
+        return self._parts(sums.outputs["Total"])
+
+    def _parts(self, vector: Any) -> list[Number]:
+        return [self.graph.number(part) for part in self.graph.separated(vector)]
+
+    def _stored(self, name: str, values: Mapping[str, Number]) -> dict[str, tuple[str, int]]:
+        """Keep numbers with the points, three in a vector; where each is."""
+        kept: dict[str, tuple[str, int]] = {}
+        keys: Sequence[str] = list(values)
+        for begin in range(0, len(keys), 3):
+            stored, together = f"{name}_{begin // 3}", keys[begin : begin + 3]
+            pack = self.graph.combined(*(values[key].socket for key in together))
+            self._points = self.graph.store(self._points, stored, pack, True, "FLOAT_VECTOR")
+            kept |= {key: (stored, place) for place, key in enumerate(together)}
+        return kept
+
+    def _at_first(self, packed: tuple[str, int]) -> Number:
+        """A kept number since the first frame."""
+        name, place = packed
+        value = self.graph.at_index(self._points, self.graph.attribute(name, "FLOAT_VECTOR"), 0)
+        return self.graph.number(self.graph.separated(value)[place])

@@ -1,0 +1,92 @@
+"""Keys on the sliders of weather, kept current in its group, where they are there at every frame without the add-on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.after.weather_course import PARTS, Span
+from .. import compat
+from . import weather_modifier
+from .weather_course_nodes import FIRST, STEP, SUMMED, keys_of, switch_of
+
+LAST = "softground_weather_last"
+"""Custom property of the group: the frame up to which it tells moments apart, keys or none."""
+
+
+def span_of(first: float, last: float, frame_rate: float = 1.0) -> Span:
+    """A span of parts of whole frames."""
+    return Span(first, first + PARTS * max(math.ceil((last - first) / PARTS), 1), frame_rate)
+
+
+def follow(display_mesh: bpy.types.Object) -> None:
+    """Have the weather of an object, if any, keep to its keys; nothing is touched where it does."""
+    modifier: Any = weather_modifier.modifier_of(display_mesh)
+    tree: Any = modifier.node_group if modifier else None
+    if tree is None or tree.library or LAST not in tree.keys():  # noqa: SIM118  (an ID is no mapping)
+        return
+    keyed = _keyed(modifier)
+    nodes = tree.nodes
+    first = nodes[FIRST].outputs[0].default_value
+    span = span_of(first, max([tree[LAST], *(curve.range()[1] for curve in keyed.values())]))
+    changed = _put(nodes[STEP].outputs[0], span.step)
+    for name in SUMMED:
+        curve = keyed.get(name)
+        changed |= _put(nodes[switch_of(name)].inputs["Switch"], curve is not None)
+        if curve is not None:
+            changed |= _write(nodes[keys_of(name)].mapping, _means(curve, span))
+    if changed:
+        tree.update_tag()
+
+
+def _keyed(modifier: Any) -> Mapping[str, bpy.types.FCurve]:
+    """The curves of those inputs that are keyed and summed up, by name."""
+    animation = modifier.id_data.animation_data
+    if animation is None or animation.action is None:
+        return {}
+    curves = {
+        curve.data_path: curve
+        for curve in compat.action_curves(animation.action, compat.slot_of(animation))
+        if not curve.mute
+    }
+    if not curves:
+        return {}
+    paths = {
+        name: compat.input_path(modifier, key)
+        for name, key in weather_modifier.inputs_of(modifier).items()
+        if name in SUMMED
+    }
+    return {name: curves[path] for name, path in paths.items() if path in curves}
+
+
+def _means(curve: bpy.types.FCurve, span: Span) -> NDArray[np.float32]:
+    """What a curve is at in the mean of each part, and at the end."""
+    frames = span.first + np.arange(round(PARTS * span.step)) + 0.5
+    values = np.array([curve.evaluate(frame) for frame in frames])
+    return np.append(values.reshape(PARTS, -1).mean(axis=1), curve.evaluate(span.last)).astype(np.float32)
+
+
+def _put(socket: Any, value: float | bool) -> bool:
+    """Set a socket; whether it changed."""
+    if socket.default_value == value:
+        return False
+    socket.default_value = value
+    return True
+
+
+def _write(mapping: Any, values: NDArray[np.float32]) -> bool:
+    """Let a curve have these values at even steps from 0 to 1; whether it changed."""
+    points = mapping.curves[0].points
+    if len(points) == len(values) and np.array_equal([point.location[1] for point in points], values):
+        return False
+    while len(points) < len(values):
+        points.new(1.0, 0.0)
+    for number, (point, value) in enumerate(zip(points, values.tolist(), strict=True)):
+        point.location, point.handle_type = (number / PARTS, value), "VECTOR"
+    mapping.update()
+    return True

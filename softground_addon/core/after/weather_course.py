@@ -1,0 +1,202 @@
+"""What weather has done from any moment to now, at rates that change: sums over parts of the time.
+
+Of each moment at which a part begins, all that an age is needed for is worked out: it then holds for all places. Rates
+are those of each part; within it every integral but that over the settling of its own layer is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import weather as w
+
+Array = NDArray[np.float64]
+
+PARTS = 256
+"""Of the time from the first frame of the weather to the last frame at which anything begins or changes."""
+KEYED = ("snowfall", "temperature", "wind", "rain", "drying", "time_scale")
+"""What is summed up over time."""
+NO_WATER = 1.0
+"""Depth of a water table that no print reaches [m]."""
+GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
+"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Rates, each a number, or (PARTS + 1,): the mean of each part of a span, and what holds from its end on.
+
+    Attributes
+    ----------
+    snowfall : float or array
+        New snow [m/s].
+    temperature : float or array
+        Of the air [°C].
+    wind : float or array
+        At 10 m [m/s].
+    rain : float or array
+        [m/s].
+    drying : float or array
+        Evaporation [m/s].
+    time_scale : float or array
+        How many times faster it goes than the animation.
+    water_table : float
+        How far below the brim of each print water comes to stand from below, now [m].
+    halo : float
+        How pale wet sand turns around a loaded foot, 0 to 1.
+    """
+
+    snowfall: float | Array = 0.0
+    temperature: float | Array = 0.0
+    wind: float | Array = 0.0
+    rain: float | Array = 0.0
+    drying: float | Array = 0.0
+    time_scale: float | Array = 1.0
+    water_table: float = NO_WATER
+    halo: float = 0.0
+
+
+@dataclass(frozen=True)
+class Span:
+    """The frames of the animation from which on there is weather and up to which it is known in parts, and [Hz]."""
+
+    first: float
+    last: float
+    frame_rate: float
+
+    @property
+    def step(self) -> float:
+        """Length of a part in frames."""
+        return (self.last - self.first) / PARTS
+
+
+@dataclass(frozen=True)
+class Course:
+    """What has happened from each of some frames (N,) to now; the last of them is now.
+
+    Attributes
+    ----------
+    frames : array
+        Ascending.
+    cover : array
+        New snow that lies there [m].
+    thawed : array
+        What would have melted of untrodden snow, were it deep enough [m].
+    variance : array
+        What edges have lost [m²].
+    kept : array
+        Share of a print that is not blown full.
+    wet : array
+        How wet the ground looks, where no water stands.
+    seeped : array
+        Share of its height that water from below has reached.
+    pale : array
+        How much of its paleness is left around a foot.
+    """
+
+    frames: Array
+    cover: Array
+    thawed: Array
+    variance: Array
+    kept: Array
+    wet: Array
+    seeped: Array
+    pale: Array
+    _rained: Array
+    _soaked: Array
+
+    def excess(self, share: float) -> Array:
+        """Rain that ground with a share of its soaking has not taken up (N,) [m]."""
+        return _to_now(np.maximum(self._rained - share * self._soaked, 0.0))
+
+    def since(self, frame: Array, values: Array) -> Array:
+        """One of the attributes from other frames on; what has not begun is as if it began now."""
+        return np.interp(frame, self.frames, values)
+
+
+def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -> Course:
+    """The course of a weather up to a frame.
+
+    Examples
+    --------
+    A night at -5 °C with 3 cm of new snow an hour, and a day that melts all of it:
+
+    >>> cold, warm = np.arange(257) // 86 != 1, np.arange(257) // 86 == 1
+    >>> nights = Weather(snowfall=np.where(cold, 3e-2 / 3600, 0.0), temperature=np.where(warm, 20.0, -5.0))
+    >>> sand = w.matter_of("sand", 0.2, 0.01)
+    >>> course_of(nights, sand, frame=86 * 360, span=Span(0, 256 * 360, 1.0)).cover[0].round(2)
+    0.25
+    >>> course_of(nights, sand, frame=86 * 720, span=Span(0, 256 * 360, 1.0)).cover[0].round(2)
+    0.0
+    """
+    begin = np.linspace(span.first, span.last, PARTS + 1)
+    past = np.clip(frame - begin, 0.0, np.append(np.full(PARTS, span.step), np.inf))
+    rates = (np.broadcast_to(getattr(weather, name), past.shape) for name in KEYED)
+    snowfall, temperature, wind, rain, drying, scale = rates
+    time = past * scale / span.frame_rate
+    density = w.new_snow_density(temperature)
+    fallen = snowfall * density / w.WATER_DENSITY * time
+    melted = w.melting_rate(temperature) * time
+
+    # What melts is the snow that fell last: of each layer that is left which the reserve never fell below again.
+    reserve = _before(fallen - melted)
+    lowest = _least_to_come(reserve)
+    left = np.diff(lowest) * w.WATER_DENSITY
+    settling = w.settling_rate(temperature) * time
+    since = _to_now(settling)[1:]
+    depth = sum(weight * left / w.settled_density(since + (1.0 - at) * settling, density) for at, weight in GAUSS)
+    cover = _to_now(np.asarray(depth))
+    thawed = (reserve - lowest) * w.WATER_DENSITY / w.SNOW.bulk_density
+
+    variance = w.DRAPE * (cover + thawed if matter.snow_depth else cover) + w.RAIN_ROUNDING * _to_now(rain * time)
+    kept = np.ones_like(cover)
+    if matter.blown:
+        flux = w.blown_flux(wind, matter.blown)
+        variance = variance + _to_now(w.spread_rate(flux, matter.blown) * time)
+        kept = np.exp(-_to_now(w.fill_rate(flux, matter.section, matter.blown) * time))
+
+    rained, age = rain * time, _to_now(time)
+    soaked, seeped = np.zeros_like(rained), np.zeros_like(age)
+    if matter.soaking:
+        soaked = np.diff(w.soaked(_before(np.where(rain > 0, time, 0.0)), matter.soaking))
+        seeped = w.seeped(age, matter.soaking)
+    return Course(
+        frames=np.append(np.minimum(begin, frame), frame),
+        cover=cover,
+        thawed=thawed,
+        variance=variance,
+        kept=kept,
+        wet=_wetness(matter, fallen, melted, rained, drying * time, reserve[-1] - lowest[0]),
+        seeped=seeped,
+        pale=w.halo(age),
+        _rained=rained,
+        _soaked=soaked,
+    )
+
+
+def _wetness(matter: w.Matter, fallen: Array, melted: Array, rained: Array, dried: Array, lying: float) -> Array:
+    """How wet the ground looks that was open since each moment; `lying` is the water in the new snow [m]."""
+    water = _before(dried - rained - (melted if matter.snow_depth else 0.0))
+    wet = w.wetness(water[-1] - _least_to_come(water))
+    if matter.wet:
+        return wet
+    gone = melted.sum() if matter.snow_depth else fallen.sum() - lying
+    return np.full_like(wet, wet[0] * float(w.wetted(rained.sum() + gone)))
+
+
+def _before(parts: Array) -> Array:
+    """Sum of all parts before each moment."""
+    return np.concatenate([[0.0], np.cumsum(parts)])
+
+
+def _to_now(parts: Array) -> Array:
+    """Sum of all parts from each moment on."""
+    before = _before(parts)
+    return np.asarray(before[-1] - before)
+
+
+def _least_to_come(values: Array) -> Array:
+    return np.asarray(np.minimum.accumulate(values[::-1])[::-1])
