@@ -38,10 +38,11 @@ def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
 def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     """An edited animation or mesh makes what was read from it worthless, and may leave a bake outdated."""
     live.watch()
-    if scene.softground.ground is not None and not bpy.app.background:
-        _later(compare_bake)
-    if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
-        _follow_weather_keys(scene)
+    if scene.softground.ground is not None:
+        if not bpy.app.background:
+            _later(compare_bake)
+        if depsgraph is not None and any(depsgraph.id_type_updated(kind) for kind in KEYED):
+            _follow_weather_keys(scene)
     if analysis.is_empty() or depsgraph is None:
         return
     if any(depsgraph.id_type_updated(kind) for kind in EDITED):
