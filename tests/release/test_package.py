@@ -39,6 +39,11 @@ def test_it_holds_the_extension_and_nothing_else(built):
         assert all(archive.read(name) == (ROOT / name).read_bytes() for name in archive.namelist())
 
 
+def test_it_is_small_and_so_are_the_pictures_of_its_page(built):
+    assert built.stat().st_size < 10_000_000
+    assert all(path.stat().st_size < 500_000 for path in (ROOT / "docs/images").glob("*.jpg"))
+
+
 def test_the_same_sources_give_the_same_bytes_whatever_their_times_and_rights(built, tmp_path):
     copy = sources(tmp_path / "copy")
     for number, path in enumerate(sorted(copy.rglob("*.py"), reverse=True)):

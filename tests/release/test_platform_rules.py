@@ -118,6 +118,18 @@ def test_files_are_written_whole_and_nowhere_else():
     assert {path for path, tree in TREES.items() if any(writes(tree))} == set(WRITERS)
 
 
+def test_no_path_is_cut_at_slashes():
+    """Windows has others; `pathlib` knows them."""
+    cutting = {"split", "rsplit", "partition", "rpartition"}
+    found = [
+        (path, ast.unparse(call))
+        for path, tree in TREES.items()
+        for call, name in calls(tree)
+        if name in cutting and {ast.unparse(word) for word in call.args} & {"'/'", r"'\\'", "os.sep"}
+    ]
+    assert found == []
+
+
 def test_text_has_the_same_line_ends_on_every_system():
     """`Path.write_text` writes others on Windows."""
     written = {ast.unparse(call.func) for tree in TREES.values() for call, name in calls(tree) if name == "write_text"}
