@@ -11,20 +11,23 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Collection, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..loads.estimate import CharacterLoads
 from ..record.edits import step_id
-from ..record.footprints import Changes, Footprint
+from ..record.footprints import Footprint
 from . import flight, phases
 from .phases import Phase
 from .thrown_matter import MATTER, ThrownMatter
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
+_Part = TypeVar("_Part")
 
 THROWN_SHARE = 0.05
 """Share of the displaced ground that a landing throws, for each unit of v²/(g·R) above 1."""
@@ -168,8 +171,15 @@ def booked(footprint: Footprint, volume: float) -> Footprint:
     rounded = np.diff(np.rint(total * left), prepend=0.0)
     scaled = np.empty(len(amounts), np.int32)
     scaled[order] = rounded.astype(np.int32)
-    rim = Changes(footprint.rim.frames, footprint.rim.first, np.asarray(footprint.rim.cells), scaled)
-    return replace(footprint, rim=rim, rim_m3=footprint.rim_m3 - volume)
+    return _changed(footprint, rim=_changed(footprint.rim, amounts=scaled), rim_m3=footprint.rim_m3 - volume)
+
+
+def _changed(one: _Part, **values: Any) -> _Part:
+    """As `dataclasses.replace`, which would pack anew what stays as it is."""
+    twin = copy(one)
+    for name, value in values.items():
+        object.__setattr__(twin, name, value)
+    return twin
 
 
 @dataclass(frozen=True)

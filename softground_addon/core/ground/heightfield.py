@@ -226,18 +226,21 @@ class SparseGrid:
         keys = sorted(self.tiles)
         slot_of = np.array(keys)
         first = slot_of.min(axis=0)
-        span = slot_of.max(axis=0) - first + 1
-        order = (slot_of - first) @ (span[1], 1)
-        tile = np.stack([column // TILE, row // TILE], axis=-1) - first
-        wanted = tile @ (span[1], 1)
+        columns, rows = (slot_of.max(axis=0) - first + 1).tolist()
+        order = (slot_of - first) @ (rows, 1)
+        tile_column, tile_row = column // TILE - first[0], row // TILE - first[1]
+        inside = (tile_column >= 0) & (tile_column < columns) & (tile_row >= 0) & (tile_row < rows)
+        known = np.flatnonzero(inside)
+        wanted = tile_column[known] * rows + tile_row[known]
         slot = np.minimum(np.searchsorted(order, wanted), len(keys) - 1)
-        known = (order[slot] == wanted) & (tile >= 0).all(axis=-1) & (tile < span).all(axis=-1)
+        held = order[slot] == wanted
+        known, slot = known[held], slot[held]
         values = np.full((self.channels, column.size), self.fill)
         used = np.zeros(len(keys), dtype=bool)
-        used[slot[known]] = True
+        used[slot] = True
         if used.any():
             stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()])
-            place = (np.cumsum(used) - 1)[slot[known]]
+            place = (np.cumsum(used) - 1)[slot]
             values[:, known] = stack[place, :, row[known] % TILE, column[known] % TILE].T
         return values
 

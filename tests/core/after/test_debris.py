@@ -143,3 +143,26 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     assert heard.birth.min() >= lifted.motion.frames[99]
     shed = np.sort(heard.birth - heard.birth.min()) / 120
     assert np.median(shed) == pytest.approx(0.1, abs=0.06)
+
+
+def test_flights_come_down_on_uneven_ground():
+    """On terraces with steep steps: above the ground until the landing, on it then, by the closed form."""
+    random = np.random.default_rng(3)
+    count = 2000
+    start = np.column_stack([random.uniform(-1, 1, (count, 2)), np.full(count, 0.2)])
+    velocity, drag = random.normal(0, 2, (count, 3)), random.uniform(0.02, 1.0, count)
+
+    def terraces(x, y):
+        return 0.1 * np.tanh(40 * np.sin(8 * x)) + 0.05 * y
+
+    time = flight.landing_times(start, velocity, drag, GRAVITY, terraces)
+    place = flight.position(start, velocity, drag, time, GRAVITY)
+    assert place[:, 2] == pytest.approx(terraces(place[:, 0], place[:, 1]), abs=1e-4)
+    before = flight.position(start, velocity, drag, time - 1e-4, GRAVITY)
+    assert (before[:, 2] > terraces(before[:, 0], before[:, 1]) - 1e-4).all()
+
+
+def test_what_nothing_catches_is_in_the_air_to_the_end():
+    velocity, drag = np.array([[1.0, 0, 2.0], [0, 0, -30.0]]), np.array([1e4, 0.05])
+    time = flight.landing_times(np.zeros((2, 3)), velocity, drag, GRAVITY, lambda x, y: np.full_like(x, np.nan))
+    assert time == pytest.approx(flight.LONGEST_FLIGHT)
