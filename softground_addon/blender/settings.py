@@ -271,6 +271,7 @@ def as_preset(scene: bpy.types.Scene, name: str, source: str = "") -> Preset:
         options.pressure,
         typed(options.tread),
         typed(options.cells_along_sole) or None,
+        options.debris,
     )
 
 
@@ -314,6 +315,7 @@ def _of_preset(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, A
     said = [(material, field, getattr(preset.material, field)) for field in MATERIAL_FIELDS]
     said += [(material, "preset", preset.name), (material, "surface", preset.surface)]
     said += [(options, "pressure", preset.pressure), (options, "tread", preset.tread)]
+    said += [(options, "debris", preset.debris)]
     return [one for one in said if one[2] is not None]
 
 

@@ -64,7 +64,7 @@ def coarse(scene: bpy.types.Scene) -> None:
     options = scene.softground
     options.sink_feet, options.ground_margin = False, 0.0
     options.cell_size, options.pressure, options.tread = 0.01, "UNIFORM", 0.0
-    options.relief = "OFF"
+    options.relief, options.debris = "OFF", False
 
 
 _walk = cache(walk)

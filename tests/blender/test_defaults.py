@@ -29,7 +29,7 @@ def walker(scene):
     return armature
 
 
-GROUND = ("preset", "surface", "material", "pressure", "tread_m", "cell_size_m")
+GROUND = ("preset", "surface", "material", "pressure", "tread_m", "cell_size_m", "debris")
 """Inputs of a report that make a ground look as it does."""
 
 
@@ -96,7 +96,7 @@ def test_a_scene_of_version_0_1_keeps_its_values(scene, walker, tmp_path):
 
 def test_a_preset_of_version_0_1_sets_the_material_alone(scene, walker, tmp_path):
     bpy.ops.softground.add_character()
-    old = dataclasses.replace(presets.find("mud"), pressure=None, tread=None, cells_along_sole=None)
+    old = dataclasses.replace(presets.find("mud"), pressure=None, tread=None, cells_along_sole=None, debris=None)
     (tmp_path / "bog.json").write_text(presets.dump(old))
     scene.softground.pressure = "UNIFORM"
     bpy.ops.softground.load_preset(filepath=str(tmp_path / "bog.json"))

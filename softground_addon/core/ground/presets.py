@@ -49,6 +49,8 @@ class Preset:
         Depth of the bars of shoes [m].
     cells_along_sole : float, optional
         Cells that lie along the shortest sole.
+    debris : bool, optional
+        Whether steps throw what physics says.
 
     What is optional stays as it was where it is None: presets of version 0.1 had none of it.
     """
@@ -60,6 +62,7 @@ class Preset:
     pressure: Pressure | None = None
     tread: float | None = None
     cells_along_sole: float | None = None
+    debris: bool | None = None
 
 
 RANGES = {"tread": (0.0, 0.1), "cells_along_sole": (4.0, 1000.0)}
@@ -125,9 +128,11 @@ def parse(text: str, origin: str) -> Preset:
         if (number := content.get(key)) is not None:
             _check(key, number, limits, origin)
             numbers[key] = float(number)
-    return Preset(
-        name, source, surface, validate_material(material, origin), cast("Pressure | None", pressure), **numbers
-    )
+    debris = content.get("debris")
+    if not isinstance(debris, bool | None):
+        raise InputError(f"{origin}: 'debris' is {debris!r}; it must be true or false.")
+    checked = validate_material(material, origin), cast("Pressure | None", pressure)
+    return Preset(name, source, surface, *checked, **numbers, debris=debris)
 
 
 def load(path: Path) -> Preset:

@@ -73,13 +73,14 @@ def test_a_shipped_preset_carries_the_whole_ground(path):
     assert preset.pressure is not None
     assert preset.tread is not None
     assert preset.cells_along_sole is not None
+    assert preset.debris == (not path.stem.startswith("paper"))
 
 
 def test_a_preset_of_version_0_1_says_nothing_of_what_it_did_not_know():
     content = json.loads((presets.FOLDER / "snow.json").read_text(encoding="utf-8"))
     old = {key: content[key] for key in ("schema_version", "name", "source", "surface", "material")}
     preset = presets.parse(json.dumps(old), "mine.json")
-    assert (preset.pressure, preset.tread, preset.cells_along_sole) == (None, None, None)
+    assert (preset.pressure, preset.tread, preset.cells_along_sole, preset.debris) == (None, None, None, None)
     assert json.loads(presets.dump(preset)) == json.loads(json.dumps(old)) | {
         "material": dataclasses.asdict(preset.material)
     }
@@ -110,6 +111,7 @@ def test_no_preset_lets_a_standing_person_through_the_layer(path):
         ({"pressure": "HEAVY"}, "'pressure' is 'HEAVY'; it must be one of UNIFORM, CENTRE_OF_PRESSURE"),
         ({"tread": -0.1}, "'tread' is -0.1"),
         ({"cells_along_sole": "many"}, "'cells_along_sole' is 'many'"),
+        ({"debris": 1}, "'debris' is 1; it must be true or false"),
         ({"material": {"density": 1}}, "unknown field 'density'"),
         ({"material": {"poisson_ratio": 0.1}}, "lacks characteristic_time, youngs_modulus"),
     ],
