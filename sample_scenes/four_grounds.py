@@ -68,13 +68,14 @@ def build(
 
 
 def claims(built: FourGrounds) -> list[Claim]:
-    """The softer the deeper; the rim is 2·nu of what was pressed."""
+    """The softer the deeper; the rim is 2·nu of what was pressed, less what was thrown."""
     depth = {
         preset: float(np.mean([step.compressed_m3 / step.area_m2 for step in bake.footprints]))
         for preset, bake in built.bakes.items()
     }
     raised = {
-        preset: sum(step.rim_m3 for step in bake.footprints) / sum(step.compressed_m3 for step in bake.footprints)
+        preset: (bake.report["totals"]["rim_m3"] + bake.report["totals"]["thrown_m3"])
+        / bake.report["totals"]["compressed_m3"]
         for preset, bake in built.bakes.items()
     }
     return [
@@ -82,8 +83,8 @@ def claims(built: FourGrounds) -> list[Claim]:
         Claim("Mud's prints over sand's, in mean depth", depth["Mud"] / depth["Dry Sand"], 1.2, 2.5),
         Claim("Sand's prints over soil's, in mean depth", depth["Dry Sand"] / depth["Soil"], 1.05, 2.5),
         Claim("Depth of sand's prints [m]", _deepest("Dry Sand", built), 0.02, 0.03),
-        Claim("Part of the pressed snow that stands up as a rim", raised["Snow"], 0.099, 0.101),
-        Claim("Part of the pressed sand that stands up as a rim", raised["Dry Sand"], 0.99, 1.01),
+        Claim("Part of the pressed snow that is raised or thrown", raised["Snow"], 0.099, 0.101),
+        Claim("Part of the pressed sand that is raised or thrown", raised["Dry Sand"], 0.99, 1.01),
         Claim("Height of snow's rim over the depth of its print", _rim_height("Snow", built), 0.0, 0.1),
         *(claim for preset in PRESETS[1:] for claim in _rim_ahead(preset, built)),
     ]

@@ -217,12 +217,12 @@ def invariants(bake: Bake) -> list[Claim]:
     """What holds on every ground, whatever is switched on."""
     ground = recompose(bake.footprints)
     compressed, raised = ground.volumes()
-    placed = raised + sum(step.unplaced_rim_m3 for step in bake.footprints)
+    placed = raised + sum(step.unplaced_rim_m3 for step in bake.footprints) + bake.report["totals"]["thrown_m3"]
     low, high = (share * compressed for share in bake.rim_share)
     smallest = min((int(step.compression.amounts.min(initial=0)) for step in bake.footprints), default=0)
     deepest = max((float(tile[0].max()) for tile in ground.tiles.values()), default=0.0)
     return [
-        Claim("Volume of the rims [m³]", placed, low * (1 - 1e-6), high * (1 + 1e-6)),
+        Claim("Volume of the rims and of what was thrown [m³]", placed, low * (1 - 1e-6), high * (1 + 1e-6)),
         Claim("Smallest change of compression [nm]", float(smallest), 0, np.inf),
         Claim("Deepest compression over the layer's depth", deepest / bake.layer_depth, 0, 1 + 1e-6),
     ]
