@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ class _Shown:
     progress: float = 0.0
     status: str = ""
     is_previewing: bool = False
+    also_chosen: tuple[str, ...] = ()
 
 
 _shown = _Shown()
@@ -98,6 +100,18 @@ def show_preview(is_shown: bool) -> None:
 def is_previewing() -> bool:
     """Whether the ground shows for a moment what it does not hold, as while a step is dragged."""
     return _shown.is_previewing
+
+
+def choose_steps(step: str, also: Iterable[str] = ()) -> None:
+    """Choose a step of the bake by its id, and others with it."""
+    current().step = step
+    _shown.also_chosen = tuple(name for name in also if name != step)
+
+
+def chosen_steps() -> tuple[str, ...]:
+    """Ids of the steps that are chosen: first the one that the panel shows."""
+    step = current().step
+    return (step, *(name for name in _shown.also_chosen if name != step)) if step else ()
 
 
 def is_rendering() -> bool:

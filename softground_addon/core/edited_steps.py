@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .ground.heightfield import HeightField, Terrain, Window
 from .ground.soft_ground import SoftGround
+from .motion.motion import SolePatch
 from .numerics.cell_keys import ROW, Keys, among
 from .numerics.rigid import rotation, turn_between, unit
 from .pressing.contact_layout import ContactLayout
@@ -82,6 +83,7 @@ class EditedSteps:
         undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
         self._solver = GroundSolver(ground, HeightField(cell_size), undisturbed)
         self._points: dict[int, SolePoints] = {}
+        self._soles: dict[tuple[int, float], PressingSole] = {}
         self._layouts: dict[Change, _Layout] = {}
         """Of the group that was pressed last: they take memory."""
         self._known: dict[frozenset[Change], _Group] = {}
@@ -105,14 +107,15 @@ class EditedSteps:
         Returns
         -------
         dict of int to Footprint or None
-            By the number of the footprint; None where nothing of it is left.
+            By the number of the footprint or copy; None where nothing of it is left.
 
         Raises
         ------
         InputError
             If a step is to be moved of which the record keeps too little.
         """
-        edits = {number: edit for number, edit in edits.items() if edit != UNCHANGED}
+        count = len(self._footprints)
+        edits = {number: edit for number, edit in edits.items() if edit != UNCHANGED or number >= count}
         groups = [self._group(frozenset({change})) for change in sorted(edits.items(), key=lambda item: item[0])]
         while pair := next((pair for pair in _near(groups) if self._meet(*pair)), None):
             groups = [group for group in groups if group not in pair]
@@ -120,6 +123,14 @@ class EditedSteps:
         self._known = {changes: group for changes, group in self._known.items() if _within(changes, edits)}
         self._met = {pair: met for pair, met in self._met.items() if pair <= self._known.keys()}
         return dict(sorted(item for group in groups for item in group.prints.items()))
+
+    def _baked(self, number: int) -> Footprint:
+        """A step as it was baked; of a copy, that which it is a copy of."""
+        return self._footprints[number % len(self._footprints)]
+
+    def _before(self, number: int) -> Footprint | None:
+        """The print that a bake without edits has."""
+        return self._footprints[number] if number < len(self._footprints) else None
 
     def _group(self, edits: frozenset[Change]) -> _Group:
         """Steps that were edited, and those that meet them."""
@@ -137,11 +148,11 @@ class EditedSteps:
         members = dict(edits)
         while True:
             prints = self._press(members)
-            changed = {n: self._changed_cells(self._footprints[n], footprint) for n, footprint in prints.items()}
+            changed = {n: self._changed_cells(n, footprint) for n, footprint in prints.items()}
             later = {
                 other
                 for n, cells in changed.items()
-                for other in self._meeting(cells, float(self._frames[n, 0]))
+                for other in self._meeting(cells, self._start(n, members[n]))
                 if other not in members and self._footprints[other].pressed_by
             }
             if not later:
@@ -150,8 +161,12 @@ class EditedSteps:
         self._layouts = {change: self._layouts[change] for change in members.items() if change in self._layouts}
         kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
         windows = [footprint.window for footprint in kept.values() if footprint]
-        window = _union([*windows, *(self._footprints[n].window for n in kept)])
+        window = _union([*windows, *(self._baked(n).window for n in kept)])
         return _Group(edits, kept, {n: changed[n] for n in kept}, window)
+
+    def _start(self, number: int, edit: StepEdit) -> float:
+        """The first scene frame at which a step presses, or pressed."""
+        return self._baked(number).start_frame + min(0, edit.shift_frames)
 
     def _meet(self, one: _Group, other: _Group) -> bool:
         """Whether steps of one group meet what another one changed."""
@@ -176,11 +191,11 @@ class EditedSteps:
         low, size = self._windows[:, :2], self._windows[:, 2:]
         near = (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
         near &= self._frames[:, 1] >= since
-        return [n for n in np.flatnonzero(near).tolist() if self._reads(n, self._footprints[n], cells)]
+        return [n for n in np.flatnonzero(near).tolist() if self._reads(n, None, cells)]
 
     def _reads(self, number: int, footprint: Footprint | None, cells: Keys) -> bool:
         """Whether a step, as it was baked or as it is now, presses some cells."""
-        prints = (self._footprints[number], footprint)
+        prints = (self._before(number), footprint)
         return any(
             bool(among(cells, pressed).any())
             for one in prints
@@ -188,10 +203,11 @@ class EditedSteps:
             for pressed in [_cells(one, _all_of(one) if self._ground.material.repose_angle else one.contact_cells)]
         )
 
-    def _changed_cells(self, before: Footprint, after: Footprint | None) -> Keys:
-        """Cells in which two prints of a step differ visibly."""
+    def _changed_cells(self, number: int, after: Footprint | None) -> Keys:
+        """Cells in which the print of a step differs visibly from that of the bake."""
         quantities = ("compression", "rim") if self._ground.material.repose_angle else ("compression",)
-        window = before.window.union(after.window) if after else before.window
+        before, window = self._before(number), self._baked(number).window
+        window = window.union(after.window) if after else window
         differs = np.zeros((window.rows, window.columns), bool)
         for quantity in quantities:
             difference = np.zeros(differs.shape)
@@ -212,7 +228,7 @@ class EditedSteps:
 
     def _run(self, laid: Mapping[int, _Layout], members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
         layouts = {n: one.layout for n, one in laid.items()}
-        grid = _grid(self._footprints[next(iter(layouts))])
+        grid = _grid(self._baked(next(iter(layouts))))
         start = min(layout.first for layout in layouts.values())
         end = max(layout.end for layout in layouts.values())
         others = self._others(layouts, members, grid.frame(grid.number(end - 1)))
@@ -251,7 +267,7 @@ class EditedSteps:
 
     def _layout(self, change: Change) -> _Layout:
         if change not in self._layouts:
-            self._layouts[change] = _Layout(self._laid_out(self._footprints[change[0]], change[1]))
+            self._layouts[change] = _Layout(self._laid_out(self._baked(change[0]), change[1]))
         return self._layouts[change]
 
     def _laid_out(self, footprint: Footprint, edit: StepEdit) -> ContactLayout:
@@ -263,21 +279,30 @@ class EditedSteps:
                 "baked by an earlier SoftGround, or by a mesh of too many vertices, and can only be muted: bake again, "
                 "or give the mesh fewer vertices."
             )
-        steps = placed(
-            kept.steps(footprint.load_frames), edit, footprint.position, self._ground.terrain, _length(kept.pressing)
-        )
-        sole, strength = kept.pressing.sole, edit.strength
+        pressing = self._scaled(kept.pressing, edit.scale)
+        steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
+        steps = scaled_steps(steps, edit.scale, footprint.position)
+        steps = placed(steps, edit, footprint.position, self._ground.terrain, _length(pressing))
+        sole, strength = pressing.sole, edit.strength
         layout: ContactLayout
         if sole.prop is not None:
             layout = PropLayout(footprint.character, sole, steps, strength=strength)
         else:
-            layout = SoleLayout(footprint.character, sole, steps, self._points_of(kept.pressing), strength=strength)
+            layout = SoleLayout(footprint.character, sole, steps, self._points_of(pressing), strength=strength)
         if layout.window(self._solver.cells).cells > MOST_CELLS:
             raise InputError(
                 f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
                 f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
             )
         return layout
+
+    def _scaled(self, pressing: PressingSole, scale: float) -> PressingSole:
+        if scale == 1.0:
+            return pressing
+        known = self._soles.get((id(pressing), scale))
+        if known is None:
+            known = self._soles[id(pressing), scale] = scaled_sole(pressing, scale)
+        return known
 
     def _points_of(self, pressing: PressingSole) -> SolePoints:
         if id(pressing) not in self._points:
@@ -301,6 +326,38 @@ class _Group:
     prints: dict[int, Footprint | None]
     changed: dict[int, Keys]
     window: Window
+
+
+def scaled_sole(pressing: PressingSole, scale: float) -> PressingSole:
+    """A sole so many times as large."""
+    sole, flat = pressing.sole, pressing.flat.copy()
+    flat[:, :3, 3] *= scale
+    patches = tuple(
+        SolePatch(one.heights * scale, one.signed_distance * scale, one.origin * scale, one.spacing * scale)
+        for one in sole.patches
+    )
+    prop = replace(sole.prop, vertices=sole.prop.vertices * scale) if sole.prop else None
+    larger = replace(sole, patches=patches, landmarks=sole.landmarks * scale, outline=sole.outline * scale, prop=prop)
+    return PressingSole(larger, flat)
+
+
+def scaled_steps(steps: Steps, scale: float, pivot: Array) -> Steps:
+    """The steps of a sole so many times as large about a place (3,), with the force that gives it the same pressure."""
+    if scale == 1.0:
+        return steps
+
+    def grown(poses: Array) -> Array:
+        poses = poses.copy()
+        poses[..., :3, 3] = pivot + scale * (poses[..., :3, 3] - pivot)
+        return poses
+
+    return replace(
+        steps,
+        poses=grown(steps.poses),
+        approach=grown(steps.approach),
+        forces=steps.forces * scale**2,
+        centres=pivot + scale * (steps.centres - pivot),
+    )
 
 
 def placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length: float) -> Steps:
@@ -382,12 +439,17 @@ class _Grid:
         per_frame = self.timing.steps_per_frame
         return range((number - 1) * per_frame + 1, number * per_frame + 1)
 
+    def shifted(self, steps: Steps, frames: int) -> Steps:
+        """The steps so many scene frames later, or as near to that as the recorded frames allow."""
+        by = round(frames / self.timing.frame_step)
+        first = steps.first + by * self.timing.steps_per_frame
+        return replace(steps, first=first, frames=steps.frames + by * self.timing.frame_step)
+
 
 def _grid(footprint: Footprint) -> _Grid:
     kept, frames = footprint.pressed_by, footprint.load_frames
     assert kept is not None
-    spacing = (frames[-1] - frames[0]) / (len(frames) - 1) if len(frames) > 1 else footprint.frame_step
-    per_frame = max(1, round(footprint.frame_step / spacing))
+    per_frame = max(1, round(footprint.frame_step / footprint.load_spacing))
     begin = frames[0] - kept.first * footprint.frame_step / per_frame
     whole = float(np.rint(begin))
     timing = Timing(kept.time_step, per_frame, footprint.frame_step)

@@ -65,6 +65,48 @@ def test_a_step_is_chosen_muted_changed_and_reset(baked):
     assert not bake_report.stale_reasons(baked)
 
 
+def test_a_step_is_copied_changed_kept_by_a_bake_and_deleted(baked):
+    before, shown = stored(baked), heights(baked.softground.ground, DISPLAY_KEY)
+    step = baked_steps.of(baked)[2]
+    bpy.ops.softground.choose_step(step=step.name)
+    bpy.ops.softground.duplicate_step()
+    copy = baked_steps.active(baked)
+    assert (copy.name, copy.is_copy, copy.number) == (f"{step.name}+1", True, len(baked_steps.of(baked)))
+    ahead = copy.left.position - step.baked.position
+    assert 0.2 < np.linalg.norm(ahead[:2]) < 0.5
+    assert ahead[1] == pytest.approx(-np.linalg.norm(ahead[:2]), abs=0.1)  # they walk along -y
+    assert under(baked, copy.left.position) == pytest.approx(under(baked, step.baked.position), rel=0.3)
+    bpy.ops.softground.change_step(move=(0.5, 0.0), scale=1.4, shift=5)
+    changed = baked_steps.active(baked)
+    assert changed.frames == (step.frames[0] + 5, step.frames[1] + 5)
+    assert changed.left.area_m2 == pytest.approx(1.4**2 * step.baked.area_m2, rel=0.05)
+    edited, ground = stored(baked), baked.softground.ground
+    bpy.ops.softground.bake()
+    assert record.dump(record.load(stored(baked))) == record.dump(record.load(edited))
+    assert changed.name in {row["step"] for row in baked_ground.events_of(ground)}
+    bpy.ops.softground.reset_step(step=changed.name)  # which deletes it
+    assert stored(baked) == before
+    np.testing.assert_array_equal(heights(ground, DISPLAY_KEY), shown)
+
+
+def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
+    before = stored(baked)
+    step = baked_steps.of(baked)[1]
+    bpy.ops.softground.choose_step(step=step.name)
+    baked.cursor.location = (0.35, -0.8, 0.3)
+    baked.frame_set(33)
+    bpy.ops.softground.add_step()
+    added = baked_steps.active(baked)
+    assert added.frames[0] == 33
+    np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.02)
+    assert under(baked, (0.35, -0.8)) > 0.01
+    baked.cursor.location = (300.0, 0.0, 0.0)
+    with pytest.raises(RuntimeError, match="more than 100 m from step"):
+        bpy.ops.softground.add_step()
+    bpy.ops.softground.reset_steps()
+    assert stored(baked) == before
+
+
 def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
     step = baked_steps.of(baked)[1]
     bpy.ops.softground.change_step(step=step.name, strength=1.3, move=(0.05, 0.07), turn=0.2)

@@ -18,7 +18,7 @@ from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
-from tests.core.walkers import pose, pressed, walk
+from tests.core.walkers import box_sole, pose, pressed, standing, walk
 
 SOIL = GroundMaterial(0.3e6, 0.35, 0.15)
 MATERIALS = {
@@ -52,7 +52,8 @@ def ground_of(material="soil", terrain=None):
 
 def edited(left, edits, material="soil"):
     """The record with edits of steps by their number."""
-    named = {step_id(left.footprints[number]): edit for number, edit in edits.items()}
+    count = len(left.footprints)
+    named = {step_id(left.footprints[n % count], n // count): edit for n, edit in edits.items()}
     return with_edits(left, named, ground_of(material), CELL)
 
 
@@ -113,6 +114,56 @@ def test_strength_is_a_factor_on_the_depth_and_the_volumes(strength):
     assert after.rim_m3 == pytest.approx(2 * SOIL.poisson_ratio * after.compressed_m3, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("material", ["soil", "hardening"])
+def test_a_copy_prints_as_the_moved_step_itself_and_leaves_that_one_alone(material):
+    _, left = baked(material)
+    away = StepEdit(move_m=(0.0, 1.5), turn_deg=30.0)
+    moved, copied = edited(left, {1: away}, material), edited(left, {1 + len(left.footprints): away}, material)
+    print_of = next(step.left for step in copied.steps if step.is_copy)
+    assert record.dump(BakeRecord((print_of,), {})) == record.dump(BakeRecord((moved.pressed_again[1],), {}))
+    assert len(copied.edited) == len(left.footprints) + 1
+    assert copied.steps[1].left is left.footprints[1]
+
+
+def test_a_copy_in_the_place_of_its_step_presses_little_further():
+    _, left = baked()
+    copied = edited(left, {1 + len(left.footprints): StepEdit(shift_frames=60)})
+    again = next(step.left for step in copied.steps if step.is_copy)
+    assert again.compressed_m3 < 0.05 * left.footprints[1].compressed_m3
+
+
+def test_a_later_step_leaves_the_same_print_later():
+    _, left = baked()
+    before, after = left.footprints[2], edited(left, {2: StepEdit(shift_frames=7)}).pressed_again[2]
+    np.testing.assert_array_equal(after.load_frames, before.load_frames + 7)
+    for frame in (*range(int(before.start_frame) + 3, int(before.end_frame), 3), np.inf):
+        assert difference(recompose([before], frame), recompose([after], frame + 7)) < 1e-5
+
+
+def test_a_step_that_comes_earlier_than_another_is_pressed_by_it():
+    _, left = baked()
+    one, other = left.footprints[2], left.footprints[4]  # of the same foot
+    onto = StepEdit(move_m=tuple(one.position[:2] - other.position[:2]))
+    first = replace(onto, shift_frames=int(one.start_frame - other.end_frame) - 2)
+    after = edited(left, {4: first})
+    assert sorted(after.pressed_again) == [2, 4]
+    assert after.pressed_again[2].compressed_m3 < 0.3 * one.compressed_m3
+    assert after.pressed_again[4].compressed_m3 == pytest.approx(other.compressed_m3, rel=0.02)
+    frames = [footprint.start_frame for footprint in after.edited]
+    assert frames == sorted(frames)
+
+
+@pytest.mark.parametrize("scale", [0.7, 1.6])
+def test_a_larger_step_covers_more_at_the_same_pressure(scale):
+    loads = standing(box_sole(0.3, 0.1), (0.5, 0.2, 0.0), 600.0)
+    left = BakeRecord(tuple(pressed(loads, SOIL, CELL)[1]), {})
+    before, after = left.footprints[0], edited(left, {0: StepEdit(scale=scale)}).pressed_again[0]
+    assert after.area_m2 == pytest.approx(scale**2 * before.area_m2, rel=0.03)
+    assert after.peak_force_n / after.area_m2 == pytest.approx(before.peak_force_n / before.area_m2, rel=0.03)
+    assert after.max_depth_m == pytest.approx(before.max_depth_m, rel=0.03)
+    np.testing.assert_allclose(after.position, before.position, atol=2e-3)
+
+
 def test_a_moved_step_follows_the_ground():
     terrain = Hill()
     loads = walk(steps=2)
@@ -144,12 +195,14 @@ CHANGES = st.builds(
     strength=st.floats(0.0, 3.0),
     move_m=st.tuples(st.floats(-1.5, 1.5), st.floats(-0.3, 0.3)),
     turn_deg=st.floats(-180.0, 180.0),
+    scale=st.floats(0.5, 1.5),
+    shift_frames=st.integers(-30, 30),
 )
 
 
 @settings(max_examples=12, deadline=None)
 @given(
-    edits=st.dictionaries(st.integers(0, 4), CHANGES, max_size=4),
+    edits=st.dictionaries(st.integers(0, 9), CHANGES, max_size=4),  # of five steps, and a copy of each
     order=st.randoms(use_true_random=False),
     material=st.sampled_from(["soil", "hardening"]),
 )

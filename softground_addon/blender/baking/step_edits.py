@@ -13,7 +13,7 @@ from ...core.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record
-from ...core.record.edits import UNCHANGED, StepEdit
+from ...core.record.edits import UNCHANGED, StepEdit, is_copy
 from ...core.settings import BakeSettings
 from .. import jobs, settings
 from ..after import debris_object
@@ -74,7 +74,7 @@ def editable(scene: bpy.types.Scene) -> EditableBake:
 
 
 def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdit]) -> None:
-    """Show the bake on the scene's ground with other edits; edits that change nothing are dropped.
+    """Show the bake on the scene's ground with other edits; edits that change nothing of a baked step are dropped.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
         If a step is to be moved of which the record keeps too little, or the ground cannot be written.
     """
     ground = scene.softground.ground
-    left = bake.with_edits({name: edit for name, edit in edits.items() if edit != UNCHANGED})
+    left = bake.with_edits({name: edit for name, edit in edits.items() if edit != UNCHANGED or is_copy(name)})
     shown, stamp = baked_ground.display_mesh_of(ground), staleness.stamp_of(ground)
     warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)
     lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]

@@ -95,6 +95,6 @@ def _windows(
     baked: Sequence[Footprint], before: Mapping[int, Footprint | None], after: Mapping[int, Footprint | None]
 ) -> list[Window]:
     """Where the prints of two sets of edits differ."""
-    numbers = {n for n in {*before, *after} if before.get(n, baked[n]) is not after.get(n, baked[n])}
-    prints = [one for n in sorted(numbers) for one in (before.get(n, baked[n]), after.get(n, baked[n])) if one]
-    return [one.window for one in prints]
+    unedited = dict(enumerate(baked))
+    pairs = ([left.get(n, unedited.get(n)) for left in (before, after)] for n in sorted({*before, *after}))
+    return [one.window for pair in pairs if pair[0] is not pair[1] for one in pair if one]

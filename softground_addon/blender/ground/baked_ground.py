@@ -252,7 +252,18 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     table = stored.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' has no events: bake again, and it has them.")
-    return as_edited(table, stored.footprints, stored.edited)
+    return as_edited(table, stored.steps)
+
+
+def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
+    """The steps of a ground's bake that left a print.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record is damaged or no longer fits the mesh.
+    """
+    return [step for step in record.load(bytes(stored_record(ground))).steps if step.left]
 
 
 def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:

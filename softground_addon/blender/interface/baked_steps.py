@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record
-from ...core.record.edits import UNCHANGED, StepEdit, edits_by_number, step_id
+from ...core.record.edits import UNCHANGED, StepEdit
 from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
 
 Array = NDArray[np.float64]
+
+APART = 1.2
+"""How far ahead of a step its copy lies, in lengths of its outline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +31,11 @@ class BakedStep:
     Attributes
     ----------
     number : int
-        In the order of the bake, from 1.
+        In the order of the bake, from 1; copies follow.
     name : str
         Its id.
     baked : Footprint
-        As it was baked.
+        As it was baked; of a copy, that which it is a copy of.
     left : Footprint or None
         As it was left; None where nothing of it is.
     edit : StepEdit
@@ -43,11 +46,18 @@ class BakedStep:
     baked: Footprint
     left: Footprint | None
     edit: StepEdit
+    is_copy: bool = False
+
+    @property
+    def is_edited(self) -> bool:
+        """Whether there is anything to be reset."""
+        return self.is_copy or self.edit != UNCHANGED
 
     @property
     def frames(self) -> tuple[int, int]:
         """First and last frame of the contact."""
-        return int(np.ceil(self.baked.start_frame)), int(self.baked.end_frame)
+        shift = self.edit.shift_frames
+        return int(np.ceil(self.baked.start_frame)) + shift, int(self.baked.end_frame) + shift
 
     @property
     def side(self) -> str:
@@ -69,8 +79,16 @@ class BakedStep:
         """Its sole on the undisturbed ground, where it is or would be with another edit, (N, 3) [m]."""
         edit = edit or self.edit
         turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))[:2, :2]
-        outline = (self._baked_outline - self.baked.position[:2]) @ turn.T + self.baked.position[:2] + edit.move_m
+        middle = self.baked.position[:2]
+        outline = edit.scale * (self._baked_outline - middle) @ turn.T + middle + edit.move_m
         return np.column_stack([outline, np.full(len(outline), self.height)])
+
+    def ahead(self) -> tuple[float, float]:
+        """Where it would be moved to lie ahead of where it is, along world x and y [m]."""
+        along = np.array([np.cos(heading := (self.left or self.baked).heading), np.sin(heading)])
+        length = float(np.ptp(self.outline()[:, :2] @ along))
+        x, y = np.array(self.edit.move_m) + APART * length * along
+        return float(x), float(y)
 
     @cached_property
     def _baked_outline(self) -> Array:
@@ -109,16 +127,9 @@ def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
 
 
 def _steps(left: record.BakeRecord) -> list[BakedStep]:
-    edits = edits_by_number(left.footprints, left.edits)
     return [
-        BakedStep(
-            number + 1,
-            step_id(footprint),
-            footprint,
-            left.pressed_again.get(number, footprint),
-            edits.get(number, UNCHANGED),
-        )
-        for number, footprint in enumerate(left.footprints)
+        BakedStep(number, step.name, step.baked, step.left, step.edit, step.is_copy)
+        for number, step in enumerate(left.steps, start=1)
     ]
 
 

@@ -12,7 +12,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...core.errors import SoftGroundError
-from ...core.record.edits import StepEdit
+from ...core.record.edits import FARTHEST, StepEdit
 from .. import session, settings
 from ..baking import step_edits
 from ..baking.step_preview import StepPreview
@@ -129,20 +129,20 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             return
         by = (mouse - drag.mouse) * (FINE if fine else 1.0)
         drag.mouse = mouse
-        move = np.round(np.array(drag.edit.move_m) + by, 6)
+        move = np.clip(np.round(np.array(drag.edit.move_m) + by, 6), -FARTHEST, FARTHEST)
         self._change(context, replace(drag.edit, move_m=(float(move[0]), float(move[1]))))
 
     def _change(self, context: bpy.types.Context, edit: StepEdit) -> None:
         drag, scene = self._drag, settings.scene_of(context)
         if drag is not None and edit != drag.edit:
-            drag.preview.show(changed(scene, drag.step, edit))
+            drag.preview.show(changed(scene, [(drag.step, edit)]))
             drag.edit = _shown.edit = edit
             _redraw()
 
     def _drop(self, context: bpy.types.Context) -> set[str]:
         drag, scene = self._drag, settings.scene_of(context)
         assert drag is not None
-        edits, is_moved = changed(scene, drag.step, drag.edit), drag.edit != drag.step.edit
+        edits, is_moved = changed(scene, [(drag.step, drag.edit)]), drag.edit != drag.step.edit
         self._leave(context, set())
         if is_moved:
             show(scene, edits, drag.bake)

@@ -1,17 +1,18 @@
-"""Operators on single steps of the bake: choose one, mute it, change it, take the change back."""
+"""Operators on single steps of the bake: choose some, mute, change and copy them, take the changes back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import degrees, radians
 from typing import Any
 
 import bpy
-from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+import numpy as np
+from bpy.props import FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ...core.errors import InputError
-from ...core.record.edits import FARTHEST, STRONGEST, UNCHANGED, StepEdit
+from ...core.record.edits import FARTHEST, LARGEST, LONGEST_SHIFT, SMALLEST, STRONGEST, StepEdit, new_copy, with_edit
 from .. import session, settings
 from ..baking import step_edits
 from ..ground import baked_ground
@@ -35,18 +36,21 @@ class OnSteps(OnBake):
 
 
 class OnStep(OnSteps):
-    """Operators that change the step that is named, or chosen."""
+    """Operators that change the steps that are named, or chosen."""
 
-    step: StringProperty(name="Step", description="Id of the step; of the chosen one if empty", options={"HIDDEN"})
+    step: StringProperty(
+        name="Steps", description="Ids of the steps, line by line; of the chosen ones if empty", options={"HIDDEN"}
+    )
 
-    def chosen(self, scene: bpy.types.Scene) -> BakedStep:
-        """The step that is meant."""
+    def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
+        """The steps that are meant, first the one that the panel shows."""
         if not self.step:
-            self.step = session.current().step
-        found = next((step for step in baked_steps.of(scene) if step.name == self.step), None)
-        if found is None:
-            raise InputError(f"The bake has no step '{self.step}': choose one in the list of steps.")
-        return found
+            self.step = "\n".join(session.chosen_steps())
+        steps = {step.name: step for step in baked_steps.of(scene)}
+        for name in self.step.split("\n"):
+            if name not in steps:
+                raise InputError(f"The bake has no step '{name}': choose one in the list of steps.")
+        return [steps[name] for name in self.step.split("\n")]
 
 
 def show(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], bake: step_edits.EditableBake | None = None) -> None:
@@ -57,25 +61,22 @@ def show(scene: bpy.types.Scene, edits: Mapping[str, StepEdit], bake: step_edits
     session.redraw(region_type="WINDOW")
 
 
-def changed(scene: bpy.types.Scene, step: BakedStep, edit: StepEdit) -> dict[str, StepEdit]:
-    """All edits of the bake, with another one of a step."""
+def changed(scene: bpy.types.Scene, changes: Iterable[tuple[BakedStep, StepEdit | None]]) -> dict[str, StepEdit]:
+    """All edits of the bake, with others of some steps; see `edits.with_edit`."""
     edits = dict(baked_ground.edits_of(scene.softground.ground))
-    for other in [name for name in edits if name != step.name and step_of(scene, name) is step]:
-        del edits[other]  # of an earlier bake: it stands under the step's newer id from now on
-    return edits | {step.name: edit}
+    for step, edit in changes:
+        edits = with_edit(edits, step.baked, step.name, edit)
+    return edits
 
 
-def step_of(scene: bpy.types.Scene, name: str) -> BakedStep | None:
-    """The step that an edit's id belongs to."""
-    who, _, frame = name.rpartition("@")
-    return next(
-        (
-            step
-            for step in baked_steps.of(scene)
-            if step.name.rpartition("@")[0] == who and step.baked.start_frame <= float(frame) <= step.baked.end_frame
-        ),
-        None,
-    )
+def copied(scene: bpy.types.Scene, copies: Iterable[tuple[BakedStep, StepEdit]]) -> None:
+    """Show the bake with copies of some steps, and choose these."""
+    edits, names = dict(baked_ground.edits_of(scene.softground.ground)), []
+    for step, edit in copies:
+        names.append(new_copy(edits, step.baked))
+        edits[names[-1]] = edit
+    show(scene, edits)
+    session.choose_steps(names[0], names)
 
 
 class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
@@ -89,7 +90,7 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        session.current().step = self.step
+        session.choose_steps(self.step)
         step = baked_steps.active(scene)
         if step is None:
             return {"CANCELLED"}
@@ -108,13 +109,14 @@ class SOFTGROUND_OT_mute_step(OnStep, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        step = self.chosen(scene)
-        show(scene, changed(scene, step, replace(step.edit, mute=not step.edit.mute)))
+        steps = self.chosen(scene)
+        mute = not steps[0].edit.mute
+        show(scene, changed(scene, [(step, replace(step.edit, mute=mute)) for step in steps]))
         return {"FINISHED"}
 
 
 class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
-    """Make the print of this step deeper or shallower, move it, or turn it"""
+    """Make the print of this step deeper or shallower, move, turn or scale it, or have it pressed earlier or later"""
 
     bl_idname = "softground.change_step"
     bl_label = "Change Step"
@@ -139,28 +141,92 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
         min=radians(-360),
         max=radians(360),
     )
+    scale: FloatProperty(
+        name="Size",
+        description="Size of the sole over that of the bake; it presses as hard on each area",
+        default=1.0,
+        min=SMALLEST,
+        max=LARGEST,
+    )
+    shift: IntProperty(
+        name="Later", description="Frames by which it presses later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
         try:
-            edit = self.chosen(settings.scene_of(context)).edit
+            edit = self.chosen(settings.scene_of(context))[0].edit
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.strength, self.move, self.turn = edit.strength, edit.move_m, radians(edit.turn_deg)
+        self.scale, self.shift = edit.scale, edit.shift_frames
         return context.window_manager.invoke_props_dialog(self)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        step = self.chosen(scene)
-        move = (settings.typed(self.move[0]), settings.typed(self.move[1]))
-        edit = StepEdit(step.edit.mute, settings.typed(self.strength), move, settings.typed(degrees(self.turn)))
-        show(scene, changed(scene, step, edit))
+        steps = self.chosen(scene)
+        wanted = {
+            "strength": settings.typed(self.strength),
+            "move_m": (settings.typed(self.move[0]), settings.typed(self.move[1])),
+            "turn_deg": settings.typed(degrees(self.turn)),
+            "scale": settings.typed(self.scale),
+            "shift_frames": self.shift,
+        }
+        # of several steps, only what was changed of the first
+        new = {key: value for key, value in wanted.items() if value != getattr(steps[0].edit, key)}
+        show(scene, changed(scene, [(step, replace(step.edit, **new)) for step in steps]))
         return {"FINISHED"}
 
 
+class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
+    """Press this step once more, ahead of where it is; the copy can be moved, changed and deleted"""
+
+    bl_idname = "softground.duplicate_step"
+    bl_label = "Duplicate"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        copied(scene, [(step, _moved(step, step.ahead())) for step in self.chosen(scene)])
+        return {"FINISHED"}
+
+
+class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
+    """Press the sole of this step at the 3D cursor too, from the current frame on"""
+
+    bl_idname = "softground.add_step"
+    bl_label = "Add at Cursor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = settings.scene_of(context)
+        step = self.chosen(scene)[0]
+        cursor = np.array(scene.cursor.location)[:2] * scene.unit_settings.scale_length
+        edit = _moved(step, (cursor - step.baked.position[:2]).tolist())
+        shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
+        if abs(shift) > LONGEST_SHIFT:
+            raise InputError(
+                f"Step '{step.name}' is {abs(shift)} frames away; a copy comes at most {LONGEST_SHIFT} earlier or "
+                "later: go nearer to it, or choose another step."
+            )
+        copied(scene, [(step, replace(edit, mute=False, shift_frames=shift))])
+        return {"FINISHED"}
+
+
+def _moved(step: BakedStep, move: Sequence[float]) -> StepEdit:
+    """The edit of a step, with another move [m]."""
+    if max(map(abs, move)) > FARTHEST:
+        raise InputError(
+            f"That is more than {FARTHEST:g} m from step '{step.name}': place it nearer, or choose another step."
+        )
+    return replace(step.edit, move_m=(settings.typed(move[0]), settings.typed(move[1])))
+
+
 class SOFTGROUND_OT_reset_step(OnStep, bpy.types.Operator):
-    """Give this step the print that was baked"""
+    """Give this step the print that was baked; a copy is deleted"""
 
     bl_idname = "softground.reset_step"
     bl_label = "Reset Step"
@@ -169,13 +235,12 @@ class SOFTGROUND_OT_reset_step(OnStep, bpy.types.Operator):
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        step = self.chosen(scene)
-        show(scene, changed(scene, step, UNCHANGED))
+        show(scene, changed(scene, [(step, None) for step in self.chosen(scene)]))
         return {"FINISHED"}
 
 
 class SOFTGROUND_OT_reset_steps(OnSteps, bpy.types.Operator):
-    """Give all steps the prints that were baked"""
+    """Give all steps the prints that were baked, and delete all copies"""
 
     bl_idname = "softground.reset_steps"
     bl_label = "Reset All Steps"
@@ -191,6 +256,8 @@ CLASSES = (
     SOFTGROUND_OT_choose_step,
     SOFTGROUND_OT_mute_step,
     SOFTGROUND_OT_change_step,
+    SOFTGROUND_OT_duplicate_step,
+    SOFTGROUND_OT_add_step,
     SOFTGROUND_OT_reset_step,
     SOFTGROUND_OT_reset_steps,
 )

@@ -6,7 +6,6 @@ from typing import Any
 
 import bpy
 
-from ...core.record.edits import UNCHANGED
 from .. import settings
 from ..ground import baked_ground
 from ..live import live
@@ -40,7 +39,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         layout.operator("softground.drag_step", icon="VIEW_PAN")
         if chosen is not None:
             _buttons(layout, chosen)
-        if any(step.edit != UNCHANGED for step in steps):
+        if any(step.is_edited for step in steps):
             layout.operator("softground.reset_steps", icon="LOOP_BACK")
 
 
@@ -64,7 +63,8 @@ def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
     first, last = step.frames
     depth = "muted" if step.edit.mute else f"{step.depth_cm:.1f} cm" if step.left else "nothing left"
     text = f"{step.number} {step.side or step.baked.sole}   {first}-{last}   {depth}   {step.baked.peak_force_n:,.0f} N"
-    icon = "HIDE_ON" if step.edit.mute else "MODIFIER" if step.edit != UNCHANGED else "BLANK1"
+    icon = "DUPLICATE" if step.is_copy else "MODIFIER" if step.is_edited else "BLANK1"
+    icon = "HIDE_ON" if step.edit.mute else icon
     row = layout.row(align=True)
     row.alignment = "LEFT"
     row.operator(
@@ -79,8 +79,11 @@ def _buttons(layout: Any, chosen: BakedStep) -> None:
     row.operator("softground.mute_step", depress=is_muted, icon="HIDE_ON" if is_muted else "HIDE_OFF").step = ""
     row.operator("softground.change_step", text="Change...", icon="MODIFIER").step = ""
     part = row.row(align=True)
-    part.enabled = chosen.edit != UNCHANGED
-    part.operator("softground.reset_step", text="", icon="LOOP_BACK").step = ""
+    part.enabled = chosen.is_edited
+    part.operator("softground.reset_step", text="", icon="TRASH" if chosen.is_copy else "LOOP_BACK").step = ""
+    row = layout.row(align=True)
+    row.operator("softground.duplicate_step", icon="DUPLICATE").step = ""
+    row.operator("softground.add_step", icon="CURSOR").step = ""
 
 
 CLASSES = (SOFTGROUND_PT_steps,)

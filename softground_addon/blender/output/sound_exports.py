@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,6 @@ from ...core.after import sound, wave_file
 from ...core.after.sound import SoundStep
 from ...core.errors import InputError
 from ...core.files import files
-from ...core.record.edits import step_id
 from ...core.record.footprints import Footprint
 from .. import settings
 from ..ground import baked_ground
@@ -52,7 +51,7 @@ def write(
     """
     rate = settings.frame_rate_of(scene)
     table = baked_ground.events_of(ground)
-    footprints, _ = baked_ground.load(ground)
+    footprints = {step.name: step.left for step in baked_ground.steps_of(ground) if step.left}
     recordings = _recordings(samples) if samples else []
     steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
     if stereo:
@@ -73,18 +72,18 @@ def _recordings(folder: Path) -> list[tuple[str, np.ndarray]]:
 
 
 def _seen_by_camera(
-    scene: bpy.types.Scene, steps: Sequence[SoundStep], footprints: Sequence[Footprint]
+    scene: bpy.types.Scene, steps: Sequence[SoundStep], footprints: Mapping[str, Footprint]
 ) -> list[SoundStep]:
     """The steps with the gains of two channels: to the side where the camera sees them, softer the farther they are."""
     camera = scene.camera
     if camera is None:
         raise InputError(f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make mono sound.")
-    unit, places = scene.unit_settings.scale_length, {step_id(one): one for one in footprints}
+    unit = scene.unit_settings.scale_length
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []
     try:
         for one in steps:
-            footprint = places[one.name]
+            footprint = footprints[one.name]
             scene.frame_set(int(footprint.start_frame))
             place = camera.matrix_world.inverted() @ Vector((footprint.position / unit).tolist())
             seen.append((place.x, max(place.length, 1e-6)))

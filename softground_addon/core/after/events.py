@@ -10,6 +10,7 @@ import numpy as np
 from ..loads.estimate import CharacterLoads
 from ..record.edits import step_id
 from ..record.footprints import Footprint
+from ..record.record import EditableStep
 from . import phases
 from .phases import Phase
 
@@ -79,21 +80,30 @@ def events(
         rows += [_row(character, one, steps, surface, first_frame, soles[one.sole]) for one in found]
     for row in rows:
         row["thrown_kg"] = _rounded((thrown or {}).get((row["step"], row["phase"]), 0.0))
-    return sorted(rows, key=lambda row: (row["frame"], row["character"], row["contact"]))
+    return _in_order(rows)
 
 
-def as_edited(table: Sequence[Event], baked: Iterable[Footprint], edited: Iterable[Footprint]) -> list[Event]:
-    """The events of the steps as the artist left them: those of muted steps are gone, of moved ones are with them.
+def as_edited(table: Sequence[Event], steps: Sequence[EditableStep]) -> list[Event]:
+    """The events of the steps as the artist left them: those of muted steps are gone, of others are where and when
+    these are, and copies have their own.
 
     Parameters
     ----------
     table : sequence of Event
-    baked, edited : iterables of Footprint
-        As they were, and those that are left of them.
+    steps : sequence of EditableStep
+        From the record.
     """
-    before, after = ({step_id(one): one for one in some} for some in (baked, edited))
-    kept = [row for row in table if row["step"] not in before or row["step"] in after]
-    return [row if row["step"] not in after else _moved(row, before[row["step"]], after[row["step"]]) for row in kept]
+    of_steps: dict[str, list[Event]] = {step_id(step.baked): [] for step in steps}
+    rows = [row for row in table if row["step"] not in of_steps]
+    for row in table:
+        if row["step"] in of_steps:
+            of_steps[row["step"]].append(row)
+    rows += [_moved(row, step) for step in steps if step.left for row in of_steps[step_id(step.baked)]]
+    return _in_order(rows)
+
+
+def _in_order(rows: Iterable[Event]) -> list[Event]:
+    return sorted(rows, key=lambda row: (row["frame"], row["character"], row["contact"]))
 
 
 def between(table: Sequence[Event], start: float, end: float, frame_rate: float) -> list[Event]:
@@ -175,7 +185,15 @@ def _row(
     }
 
 
-def _moved(row: Event, before: Footprint, after: Footprint) -> Event:
+def _moved(row: Event, step: EditableStep) -> Event:
+    """An event of a step as that was left."""
+    before, after = step.baked, step.left
+    assert after is not None
+    later = after.start_frame - before.start_frame
+    if later and before.pressed_by:
+        seconds = later / before.load_spacing * before.pressed_by.time_step
+        row = row | {"frame": _rounded(row["frame"] + later), "time_s": _rounded(row["time_s"] + seconds)}
+    row = row | {"step": step.name} if step.is_copy else row
     turn = after.heading - before.heading
     x, y = np.array(row["position"][:2]) - before.position[:2]
     cos, sin = np.cos(turn), np.sin(turn)

@@ -8,13 +8,12 @@ See `voices` for the sources.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..record.edits import step_id
 from ..record.footprints import QUANTUM, Footprint
 from .events import LANDINGS, Event
 from .voices import VOICES, Voice
@@ -85,13 +84,13 @@ class SoundStep:
 
 
 def steps_of(
-    footprints: Sequence[Footprint], table: Sequence[Event], *, frame_rate: float, first_frame: float
+    footprints: Mapping[str, Footprint], table: Sequence[Event], *, frame_rate: float, first_frame: float
 ) -> list[SoundStep]:
     """What is heard of a bake.
 
     Parameters
     ----------
-    footprints : sequence of Footprint
+    footprints : mapping of step id to Footprint
     table : sequence of Event
         From `events.events`.
     frame_rate : float
@@ -110,8 +109,8 @@ def steps_of(
         return None if row is None else float(seconds(row["frame"]))
 
     heard = []
-    for one in footprints:
-        name, volumes = step_id(one), _volumes(one)
+    for name, one in footprints.items():
+        volumes = _volumes(one)
         ends = np.asarray(one.compression.frames)
         compacted = np.stack([seconds(ends - one.frame_step), seconds(ends), volumes], axis=1)
         time, force = seconds(one.load_frames), np.asarray(one.load_n, float)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
-from ..record.edits import StepEdit, edit_as_json, edits_by_number, step_id, to_json
+from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
 from ..record.footprints import Footprint
+from ..record.record import EditableStep, steps_of
 from ..record.typical_depth import typical_of
 
 SCHEMA_VERSION = 1
@@ -71,14 +72,10 @@ def build(
     thrown_m3 : float
         What steps have thrown out of their rims.
     """
-    changes = edits_by_number(footprints, edits)
-    steps = [
-        _step(footprint, pressed_again.get(number, footprint), changes.get(number))
-        for number, footprint in enumerate(footprints)
-    ]
+    left = steps_of(footprints, edits, pressed_again)
+    steps = [_step(step) for step in left]
     counted = [step for step in steps if not step.get("left_out")]
-    again = [pressed_again.get(number, footprint) for number, footprint in enumerate(footprints)]
-    shown = [printed for printed, step in zip(again, steps, strict=True) if printed and not step.get("left_out")]
+    shown = [step.left for step in left if step.left]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
@@ -111,11 +108,11 @@ def build(
     return report
 
 
-def _step(baked: Footprint, left: Footprint | None, edit: StepEdit | None) -> dict[str, Any]:
+def _step(one: EditableStep) -> dict[str, Any]:
     """What the report says of a step, as it was left; where nothing is, as it was baked."""
-    footprint = left or baked
+    footprint = one.left or one.baked
     step: dict[str, Any] = {
-        "id": step_id(baked),
+        "id": one.name,
         "contact": footprint.sole,
         "character": footprint.character,
         "frame_start": round(float(footprint.start_frame), 3),
@@ -127,9 +124,9 @@ def _step(baked: Footprint, left: Footprint | None, edit: StepEdit | None) -> di
         "compressed_m3": float(footprint.compressed_m3),
         "rim_m3": float(footprint.rim_m3),
     }
-    if edit is not None:
-        step["edit"] = edit_as_json(edit)
-    if left is None:
+    if one.edit != UNCHANGED or one.is_copy:
+        step["edit"] = edit_as_json(one.edit)
+    if one.left is None:
         step["left_out"] = True
     return step
 

@@ -1,9 +1,12 @@
-"""What the artist changes of single steps, stored beside the footprints of a bake and kept when it is baked again."""
+"""What the artist changes of single steps, stored beside the footprints of a bake and kept when it is baked again.
+
+Steps are numbered as they were baked; copy number k of step n has the number n + k times the count of the baked ones.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,6 +19,12 @@ STRONGEST = 10.0
 """Largest `StepEdit.strength`."""
 FARTHEST = 100.0
 """Largest part of `StepEdit.move_m` [m]."""
+SMALLEST, LARGEST = 0.2, 5.0
+"""Between what `StepEdit.scale` is."""
+LONGEST_SHIFT = 1000
+"""Most frames of `StepEdit.shift_frames`, either way."""
+MOST_COPIES = 999
+"""Most copies of one step."""
 
 
 @dataclass(frozen=True)
@@ -32,54 +41,117 @@ class StepEdit:
         How far it is moved along world x and y [m].
     turn_deg : float
         How far it is turned counter-clockwise around its position [deg].
+    scale : float
+        Size of its sole over that of the bake, at the same pressure.
+    shift_frames : int
+        How many frames later it presses.
     """
 
     mute: bool = False
     strength: float = 1.0
     move_m: tuple[float, float] = (0.0, 0.0)
     turn_deg: float = 0.0
+    scale: float = 1.0
+    shift_frames: int = 0
 
 
 UNCHANGED = StepEdit()
 _FIELDS = tuple(field.name for field in fields(StepEdit))
 
 
-def step_id(footprint: Footprint) -> str:
+def step_id(footprint: Footprint, copy: int = 0) -> str:
     """Identity of a step in reports and edits, such as `Walker/foot.L@36.5`: character, contact, middle of the contact.
 
     The frame is the middle of the contact to a tenth, so that no two contacts of a sole share it. An edit belongs to
     the contact of that sole that is under way at its frame. So it stays with its step when material, mass, cell size
-    or the range of frames change, and when keys move the ends of a contact by less than half of its length.
+    or the range of frames change, and when keys move the ends of a contact by less than half of its length. A copy that
+    the artist made of it goes with it, and its number follows: `Walker/foot.L@36.5+1`.
     """
-    return f"{_who(footprint)}@{_middle(footprint):.1f}"
+    return f"{_who(footprint)}@{_middle(footprint):.1f}" + (f"+{copy}" if copy else "")
 
 
-def edit_of(footprint: Footprint, edits: Mapping[str, StepEdit]) -> StepEdit:
-    """What the artist changed of a step; where several edits belong to it, the one nearest to its middle."""
-    name = _key_of(footprint, edits)
-    return edits[name] if name is not None else UNCHANGED
+def with_edit(
+    edits: Mapping[str, StepEdit], footprint: Footprint, name: str, edit: StepEdit | None
+) -> dict[str, StepEdit]:
+    """All edits, with another one of a step, or of a copy of it; or with none, without which a copy is gone.
+
+    Parameters
+    ----------
+    edits : mapping of step id to StepEdit
+    footprint : Footprint
+        The step as it was baked.
+    name : str
+        Its id, or that of the copy: what was stored under ids of an earlier bake goes.
+    edit : StepEdit or None
+    """
+    _, _, copy = _parts(name)
+    others = {other: one for other, one in edits.items() if not _is_of(_parts(other), footprint, copy)}
+    return others if edit is None else others | {name: edit}
 
 
-def _key_of(footprint: Footprint, edits: Mapping[str, StepEdit]) -> str | None:
-    """The id under which a step's edit stands."""
-    who, middle = _who(footprint), _middle(footprint)
-    of_sole = {float(frame): name for name in edits for key, _, frame in [name.rpartition("@")] if key == who}
-    meant = [frame for frame in of_sole if footprint.start_frame <= frame <= footprint.end_frame or frame == middle]
-    return of_sole[min(meant, key=lambda frame: abs(frame - middle))] if meant else None
+def new_copy(edits: Mapping[str, StepEdit], footprint: Footprint) -> str:
+    """Id for one more copy of a step.
+
+    Raises
+    ------
+    InputError
+        If it has `MOST_COPIES` already.
+    """
+    taken = {copy for name in edits for copy in [_parts(name)[2]] if _is_of(_parts(name), footprint, copy)}
+    free = next((copy for copy in range(1, MOST_COPIES + 1) if copy not in taken), None)
+    if free is None:
+        raise InputError(f"Step '{step_id(footprint)}' has {MOST_COPIES} copies: copy another step.")
+    return step_id(footprint, free)
 
 
-def edits_by_number(footprints: Iterable[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, StepEdit]:
+def is_copy(name: str) -> bool:
+    """Whether a step's id is that of a copy."""
+    return _parts(name)[2] > 0
+
+
+def edits_by_number(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, StepEdit]:
     """What the artist changed, by the number of the step; steps that are as they were baked are left out."""
-    if not edits:
-        return {}
-    changes = {number: edit_of(footprint, edits) for number, footprint in enumerate(footprints)}
-    return {number: edit for number, edit in changes.items() if edit != UNCHANGED}
+    names = sorted(_names(footprints, edits).items())
+    return {n: edits[name] for n, name in names if edits[name] != UNCHANGED or n >= len(footprints)}
 
 
-def without_step(footprints: Iterable[Footprint], edits: Mapping[str, StepEdit]) -> list[str]:
+def without_step(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> list[str]:
     """Ids of edits that belong to no step any more."""
-    used = {_key_of(footprint, edits) for footprint in footprints} if edits else set()
+    used = set(_names(footprints, edits).values())
     return [name for name in edits if name not in used]
+
+
+def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, str]:
+    """Ids of the edits that belong to steps, by number; of several for one step, the one nearest to its middle."""
+    of_soles: dict[str, dict[int, dict[float, str]]] = {}
+    for name in edits:
+        who, frame, copy = _parts(name)
+        of_soles.setdefault(who, {}).setdefault(copy, {})[frame] = name
+    names = {}
+    for number, footprint in enumerate(footprints) if edits else ():
+        middle = _middle(footprint)
+        for copy, frames in of_soles.get(_who(footprint), {}).items():
+            meant = [f for f in frames if footprint.start_frame <= f <= footprint.end_frame or f == middle]
+            if meant:
+                nearest = min(meant, key=lambda frame: abs(frame - middle))
+                names[number + copy * len(footprints)] = frames[nearest]
+    return names
+
+
+def _is_of(parts: tuple[str, float, int], footprint: Footprint, copy: int) -> bool:
+    who, frame, number = parts
+    during = footprint.start_frame <= frame <= footprint.end_frame or frame == _middle(footprint)
+    return (who, number) == (_who(footprint), copy) and during
+
+
+def _parts(name: str) -> tuple[str, float, int]:
+    """Character and sole, frame, and number of the copy that an id says; ValueError where it is none."""
+    who, _, when = name.rpartition("@")
+    frame, plus, copy = when.partition("+")
+    number = int(copy) if plus else 0
+    if "/" not in who or not math.isfinite(float(frame)) or not (not plus or 1 <= number <= MOST_COPIES):
+        raise ValueError(name)
+    return who, float(frame), number
 
 
 def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
@@ -138,27 +210,49 @@ def from_json(content: object, origin: str) -> dict[str, StepEdit]:
 
 def _edit(name: str, change: object, origin: str) -> StepEdit:
     where = f"{origin}, step '{name}'"
-    who, _, frame = name.rpartition("@")
-    if "/" not in who or not _is_frame(frame):
-        raise InputError(f"{where}: this is no step's id. The bake's report names them: steps, id.")
+    try:
+        _parts(name)
+    except ValueError:
+        raise InputError(f"{where}: this is no step's id. The bake's report names them: steps, id.") from None
     if not isinstance(change, dict):
         raise InputError(f'{where} must be a table such as {{"mute": true}}.')
     _check_fields(change, _FIELDS, where)
-    mute, strength = change.get("mute", False), change.get("strength", 1.0)
-    move, turn = change.get("move_m", (0.0, 0.0)), change.get("turn_deg", 0.0)
-    if not isinstance(mute, bool):
-        raise InputError(f"{where}: 'mute' is {mute!r}; it must be true or false.")
-    if not _is_number(strength, 0.0, STRONGEST):
-        raise InputError(f"{where}: 'strength' is {strength!r}; it must be a number from 0 to {STRONGEST:g}.")
-    if (
-        not isinstance(move, list | tuple)
-        or len(move) != 2
-        or not all(_is_number(m, -FARTHEST, FARTHEST) for m in move)
-    ):
-        raise InputError(f"{where}: 'move_m' is {move!r}; it must be two numbers up to {FARTHEST:g} m, along x and y.")
-    if not _is_number(turn, -360.0, 360.0):
-        raise InputError(f"{where}: 'turn_deg' is {turn!r}; it must be a number from -360 to 360.")
-    return StepEdit(mute, float(strength), (float(move[0]), float(move[1])), float(turn))
+    for field, (is_valid, needed) in _VALID.items():
+        if field in change and not is_valid(change[field]):
+            raise InputError(f"{where}: '{field}' is {change[field]!r}; it must be {needed}.")
+    return StepEdit(**{field: _KINDS[field](value) for field, value in change.items()})
+
+
+def _is_number(value: object, low: float, high: float) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
+
+
+def _is_move(value: object) -> bool:
+    return (
+        isinstance(value, list | tuple) and len(value) == 2 and all(_is_number(m, -FARTHEST, FARTHEST) for m in value)
+    )
+
+
+_VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "mute": (lambda value: isinstance(value, bool), "true or false"),
+    "strength": (lambda value: _is_number(value, 0.0, STRONGEST), f"a number from 0 to {STRONGEST:g}"),
+    "move_m": (_is_move, f"two numbers up to {FARTHEST:g} m, along x and y"),
+    "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360"),
+    "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}"),
+    "shift_frames": (
+        lambda value: _is_number(value, -LONGEST_SHIFT, LONGEST_SHIFT) and value == int(value),
+        f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
+    ),
+}
+"""What the fields of an edit may be, and how that is said."""
+_KINDS: dict[str, Callable[[Any], Any]] = {
+    "mute": bool,
+    "strength": float,
+    "move_m": lambda move: (float(move[0]), float(move[1])),
+    "turn_deg": float,
+    "scale": float,
+    "shift_frames": int,
+}
 
 
 def _who(footprint: Footprint) -> str:
@@ -173,14 +267,3 @@ def _check_fields(table: Mapping[str, object], known: tuple[str, ...], where: st
     unknown = [key for key in table if key not in known]
     if unknown:
         raise InputError(f"{where}: unknown field {unknown[0]!r}. Known are: {', '.join(known)}.")
-
-
-def _is_frame(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _is_number(value: object, low: float, high: float) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high

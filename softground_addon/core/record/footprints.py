@@ -132,6 +132,12 @@ class Footprint:
         return (total * QUANTUM).reshape(self.window.rows, self.window.columns)
 
     @property
+    def load_spacing(self) -> float:
+        """Scene frames from one of `load_frames` to the next."""
+        frames = self.load_frames
+        return float(frames[-1] - frames[0]) / (len(frames) - 1) if len(frames) > 1 else self.frame_step
+
+    @property
     def max_depth_m(self) -> float:
         """Deepest that this contact compressed a cell by [m], on top of what earlier ones had."""
         return float(self.tile(self.compression).max(initial=0.0))

@@ -22,7 +22,7 @@ from . import edits as step_edits
 from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
 
-FORMAT = 3
+FORMAT = 4
 """Version of the bytes' layout. Who raises it adds to `MIGRATIONS` what lifts the version before."""
 
 Layout = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -45,8 +45,10 @@ def _without_contacts(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> 
 MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout]] = {
     1: _with_edits,
     2: _without_contacts,
+    3: lambda text, arrays: (text, arrays),
 }
-"""What lifts a layout of a version to the next. Version 1 had no edits, version 2 nothing to press steps again from."""
+"""What lifts a layout of a version to the next. Version 1 had no edits, version 2 nothing to press steps again from,
+version 3 no copies of steps."""
 
 _TEXT = "record.json"
 _DAMAGE = (
@@ -82,7 +84,8 @@ class BakeRecord:
     edits : mapping of step id to StepEdit
         What the artist changed of them.
     pressed_again : mapping of int to Footprint or None
-        What stands for some of the footprints because of the edits; None where nothing of one is left.
+        What stands for some of the footprints and for copies of them because of the edits, by their numbers (see
+        `edits`); None where nothing of one is left.
     """
 
     footprints: Sequence[Footprint]
@@ -92,10 +95,55 @@ class BakeRecord:
 
     @property
     def edited(self) -> list[Footprint]:
-        """The footprints as the artist left them: those that the ground is made from."""
-        muted = {n for n, edit in step_edits.edits_by_number(self.footprints, self.edits).items() if edit.mute}
-        left = dict(enumerate(self.footprints)) | dict.fromkeys(muted) | dict(self.pressed_again)
-        return [footprint for footprint in left.values() if footprint is not None]
+        """The footprints as the artist left them, in their order: those that the ground is made from."""
+        left = [step.left for step in self.steps if step.left is not None]
+        return sorted(left, key=lambda footprint: footprint.start_frame) if self.edits else left
+
+    @property
+    def steps(self) -> list[EditableStep]:
+        """All steps, and after them the copies of some."""
+        return steps_of(self.footprints, self.edits, self.pressed_again)
+
+
+@dataclass(frozen=True)
+class EditableStep:
+    """A step of a bake, or a copy of one.
+
+    Attributes
+    ----------
+    number : int
+        See `edits`.
+    name : str
+        Its id.
+    baked : Footprint
+        As it was baked; of a copy, that which it is a copy of.
+    left : Footprint or None
+        As it was left; None where nothing of it is.
+    edit : StepEdit
+    is_copy : bool
+    """
+
+    number: int
+    name: str
+    baked: Footprint
+    left: Footprint | None
+    edit: step_edits.StepEdit
+    is_copy: bool
+
+
+def steps_of(
+    footprints: Sequence[Footprint],
+    edits: Mapping[str, step_edits.StepEdit],
+    pressed_again: Mapping[int, Footprint | None],
+) -> list[EditableStep]:
+    """The steps of a record, and after them the copies of some."""
+    changes, count = step_edits.edits_by_number(footprints, edits), len(footprints)
+    steps = []
+    for number in (*range(count), *(n for n in changes if n >= count)):
+        edit, baked, copy = changes.get(number, step_edits.UNCHANGED), footprints[number % count], number // count
+        left = None if edit.mute else pressed_again.get(number, None if copy else baked)
+        steps.append(EditableStep(number, step_edits.step_id(baked, copy), baked, left, edit, copy > 0))
+    return steps
 
 
 @sliced
@@ -150,7 +198,7 @@ def load(content: bytes) -> BakeRecord:
                 )
             if set(archive.namelist()) - {_TEXT, *(f"{name}.npy" for name in ARRAYS)}:
                 raise ValueError("it has parts that no record has")
-            known = ARRAYS if version == FORMAT else set(ARRAYS) - set(contact_arrays.KINDS)
+            known = ARRAYS if version > 2 else set(ARRAYS) - set(contact_arrays.KINDS)
             arrays = {name: members.array(members.read(archive, f"{name}.npy")) for name in known}
         for older in range(version, FORMAT):
             text, arrays = MIGRATIONS[older](text, arrays)
@@ -172,7 +220,10 @@ def _count_baked(count: int, again: list[tuple[Any, Any]]) -> int:
     """How many of so many footprints were baked, the others being pressed again; ValueError where that cannot be."""
     baked = count - sum(there is True for _, there in again)
     numbers = [number for number, _ in again]
-    if any(type(number) is not int or not 0 <= number < baked for number in numbers) or sorted(set(numbers)) != numbers:
+    if (
+        any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in numbers)
+        or sorted(set(numbers)) != numbers
+    ):
         raise ValueError("steps were pressed again that it does not have")
     if any(type(there) is not bool for _, there in again):
         raise ValueError("it does not say which steps are left")

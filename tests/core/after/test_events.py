@@ -111,14 +111,28 @@ def test_both_feet_out_of_a_jump_land_at_the_speed_of_the_fall():
 def test_muted_steps_have_no_events_and_moved_ones_take_them_along(baked, table):
     _, footprints = baked
     muted, moved = map(step_id, footprints[:2])
-    left = BakeRecord(footprints, {}, {muted: StepEdit(mute=True)}).edited
-    left = [replace(one, position=one.position + np.array([1, 2, 0])) if step_id(one) == moved else one for one in left]
-    rows = as_edited(table, footprints, left)
-    assert {row["step"] for row in rows} == {step_id(one) for one in left}
+    elsewhere = replace(footprints[1], position=footprints[1].position + np.array([1, 2, 0]))
+    left = BakeRecord(footprints, {}, {muted: StepEdit(mute=True), moved: StepEdit(turn_deg=1.0)}, {1: elsewhere})
+    rows = as_edited(table, left.steps)
+    assert {row["step"] for row in rows} == {step_id(one) for one in footprints[1:]}
     for before, after in zip(
         [row for row in table if row["step"] == moved], [row for row in rows if row["step"] == moved], strict=True
     ):
         assert np.subtract(after["position"], before["position"]) == pytest.approx([1, 2, 0], abs=2e-5)
+
+
+def test_a_copy_has_the_events_of_its_step_when_it_presses(baked, table):
+    _, footprints = baked
+    count, one = len(footprints), footprints[1]
+    later = replace(one, start_frame=one.start_frame + 6, end_frame=one.end_frame + 6)
+    left = BakeRecord(footprints, {}, {step_id(one, 1): StepEdit(shift_frames=6)}, {1 + count: later})
+    rows = as_edited(table, left.steps)
+    of_step, of_copy = ([row for row in rows if row["step"] == step_id(one, copy)] for copy in (0, 1))
+    assert [row for row in rows if row["step"] != step_id(one, 1)] == table
+    assert [row["phase"] for row in of_copy] == [row["phase"] for row in of_step] != []
+    assert [row["frame"] - 6 for row in of_copy] == pytest.approx([row["frame"] for row in of_step], abs=1e-5)
+    assert [row["time_s"] - 6 / 30 for row in of_copy] == pytest.approx([row["time_s"] for row in of_step], abs=1e-5)
+    assert rows == sorted(rows, key=lambda row: row["frame"])
 
 
 def test_times_count_from_the_first_frame_that_is_asked_for(table):

@@ -12,6 +12,7 @@ from softground_addon.core.after import sound, wave_file
 from softground_addon.core.after.events import LANDINGS, events
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.presets import find
+from softground_addon.core.record.edits import step_id
 from tests.core.walkers import pressed, walk
 
 RATE = wave_file.RATE
@@ -30,7 +31,12 @@ def grounds(loads):
     for name, surface in GROUNDS.items():
         _, footprints = pressed(loads, find(name).material, cell_size=0.03)
         table = events([loads], footprints, surface=surface, first_frame=1.0)
-        found[surface] = table, sound.steps_of(footprints, table, frame_rate=30.0, first_frame=1.0)
+        found[surface] = (
+            table,
+            sound.steps_of(
+                dict(zip(map(step_id, footprints), footprints, strict=True)), table, frame_rate=30.0, first_frame=1.0
+            ),
+        )
     return found
 
 

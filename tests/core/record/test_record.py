@@ -12,7 +12,15 @@ import pytest
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record import record
-from softground_addon.core.record.edits import StepEdit, edit_of, from_json, step_id, to_json
+from softground_addon.core.record.edits import (
+    StepEdit,
+    edits_by_number,
+    from_json,
+    new_copy,
+    step_id,
+    to_json,
+    without_step,
+)
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
 from tests.core.walkers import pressed, walk
@@ -92,6 +100,10 @@ def test_each_step_has_an_id_of_its_own(footprints):
     assert len({step_id(footprint) for footprint in footprints}) == len(footprints) > 3
 
 
+def edit_of(footprint, edits):
+    return edits_by_number([footprint], edits).get(0, StepEdit())
+
+
 def moved(footprint, by, longer=0.0):
     return replace(footprint, start_frame=footprint.start_frame + by, end_frame=footprint.end_frame + by + longer)
 
@@ -113,6 +125,28 @@ def test_an_edit_belongs_to_no_other_character_sole_or_time(footprints):
     assert edit_of(replace(footprint, character="other"), edits) == StepEdit()
     assert edit_of(replace(footprint, sole="other"), edits) == StepEdit()
     assert edit_of(moved(footprint, footprint.end_frame - footprint.start_frame + 1.0), edits) == StepEdit()
+
+
+def test_copies_have_ids_and_numbers_of_their_own(footprints):
+    count = len(footprints)
+    edits = {step_id(footprints[1], copy): StepEdit(scale=1.0 + copy) for copy in (1, 3)}
+    assert edits_by_number(footprints, edits) == {
+        1 + count: StepEdit(scale=2.0),
+        1 + 3 * count: StepEdit(scale=4.0),
+    }
+    assert new_copy(edits, footprints[1]) == step_id(footprints[1], 2)
+    assert new_copy(edits, footprints[0]) == step_id(footprints[0], 1)
+    assert edits_by_number(footprints, {step_id(footprints[1], 2): StepEdit()}) == {1 + 2 * count: StepEdit()}
+    assert edits_by_number([moved(one, 3.0) for one in footprints], edits).keys() == {1 + count, 1 + 3 * count}
+    assert without_step(footprints[:1], edits) == list(edits)
+
+
+def test_a_record_of_before_copies_is_read(footprints, monkeypatch):
+    left = BakeRecord(footprints, {}, {step_id(footprints[1]): StepEdit(mute=True)}, {1: None})
+    monkeypatch.setattr(record, "FORMAT", 3)
+    older = record.dump(left)
+    monkeypatch.undo()
+    assert record.dump(record.load(older)) == record.dump(left)
 
 
 def test_names_with_the_ids_own_marks_make_no_confusion(footprints):
