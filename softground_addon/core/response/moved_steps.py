@@ -108,6 +108,8 @@ def _moved(
     feet = leg_soles(motion)
     of_name = {motion.soles[sole].sole.name: (side, sole) for side, sole in feet.items()}
     for number, edit in edits_by_number(footprints, edits).items():
+        if number >= len(footprints):  # a copy, which no foot made
+            continue
         footprint = footprints[number]
         stays = edit.mute or (edit.move_m == (0.0, 0.0) and edit.turn_deg == 0.0)
         if stays or footprint.character != motion.name or footprint.sole not in of_name:

@@ -51,6 +51,13 @@ def sole_points(motion, name):
     return next(sole for sole in motion.soles if sole.sole.name == name).landmark_positions()
 
 
+def test_nobody_follows_a_copy():
+    motion, touching = walk()
+    prints = prints_of(motion, touching)
+    copy = {step_id(second_of(prints, "foot.L"), 1): StepEdit(move_m=MOVE)}
+    assert follow(motion, touching, prints, copy).carries == {}
+
+
 @pytest.mark.parametrize("foot", ["foot.L", "foot.R"])
 def test_the_foot_stands_where_its_step_was_moved_and_turned_to(foot):
     plain, moved, step, found = followed_by(StepEdit(move_m=MOVE, turn_deg=TURN), foot)
