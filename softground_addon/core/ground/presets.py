@@ -131,8 +131,8 @@ def parse(text: str, origin: str) -> Preset:
     debris = content.get("debris")
     if not isinstance(debris, bool | None):
         raise InputError(f"{origin}: 'debris' is {debris!r}; it must be true or false.")
-    checked = validate_material(material, origin), cast("Pressure | None", pressure)
-    return Preset(name, source, surface, *checked, **numbers, debris=debris)
+    checked, spread = validate_material(material, origin), cast("Pressure | None", pressure)
+    return Preset(name, source, surface, checked, spread, **numbers, debris=debris)
 
 
 def load(path: Path) -> Preset:
