@@ -108,6 +108,14 @@ def test_a_slide_and_a_float_that_were_added_are_gone(floor_walk):
     assert np.abs(cleaned_hips[:, 2] - hips[:, 2]).max() < 0.01, "the body is back at its height"
 
 
+def test_a_mesh_with_bumps_is_a_hard_floor_too(floor_walk):
+    bumps = plane(floor_walk, height=lambda x, y: 0.05 * np.sin(3.0 * x) * np.sin(2.5 * y))
+    floor_walk.softground.ground = bumps
+    before = fastest_knee(responders.legs(floor_walk))
+    jobs.run(clean_feet(floor_walk))
+    check_bars(floor_walk, "bumps", before)
+
+
 def test_clear_bake_gives_the_bytes_back(floor_walk):
     spoil(floor_walk)
     before = fingerprints.of_file()

@@ -19,6 +19,9 @@ from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, wi
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+LOCK_PASSES = 2
+"""Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
+
 
 @dataclass(frozen=True)
 class FootFaults:
@@ -60,8 +63,10 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
         yield
         first = place_sole(motion, number, touches, floor, floor)
         yield
-        lying = moved(motion.soles[number], first.carry)
-        locked = lock(underside_on(lying, floor, motion.frames), touches) @ first.carry
+        locked = first.carry
+        for _ in range(LOCK_PASSES):
+            lying = moved(motion.soles[number], locked)
+            locked = lock(underside_on(lying, floor, motion.frames), touches) @ locked
         held = moved(motion.soles[number], locked)
         placed = place_sole(
             with_sole(motion, number, held), number, touches, floor, floor, align=0.0, points=rim_points(held)
