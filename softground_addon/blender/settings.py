@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
+from ..core.motion.motion import shortest_length
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
@@ -324,17 +325,12 @@ def _defaults(scene: bpy.types.Scene, preset: Preset) -> list[tuple[Any, str, An
     return [*_of_preset(scene, preset), (scene.softground, "sink_feet", True), (scene.softground, "relief", "FINE")]
 
 
-COARSER = 4.0
-"""How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
-be as it says."""
-
-
 def fit_cells(scene: bpy.types.Scene) -> None:
     """Set the cell size to what the scene's preset says of the soles, unless the user has set it."""
     options = scene.softground
     count, lengths = options.cells_along_sole, [one.sole_length for one in options.characters if one.sole_length > 0]
     if count > 0 and lengths:
-        options.cell_size = float(f"{max(min(lengths), max(lengths) / COARSER) / count:.2g}")
+        options.cell_size = float(f"{shortest_length(lengths) / count:.2g}")
         options.cells_along_sole = count  # which a cell size of the user's own switches off
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
 from .loads.contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
 from .loads.missed_steps import advice, missed_steps
-from .motion.motion import CharacterMotion, SoleMotion
+from .motion.motion import CharacterMotion, SoleMotion, shortest_length
 from .motion.props import posed
 from .numerics.cell_keys import Keys, cells_at, cells_of, keys_of
 from .numerics.slices import Slices, sliced
@@ -138,7 +138,7 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
         if motion.centre is None and any(sole is foot for foot in _feet(motion))
     ]
     height = low + (float(np.median(floats)) if floats else 0.0)
-    raster = min(sole.sole.length for motion in motions for sole in motion.soles) / POINTS_ALONG_SOLE
+    raster = shortest_length(sole.sole.length for motion in motions for sole in motion.soles) / POINTS_ALONG_SOLE
     footfalls = []
     for motion, found in zip(motions, contacts, strict=True):
         for sole, touching, offset in zip(motion.soles, found.touching.T, found.offset, strict=True):

@@ -14,7 +14,7 @@ from .ground.heightfield import Terrain
 from .loads.estimate import CharacterLoads
 from .loads.missed_steps import advice, missed_steps
 from .loads.sliding import treadmill_speed
-from .motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin
+from .motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin, shortest_length
 from .numerics.slices import Slices, sliced
 from .pressing.sole_points import places, sole_points
 from .record.footprints import Footprint
@@ -150,7 +150,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
 
 def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
     """Whether the body, its mass and the cells suit each other."""
-    length = min(sole.sole.length for sole in motion.soles)
+    length = shortest_length(sole.sole.length for sole in motion.soles)
     if length < FEW_CELLS * cell_size:
         yield Finding(
             "few_cells",

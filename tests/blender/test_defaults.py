@@ -17,6 +17,7 @@ from softground_addon.blender.characters import character_setup
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.blender.interface import operators
 from softground_addon.core.ground import presets
+from softground_addon.core.motion.motion import COARSER
 from softground_addon.core.record import record
 
 
@@ -117,7 +118,7 @@ def test_cells_fit_the_shortest_sole_and_things_have_a_centimetre_at_most(scene,
     assert options.cell_size == pytest.approx(0.16 / 55, rel=0.02)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.002)
     bpy.ops.softground.add_character()
-    assert options.cell_size == pytest.approx(0.55 / 55 / settings.COARSER, rel=0.02)
+    assert options.cell_size == pytest.approx(0.55 / 55 / COARSER, rel=0.02)
     options.characters.clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=4.0)
     character_setup.add_things(scene, [bpy.context.active_object])

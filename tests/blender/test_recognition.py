@@ -123,3 +123,12 @@ def test_a_limb_lies_where_its_skin_does_though_other_bones_bend_it(scene):
     assert motion.ground_level == pytest.approx(0.75 - 0.6 * 0.4 - 0.4 * 0.9, abs=2e-3)
     assert limb.bears[20:].all()
     assert limb.lowest()[20:] == pytest.approx(motion.ground_level, abs=2e-3)
+
+
+def test_a_fingertip_on_the_ground_does_not_size_the_cells(scene):
+    armature = stool()
+    box("tip", 0.004, (0, 0.1, 0.062), armature, "Root")
+    character = add_character(scene, armature)
+    assert "Root" in {sole.bone for sole in character.soles}
+    assert 0.02 < character.sole_length < 0.05
+    assert scene.softground.cell_size > 0.02 / scene.softground.cells_along_sole

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...core.errors import BakeError, InputError
 from ...core.findings import Finding
 from ...core.ground.material import GroundMaterial
-from ...core.motion.motion import CharacterMotion
+from ...core.motion.motion import CharacterMotion, shortest_length
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.numerics.slices import Slices, sliced
 from ...core.record.footprints import QUANTUM, Footprint
@@ -91,7 +91,7 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
 
 def shortest_sole(motions: Sequence[CharacterMotion]) -> float:
     """Length of the shortest sole of all characters [m]."""
-    return min(sole.sole.length for motion in motions for sole in motion.soles)
+    return shortest_length(sole.sole.length for motion in motions for sole in motion.soles)
 
 
 def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, sole_length: float) -> bool:

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.motion.motion import shortest_length
 from ...core.motion.props import mass_properties
 from ...core.numerics.components import components
 from .. import jobs
@@ -93,7 +94,7 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
         return 0.0
     limbs = {sole.name for sole in mapping.soles if sole.limb}
     lengths = ((sole.sole.name in limbs, sole.sole.length) for sole in motion.soles)
-    return min(min(length, LONGEST_OF_LIMBS) if is_limb else length for is_limb, length in lengths)
+    return shortest_length(min(length, LONGEST_OF_LIMBS) if is_limb else length for is_limb, length in lengths)
 
 
 def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:

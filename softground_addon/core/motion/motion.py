@@ -7,7 +7,7 @@ This is the border between Blender and the physics. Everything that the core kno
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil
@@ -33,10 +33,26 @@ ADULT_LEG = 0.9
 TALLEST, SMALLEST = 20.0, 0.05
 """Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
 
+COARSER = 4.0
+"""How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
+be as it says."""
+
 _LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball", "toe")
 
 JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" for joint in _LIMB_JOINTS))
 """Names that `CharacterMotion.joints` may hold. `toe` is the tip of the foot; any may be missing."""
+
+
+def shortest_length(lengths: Iterable[float]) -> float:
+    """Length of the shortest of some soles by which cells are sized [m]: a fingertip beside a trunk sizes none.
+
+    Examples
+    --------
+    >>> shortest_length([0.27, 0.19]), shortest_length([0.4, 0.003])
+    (0.19, 0.1)
+    """
+    known = list(lengths)
+    return max(min(known), max(known) / COARSER)
 
 
 @dataclass(frozen=True)
