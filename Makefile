@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
+.PHONY: ready blenders demo scenes heroes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -27,11 +27,15 @@ ready: $(READY)
 demo: $(READY)
 	$(BIN)/python -m sample_scenes.demo $(if $(MOTION),--motion "$(MOTION)" --scale $(SCALE)) $(if $(UP),--up $(UP))
 
-# The scenes of docs/gallery.md with their pictures, from nothing, into build/scenes.
+# The scenes of docs/figures.md and the smaller of docs/gallery.md with their pictures, from nothing, into build/scenes.
 scenes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all
 
-# The same, and then the pictures into docs/images and the small .blend files into sample_scenes.
+# The large pictures of docs/gallery.md.
+heroes: $(READY)
+	$(BIN)/python -m sample_scenes.make_all heroes --samples 16
+
+# What `make scenes` builds, and then the pictures into docs/images and the small .blend files into sample_scenes.
 gallery: scenes
 	$(BIN)/python -m sample_scenes.publish
 

@@ -1,6 +1,6 @@
 """`make scenes`: builds every sample scene with its pictures, each in a process of its own, into build/scenes.
 
-python -m sample_scenes.make_all [options of the scenes]
+python -m sample_scenes.make_all [heroes] [options of the scenes]
 """
 
 from __future__ import annotations
@@ -24,14 +24,18 @@ SCENES = (
 )
 """Modules of this package that `production.run` knows how to run, in the order of the paper's figures."""
 
+HEROES = ("snow_at_dusk",)
+"""Scenes out of doors, whose pictures take minutes."""
+
 
 def main(arguments: list[str]) -> int:
-    """Run all scenes, also those after one that failed; returns the number of failures."""
+    """Run all scenes, or all heroes, also those after one that failed; returns the number of failures."""
     results = {}
-    for name in SCENES:
+    heroes = arguments[:1] == ["heroes"]
+    for name in HEROES if heroes else SCENES:
         print(f"--- {name}", flush=True)
         started = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", f"sample_scenes.{name}", *arguments], check=False)
+        done = subprocess.run([sys.executable, "-m", f"sample_scenes.{name}", *arguments[heroes:]], check=False)
         results[name] = done.returncode, time.perf_counter() - started
     print(f"\n{'scene':<20}{'time':>8}")
     for name, (code, seconds) in results.items():

@@ -5,6 +5,7 @@ python -m sample_scenes.preset_pictures
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,11 +26,17 @@ LENS = 62.0
 
 
 def main() -> None:
-    """Bake a walk on each preset, and put the picture of a print beside its file."""
+    """Put the picture of a print beside the file of each preset."""
     files = {presets.load(path).name: path for path in sorted(presets.FOLDER.glob("*.json"))}
+    for name, rendered in prints(list(files), SIZE):
+        _shrink(rendered, files[name].with_suffix(".png"))
+
+
+def prints(names: Sequence[str], size: int) -> Iterator[tuple[str, Path]]:
+    """Bake a walk on each preset: its name, and a square picture of a print that is there until the next."""
     with addon(), TemporaryDirectory() as folder:
         scene = bpy.context.scene
-        built = four_grounds.build(scene, presets=list(files))
+        built = four_grounds.build(scene, presets=names)
         stage.set_up_rendering(scene)
         scene.frame_set(scene.frame_end)
         for walker in built.walkers:
@@ -40,8 +47,8 @@ def main() -> None:
         for name, bake in built.bakes.items():
             four_grounds.aim_at_print(camera, four_grounds.close_up_of(bake.footprints))
             rendered = Path(folder) / "rendered.png"
-            stage.render(scene, camera, rendered, (SIZE, SIZE), SAMPLES)
-            _shrink(rendered, files[name].with_suffix(".png"))
+            stage.render(scene, camera, rendered, (size, size), SAMPLES)
+            yield name, rendered
 
 
 def _shrink(rendered: Path, target: Path) -> None:

@@ -1,6 +1,6 @@
 """`make gallery`: puts what `make scenes` built where the project shows it.
 
-The pictures of docs/gallery.md go to docs/images, the .blend files that are small to sample_scenes.
+The pictures of docs/gallery.md and docs/figures.md go to docs/images, the .blend files that are small to sample_scenes.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from sample_scenes.production import OUTPUT
 
 ROOT = Path(__file__).parents[1]
 
+PAGES = ("gallery.md", "figures.md")
+
 LARGEST = 2_000_000
 """A .blend file larger than this stays out of the repository [bytes]."""
 
@@ -26,10 +28,10 @@ def publish(built: Path, root: Path) -> list[Path]:
     built : Path
         Folder into which the scenes were built.
     root : Path
-        The project, with docs/gallery.md and sample_scenes.
+        The project, with these pages and sample_scenes.
     """
-    gallery = (root / "docs" / "gallery.md").read_text(encoding="utf-8")
-    pictures = [built / name for name in re.findall(r"\(images/([\w.]+)\)", gallery)]
+    pages = "".join((root / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
+    pictures = [built / name for name in re.findall(r"\(images/([\w.]+)\)", pages)]
     blends = [built / f"{name}.blend" for name in SCENES]
     copies = [(picture, root / "docs" / "images") for picture in pictures if picture.is_file()]
     copies += [

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sample_scenes.make_all import SCENES
-from sample_scenes.publish import LARGEST, publish
+from sample_scenes.make_all import HEROES, SCENES
+from sample_scenes.publish import LARGEST, PAGES, publish
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +40,7 @@ def production(addon, scene):
     return production
 
 
-@scenes
+@pytest.mark.parametrize("name", [*SCENES, *HEROES])
 def test_the_scene_keeps_what_its_figure_promises(production, name):
     import bpy
 
@@ -62,10 +62,10 @@ def test_volumes_are_kept_and_compression_only_grows_with_every_option_on(produc
     assert not failed
 
 
-def test_every_scene_is_in_the_gallery():
-    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    for name in SCENES:
-        assert f"python -m sample_scenes.{name}" in gallery
+def test_every_scene_is_shown_with_its_command():
+    shown = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
+    for name in (*SCENES, *HEROES):
+        assert f"python -m sample_scenes.{name}" in shown
 
 
 def test_pictures_of_the_gallery_and_small_scenes_are_published(tmp_path):
@@ -73,11 +73,18 @@ def test_pictures_of_the_gallery_and_small_scenes_are_published(tmp_path):
     for folder in (built, project / "docs" / "images", project / "sample_scenes"):
         folder.mkdir(parents=True)
     (project / "docs" / "gallery.md").write_text("![One](images/craters.jpg) ![Two](images/not_built.png)")
-    for name, size in {"craters.jpg": 5, "other.jpg": 5, "craters.blend": LARGEST, "stunts.blend": LARGEST + 1}.items():
+    (project / "docs" / "figures.md").write_text("![Three](images/bicycle.jpg)")
+    for name, size in {
+        "craters.jpg": 5,
+        "bicycle.jpg": 5,
+        "other.jpg": 5,
+        "craters.blend": LARGEST,
+        "stunts.blend": LARGEST + 1,
+    }.items():
         (built / name).write_bytes(bytes(size))
     publish(built, project)
     published = {path.name for path in project.rglob("*") if path.suffix in (".jpg", ".blend")}
-    assert published == {"craters.jpg", "craters.blend"}
+    assert published == {"craters.jpg", "bicycle.jpg", "craters.blend"}
 
 
 def test_scenes_in_the_repository_are_small_and_of_this_package():

@@ -1,0 +1,160 @@
+"""What pictures out of doors have in common: ground to the horizon, sky and low sun, trees, a camera with a focus."""
+
+from __future__ import annotations
+
+from math import atan, pi, radians
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import ArrayLike
+
+from sample_scenes import stage, terrain
+from sample_scenes.stage import Array
+
+NEAR, FAR = 9.0, 600.0
+"""Half the width of the ground that is even, and of all of it [m]."""
+
+_SPACING, _GROWTH = 0.15, 1.055  # m between vertices of the even part, and how much wider each further row is
+
+_CORRIDOR = 1.2  # m to either side of the way, as level as the walk is animated for
+
+
+def places(low: float, high: float) -> Array:
+    """Places along one axis, close together from low to high and ever wider apart to the horizon [m]."""
+    beyond = _SPACING * np.cumsum(_GROWTH ** np.arange(1, 120))
+    beyond = beyond[beyond < FAR]
+    even = terrain.spaced(low, high, _SPACING)
+    return np.concatenate([even[0] - beyond[::-1], even, even[-1] + beyond])
+
+
+def rolling(swell: float, hills: float, seed: int = 0) -> terrain.Field:
+    """Height of a ground that is level along x = 0 and rises to hills.
+
+    Parameters
+    ----------
+    swell : float
+        Height of the waves beside the way [m].
+    hills : float
+        Height of the hills at the horizon [m].
+    """
+    waves = np.random.default_rng(seed)
+    near = [(waves.uniform(1.3, 6.0), waves.uniform(0, pi), waves.uniform(0, 2 * pi)) for _ in range(9)]
+    far = [(200.0 / 1.35**number, waves.uniform(0, pi), waves.uniform(0, 2 * pi)) for number in range(9)]
+
+    def summed(sines: list[tuple[float, float, float]], x: Array, y: Array) -> Array:
+        return sum(
+            length * np.sin((x * np.cos(way) + y * np.sin(way)) * 2 * pi / length + phase)
+            for length, way, phase in sines
+        ) / sum(length for length, *_ in sines)
+
+    def height(x: Array, y: Array) -> Array:
+        aside = np.clip((np.abs(x) - _CORRIDOR) / 4.0, 0.0, 1.0) ** 1.5
+        away = np.clip((np.hypot(x, y) - 45.0) / 320.0, 0.0, 1.0) ** 1.6
+        ridges = 1.0 - np.abs(2.0 * summed(far, x, y))
+        return swell * aside * summed(near, x, y) + hills * away * ridges
+
+    return height
+
+
+_SUN_WIDTH = radians(0.7)
+_SUN_OF_SKY = radians(1.5)
+"""So low that the sky takes the colours of dusk."""
+_OZONE = 3.0
+"""Of the sky, in that of a clear day: what turns dusk blue overhead."""
+
+
+def add_low_sun(
+    scene: bpy.types.Scene, toward: float, elevation: float, colour: tuple[float, float, float], sun: float, sky: float
+) -> None:
+    """The sun of the other scenes, of another colour and strength [W/m²], below a sky in which it is lower still."""
+    stage.add_sun(scene, toward, elevation)
+    light = next(lamp for lamp in bpy.data.lights if lamp.type == "SUN")
+    light.energy, light.color, light.angle = sun, colour, _SUN_WIDTH
+    nodes = {node.type: node for node in scene.world.node_tree.nodes}
+    nodes["TEX_SKY"].sun_elevation, nodes["TEX_SKY"].ozone_density = _SUN_OF_SKY, _OZONE
+    nodes["BACKGROUND"].inputs[1].default_value = sky
+
+
+def add_camera(
+    scene: bpy.types.Scene, eye: ArrayLike, target: ArrayLike, lens: float, focus: ArrayLike, f_stop: float
+) -> bpy.types.Object:
+    """A camera that is sharp at `focus`."""
+    camera = stage.add_camera(scene, "Camera", lens)
+    stage.aim(camera, eye, target)
+    camera.data.clip_end = 2 * FAR
+    camera.data.dof.use_dof = True
+    camera.data.dof.focus_distance = (Vector(focus) - Vector(eye)).length
+    camera.data.dof.aperture_fstop = f_stop
+    scene.camera = camera
+    return camera
+
+
+def add_conifers(
+    spots: Array, heights: Array, ground: terrain.Field, colour: tuple[float, float, float], seed: int = 0
+) -> None:
+    """Firs on a ground: whorls of drooping twigs around a stem."""
+    shapes = [_conifer(np.random.default_rng(seed + number), colour) for number in range(4)]
+    turn = np.random.default_rng(seed)
+    for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
+        tree = bpy.data.objects.new("Fir", shapes[number % len(shapes)])
+        tree.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.02 * height)
+        tree.rotation_euler.z = turn.uniform(0, 2 * pi)
+        tree.scale = (height, height, height)
+        bpy.context.scene.collection.objects.link(tree)
+
+
+def _conifer(chance: np.random.Generator, colour: tuple[float, float, float]) -> bpy.types.Mesh:
+    """A fir of height 1: twigs as bent triangles, whorl over whorl."""
+    whorls = np.linspace(0.10, 0.985, 34)
+    vertices, faces = [], []
+    for z in whorls:
+        reach = 0.20 * (1.0 - z) ** 0.85 + 0.008
+        for angle in np.arange(0, 2 * pi, 2 * pi / 13) + chance.uniform(0, 2 * pi):
+            length = reach * chance.uniform(0.65, 1.1)
+            ahead = np.array((np.cos(angle), np.sin(angle), 0.0))
+            aside = np.array((-ahead[1], ahead[0], 0.0)) * 0.28 * length
+            middle = ahead * 0.55 * length + (0.0, 0.0, z + 0.05 * length)
+            tip = ahead * length + (0.0, 0.0, z - chance.uniform(0.25, 0.45) * length)
+            first = len(vertices)
+            vertices += [(0.0, 0.0, z + 0.02), tuple(middle + aside), tuple(tip), tuple(middle - aside)]
+            faces.append((first, first + 1, first + 2, first + 3))
+    stem = len(vertices)
+    vertices += [(0.012, 0, 0), (-0.006, 0.01, 0), (-0.006, -0.01, 0), (0, 0, 1.0)]
+    faces += [(stem, stem + 1, stem + 3), (stem + 1, stem + 2, stem + 3), (stem + 2, stem, stem + 3)]
+    mesh = bpy.data.meshes.new("Fir")
+    mesh.from_pydata(vertices, [], faces)
+    mesh.materials.append(stage.plain_material("SoftGround Sample fir", colour, 0.9))
+    return mesh
+
+
+_GLOW = 0.35
+"""Of a flake: light goes through it, so that it is bright also where the sun stands behind [W/m²]."""
+
+
+def add_snowfall(camera: bpy.types.Object, count: int, aspect: float, seed: int = 0) -> bpy.types.Object:
+    """Flakes of 3 to 8 mm in the air that a camera sees, as one mesh of octahedra."""
+    chance = np.random.default_rng(seed)
+    depth = 0.7 + 26.0 * chance.random(count) ** 0.8
+    half = np.tan(atan(18.0 / camera.data.lens))
+    across = depth * half * chance.uniform(-1.1, 1.1, count)
+    up = depth * half / aspect * chance.uniform(-1.1, 1.1, count)
+    centres = np.column_stack([across, up, -depth])
+    sizes = chance.uniform(0.0015, 0.0038, count)
+    corners = np.array([(1, 0, 0), (-1, 0, 0), (0, 1.6, 0), (0, -1.6, 0), (0, 0, 1), (0, 0, -1)], float)
+    sides = np.array([(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)])
+    vertices = (centres[:, None] + sizes[:, None, None] * corners).reshape(-1, 3)
+    faces = (np.arange(count)[:, None, None] * len(corners) + sides).reshape(-1, 3)
+    world = np.array(camera.matrix_world)
+    vertices = vertices @ world[:3, :3].T + world[:3, 3]
+    high = np.repeat(vertices.reshape(count, -1, 3)[:, :, 2].min(axis=1) > 0.05, len(sides))
+    mesh = bpy.data.meshes.new("Snowfall")
+    mesh.from_pydata(vertices.tolist(), [], faces[high].tolist())
+    flake = stage.plain_material("SoftGround Sample flake", (0.9, 0.9, 0.92), 0.7)
+    shader = next(node for node in flake.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Emission Color"].default_value = (1.0, 0.95, 0.9, 1.0)
+    shader.inputs["Emission Strength"].default_value = _GLOW
+    mesh.materials.append(flake)
+    flakes = bpy.data.objects.new("Snowfall", mesh)
+    bpy.context.scene.collection.objects.link(flakes)
+    return flakes
