@@ -34,6 +34,8 @@ WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softgr
 """What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
 was wet is 0 to 1."""
 
+NOW = ("softground_weather_now_1", "softground_weather_now_2")
+"""Vectors that are there only while the group works."""
 HEIGHT, KEPT = "height", "kept"
 """Names of what is worked out with that, and not stored."""
 
@@ -171,19 +173,20 @@ def _changed(
     height, kept = known.pop(HEIGHT), known.pop(KEPT, None)
     known.setdefault(WETNESS, wetness)
     changed = _with(graph, changed, _seen(graph, known, kept, matter))
-    return _moved(graph, changed, up, height)
+    return graph.forgotten(_moved(graph, changed, up, height), *NOW[: 1 + (len(seen) > 3)])
 
 
 def _worked_out(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> tuple[Any, dict[str, Number]]:
     """A geometry that keeps some numbers, and these as they are kept: who asks for one does not work it out again."""
-    node = graph.node("GeometryNodeCaptureAttribute")
-    node.domain = "POINT"
-    graph.link(geometry, node.inputs[0])
-    for number, (name, value) in enumerate(values.items()):
-        node.capture_items.new("FLOAT", name)
-        graph.link(value.socket, node.inputs[number + 1])
-    kept = {name: graph.number(node.outputs[number + 1]) for number, name in enumerate(values)}
-    return node.outputs[0], kept
+    known, names = {}, list(values)
+    for number, stored in enumerate(NOW):
+        together = names[3 * number : 3 * number + 3]
+        if together:
+            pack = graph.combined(*(values[name].socket for name in together))
+            geometry = graph.store(geometry, stored, pack, True, "FLOAT_VECTOR")
+            parts = graph.separated(_vector(graph, stored))
+            known |= {name: graph.number(part) for name, part in zip(together, parts, strict=False)}
+    return geometry, known
 
 
 def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:
