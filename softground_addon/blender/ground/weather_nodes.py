@@ -178,7 +178,8 @@ def _changed(
 
 def _worked_out(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> tuple[Any, dict[str, Number]]:
     """A geometry that keeps some numbers, and these as they are kept: who asks for one does not work it out again."""
-    known, names = {}, list(values)
+    known: dict[str, Number] = {}
+    names = list(values)
     for number, stored in enumerate(NOW):
         together = names[3 * number : 3 * number + 3]
         if together:
