@@ -131,19 +131,15 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     sharp, offset = (np.array(values) for values in zip(*found, strict=True))
     if seen is not None and np.ptp(offset) > LEAVE_HEIGHT * motion.leg_length:
         return seen  # the feet of one body stand on one ground: these heights are those of feet that swing
-    dated = [
+    touching = [
         _beside(sharp[index], np.delete(sharp, index, axis=0), track.velocity - drift, motion)
-        for index, track in enumerate(tracks)
+        if seen is None or sole.sole.prop is None
+        else seen.touching[:, index]  # what a limb turns to the ground has no speed of its own
+        for index, (track, sole) in enumerate(zip(tracks, motion.soles, strict=True))
     ]
-    touching = np.stack(dated, axis=1)
-    if seen is not None:
-        # What a limb turns to the ground has no speed of its own; calm skin on the ground bears if nothing else does.
-        limb = np.array([sole.sole.prop is not None for sole in motion.soles])
-        touching = np.where(limb, seen.touching, touching)
-        touching |= seen.touching & ~touching.any(axis=1, keepdims=True)
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
-    return Contacts(touching, offset, normal, clearance)
+    return Contacts(np.stack(touching, axis=1), offset, normal, clearance)
 
 
 def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track]) -> Contacts | None:
