@@ -49,8 +49,6 @@ HIGHEST_SUPPORT = 0.2
 """A sole higher than this bears nothing, whatever pushes the body up, in leg lengths."""
 SUPPORT_RANGE = 0.08
 """A sole bears while it is within this of its lowest place, in leg lengths."""
-SEEN_SUPPORT = 0.015
-"""Both of these, where the skin tells how high a sole is, in body heights (`skin.bearing.TOUCH`)."""
 IDLE_LOAD = 0.15
 """A sole that never bears more than this only drags, in body weights."""
 QUARTER_SINE, HALF_SINE = np.arcsin((0.25, 0.5))
@@ -140,9 +138,6 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     overlap = round(SEARCH * unit)
     same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
     clearance, touching = contacts.clearance, contacts.touching.copy()
-    if motion.skin is not None and motion.ground_level is not None:
-        same_height = SEEN_SUPPORT * motion.skin.height
-        clearance = np.where(clearance < same_height, clearance, np.inf)
     unsupported = [
         (first, last)
         for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True)

@@ -133,9 +133,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
         return seen  # the feet of one body stand on one ground: these heights are those of feet that swing
     touching = [
         _beside(sharp[index], np.delete(sharp, index, axis=0), track.velocity - drift, motion)
-        if seen is None or sole.sole.prop is None
-        else seen.touching[:, index]  # what a limb turns to the ground has no speed of its own
-        for index, (track, sole) in enumerate(zip(tracks, motion.soles, strict=True))
+        for index, track in enumerate(tracks)
     ]
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset

@@ -1,14 +1,11 @@
 """Contacts that agree with the forces on the whole body, on bodies whose forces are known."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from softground_addon.core.loads.body_dynamics import body_dynamics
 from softground_addon.core.loads.contact_timing import Transition, refine_contacts, transitions
 from softground_addon.core.loads.contacts import Contacts
-from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.numerics.intervals import runs
 from tests.core.character import character, flat_sole
 
@@ -77,19 +74,6 @@ def test_a_body_that_is_held_up_stands_on_its_lowest_foot_however_it_floats():
     refined = refine_contacts(motion, contacts(np.zeros((120, 2)), clearance), body_dynamics(motion)).touching
     assert refined[:, 0].all()
     assert not refined[:, 1].any()
-
-
-def test_a_sole_that_the_skin_shows_in_the_air_bears_nothing_whatever_holds_the_body_up():
-    motion = character([flat_sole(np.zeros((120, 3)), name=side) for side in "lr"], hips=(0, 0, 0.9), rate=RATE)
-    skin = LowSkin(motion.frames, np.zeros((120, 1, 3)), np.zeros((120, 1)), 0.3, 1.78)
-    motion = replace(motion, ground_level=0.0, skin=skin)
-    body = body_dynamics(motion)
-
-    def touching(*heights):
-        return refine_contacts(motion, contacts(np.zeros((120, 2)), np.tile(heights, (120, 1))), body).touching
-
-    assert not touching(0.05, 0.06).any()
-    assert touching(0.02, 0.05).all(axis=0).tolist() == [True, False]
 
 
 def test_a_body_that_hangs_high_stands_on_nothing():
