@@ -67,7 +67,7 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
 def counted(
     work: Generator[int, None, Result], stage: str, count: int, *, part: int = 0, parts: int = 1, share: float = 1.0
 ) -> Job[Result]:
-    """A job of work that yields how many of `count` things are done.
+    """A job of work that yields how many of `count` items are done.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ CLASSES = (
 )
 
 _registered = ExitStack()
-"""What takes each registered thing back; lives between register and unregister."""
+"""What unregisters each of them; lives between register and unregister."""
 
 
 def register() -> None:

@@ -165,14 +165,14 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
     )
 
 
-def is_thing(character: Any) -> bool:
+def is_prop(character: Any) -> bool:
     """Whether an entry of the characters is of objects without a rig."""
     return character.armature is None and any(sole.object for sole in character.soles)
 
 
 def is_set_up(character: Any) -> bool:
     """Whether an entry of the characters still has what leaves prints: an armature, or an object."""
-    return exists(character.armature) if character.armature else is_thing(character)
+    return exists(character.armature) if character.armature else is_prop(character)
 
 
 def character_of(character: Any) -> CharacterSettings:

@@ -170,7 +170,7 @@ def _feet(motion: CharacterMotion) -> list[SoleMotion]:
 def _standing_height(motion: CharacterMotion, sole: SoleMotion, slope: Array) -> float:
     """Height at which a sole is on its ground, where that would be at the origin [m].
 
-    A thing may fly for most of a shot, and its mesh touches exactly.
+    A prop may fly for most of a shot, and its mesh touches exactly.
     """
     if sole.sole.prop:
         lifts = sole.lowest() - sole.transforms[:, 0, :2, 3] @ slope

@@ -157,7 +157,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             f"set the cell size to {length / ENOUGH_CELLS * 100:.2g} cm to see their shape.",
         )
     if motion.centre is not None:
-        return  # a thing has no legs to go by
+        return  # a prop has no legs to go by
     height = motion.skin.height if motion.skin else motion.leg_length / LEG_OF_STATURE
     if not SMALLEST < height < TALLEST:
         tall = f"{height:.0f} m" if height > 1 else f"{height * 100:.2g} cm"

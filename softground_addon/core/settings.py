@@ -94,7 +94,7 @@ class CharacterSettings:
     Attributes
     ----------
     armature : ObjectName or None
-        None of things without a rig.
+        None for props without a rig.
     name : str
         What the user calls it.
     mass_kg : float

@@ -121,7 +121,7 @@ def test_cells_fit_the_shortest_sole_and_things_have_a_centimetre_at_most(scene,
     assert options.cell_size == pytest.approx(0.55 / 55 / COARSER, rel=0.02)
     options.characters.clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=4.0)
-    character_setup.add_things(scene, [bpy.context.active_object])
+    character_setup.add_props(scene, [bpy.context.active_object])
     assert options.cell_size == pytest.approx(0.01)
 
 

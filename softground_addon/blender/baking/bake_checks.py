@@ -135,7 +135,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
 
 def copy_findings(ground: bpy.types.Object) -> list[Finding]:
     """What the user should know of a finer copy of a ground: it holds what modifiers show in the viewport."""
-    # Nodes may scatter things for renders only, and those stay.
+    # Nodes may scatter objects for renders only, and those stay.
     hidden = (one for one in ground.modifiers if one.show_render and not one.show_viewport)
     names = [f"'{one.name}'" for one in hidden if one.type not in ("NODES", "PARTICLE_SYSTEM", "COLLISION")]
     if not names:

@@ -113,13 +113,13 @@ def _fit_ground(scene: bpy.types.Scene) -> None:
 
 
 DENSITY = 500.0
-"""Density from which a thing's first mass is guessed [kg/m³]: wood's, between a tyre's and a stone's."""
+"""Density from which a prop's first mass is guessed [kg/m³]: wood's, between a tyre's and a stone's."""
 
 
-def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[SoftGroundCharacter]:
-    """Add mesh objects to the scene's characters, as things without a rig that fall, roll and slide.
+def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list[SoftGroundCharacter]:
+    """Add mesh objects to the scene's characters, as props without a rig that fall, roll and slide.
 
-    Objects that hang on one parent, such as the wheels of a bicycle, are one thing. Its mass is that of its rigid
+    Objects that hang on one parent, such as the wheels of a bicycle, are one prop. Its mass is that of its rigid
     bodies, or guessed from its volume.
 
     Raises
@@ -127,77 +127,77 @@ def add_things(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> li
     InputError
         If there is no object, or one is no mesh, the ground, or printing already.
     """
-    things = list(things)
-    if not things:
+    props = list(props)
+    if not props:
         raise InputError("No object is selected: select an animated armature, or mesh objects that fall or roll.")
-    for thing in things:
-        _check_printable(scene, thing)
+    for obj in props:
+        _check_printable(scene, obj)
         for character in scene.softground.characters:
-            if character.armature and character.armature in ancestors(thing):
+            if character.armature and character.armature in ancestors(obj):
                 raise InputError(
-                    f"'{thing.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
+                    f"'{obj.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
                     "Contact."
                 )
     groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
-    for thing in things:
-        groups.setdefault(_root(thing), []).append(thing)
+    for obj in props:
+        groups.setdefault(_root(obj), []).append(obj)
     added = []
     for root, members in groups.items():
         character = scene.softground.characters.add()
         character.name = (members[0] if len(members) == 1 else root).name
         character.mass = _guessed_mass(scene, members)
-        size = min(float(np.array(thing.dimensions).max()) for thing in members) * scene.unit_settings.scale_length
+        size = min(float(np.array(obj.dimensions).max()) for obj in members) * scene.unit_settings.scale_length
         character.sole_length = min(size, LONGEST_OF_LIMBS)
-        for thing in members:
+        for obj in members:
             sole = character.soles.add()
-            sole.name, sole.object = thing.name, thing
+            sole.name, sole.object = obj.name, obj
         added.append(character)
-        for thing in members:
-            _take_frames(scene, _moving_frames(scene, thing))
+        for obj in members:
+            _take_frames(scene, _moving_frames(scene, obj))
         _fit_ground(scene)
     scene.softground.active_character = len(scene.softground.characters) - 1
     return added
 
 
-def _check_printable(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    if thing.type != "MESH":
+def _check_printable(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    if obj.type != "MESH":
         raise InputError(
-            f"'{thing.name}' is not a mesh but of type {thing.type.title()}: select an animated armature, or mesh "
+            f"'{obj.name}' is not a mesh but of type {obj.type.title()}: select an animated armature, or mesh "
             "objects that fall or roll."
         )
-    if thing == scene.softground.ground:
-        raise InputError(f"'{thing.name}' is the ground: select what moves on it.")
-    if not thing.data.polygons and not thing.modifiers:
-        raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or select another object.")
+    if obj == scene.softground.ground:
+        raise InputError(f"'{obj.name}' is the ground: select what moves on it.")
+    if not obj.data.polygons and not obj.modifiers:
+        raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or select another object.")
     for character in scene.softground.characters:
-        if any(sole.object == thing for sole in character.soles):
-            raise InputError(f"'{thing.name}' prints already, as a sole of '{title_of(character)}'.")
+        if any(sole.object == obj for sole in character.soles):
+            raise InputError(f"'{obj.name}' prints already, as a sole of '{title_of(character)}'.")
 
 
-def _root(thing: bpy.types.Object) -> bpy.types.Object:
-    return ([thing, *ancestors(thing)])[-1]
+def _root(obj: bpy.types.Object) -> bpy.types.Object:
+    return ([obj, *ancestors(obj)])[-1]
 
 
-def _guessed_mass(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> float:
+def _guessed_mass(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> float:
     """Mass of some objects [kg]: that of their rigid bodies, or from their volume, to two digits."""
     total = 0.0
-    for thing in things:
-        if thing.rigid_body:
-            total += thing.rigid_body.mass
+    for obj in props:
+        if obj.rigid_body:
+            total += obj.rigid_body.mass
             continue
-        vertices, triangles = surface_of(scene, thing)
-        to_world = np.array(thing.matrix_world)[:3, :3] * scene.unit_settings.scale_length
+        vertices, triangles = surface_of(scene, obj)
+        to_world = np.array(obj.matrix_world)[:3, :3] * scene.unit_settings.scale_length
         total += mass_properties(vertices @ to_world.T, triangles).volume * DENSITY
     if not total > 0:
         return 1.0
     return round(total, 1 - floor(log10(total)))
 
 
-def _moving_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int, int] | None:
-    if is_simulated(thing) and scene.rigidbody_world:
+def _moving_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, int] | None:
+    if is_simulated(obj) and scene.rigidbody_world:
         cache = scene.rigidbody_world.point_cache
         return max(cache.frame_start, scene.frame_start), min(cache.frame_end, scene.frame_end)
-    return animated_frames(scene, thing)
+    return animated_frames(scene, obj)
 
 
 def _take_frames(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> None:
@@ -343,7 +343,7 @@ def add_vertex_contacts(character: SoftGroundCharacter, skin: bpy.types.Object) 
 
 
 def add_object_contacts(
-    scene: bpy.types.Scene, character: SoftGroundCharacter, things: Iterable[bpy.types.Object]
+    scene: bpy.types.Scene, character: SoftGroundCharacter, props: Iterable[bpy.types.Object]
 ) -> list[str]:
     """Let objects print as soles of a character: canes, snowshoes, wheels; names of those that were added.
 
@@ -352,19 +352,19 @@ def add_object_contacts(
     InputError
         If there is none, or one is no mesh, the ground, or printing already.
     """
-    things = list(things)
-    if not things:
+    props = list(props)
+    if not props:
         raise InputError(
             "No object is selected: select the meshes that touch the ground, such as a cane or a snowshoe."
         )
-    for thing in things:
-        _check_printable(scene, thing)
-    for thing in things:
+    for obj in props:
+        _check_printable(scene, obj)
+    for obj in props:
         sole = character.soles.add()
-        sole.name, sole.object = thing.name, thing
-        sole.side = _side_of(thing.name)
+        sole.name, sole.object = obj.name, obj
+        sole.side = _side_of(obj.name)
     character.active_sole = len(character.soles) - 1
-    return [thing.name for thing in things]
+    return [obj.name for obj in props]
 
 
 def _side_of(name: str) -> str:
@@ -373,7 +373,7 @@ def _side_of(name: str) -> str:
 
 
 def title_of(character: SoftGroundCharacter) -> str:
-    """What the user calls a character: its armature's name, or that of the thing."""
+    """What the user calls a character: its armature's name, or that of the prop."""
     return character.armature.name if character.armature else character.name
 
 

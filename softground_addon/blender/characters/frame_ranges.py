@@ -18,13 +18,13 @@ LEVEL = 1e-6
 """A curve that goes straight on by less than this in a frame stays where it is: rounding."""
 
 
-def animated_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[int, int] | None:
+def animated_frames(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[int, int] | None:
     """First and last frame of the animation of an object, and of those that it is parented to.
 
     Where there is none, of what its constraints follow. Curves that go on, by a modifier or by extrapolation, last as
     long as the scene.
     """
-    ranges = list(_ranges(thing, frozenset()))
+    ranges = list(_ranges(obj, frozenset()))
     if not ranges:
         return None
     starts, ends = zip(*ranges, strict=True)
@@ -35,12 +35,12 @@ def animated_frames(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[in
     return floor(first), ceil(last)
 
 
-def _ranges(thing: bpy.types.Object, followers: frozenset[bpy.types.Object]) -> Iterator[Range]:
+def _ranges(obj: bpy.types.Object, followers: frozenset[bpy.types.Object]) -> Iterator[Range]:
     """Ranges of what animates an object; `followers` are those that are asked about already."""
-    found = [one for node in (thing, *ancestors(thing)) if node.animation_data for one in _of_data(node.animation_data)]
+    found = [one for node in (obj, *ancestors(obj)) if node.animation_data for one in _of_data(node.animation_data)]
     if not found:
-        followers |= {thing}
-        found = [one for leader in leaders(thing) - followers for one in _ranges(leader, followers)]
+        followers |= {obj}
+        found = [one for leader in leaders(obj) - followers for one in _ranges(leader, followers)]
     yield from found
 
 
@@ -94,19 +94,19 @@ def _of_cycles(cycles: bpy.types.FModifierCycles, first: float, last: float) -> 
     return first - lengths[0], last + lengths[1]
 
 
-def ancestors(thing: bpy.types.Object) -> list[bpy.types.Object]:
+def ancestors(obj: bpy.types.Object) -> list[bpy.types.Object]:
     """An object's parents, nearest first."""
-    found, parent = [], thing.parent
+    found, parent = [], obj.parent
     while parent is not None:
         found.append(parent)
         parent = parent.parent
     return found
 
 
-def leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+def leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
     """Objects that the constraints of an object and of its bones follow."""
-    bones = thing.pose.bones if thing.pose else ()
-    constraints: list[Any] = [one for owner in (thing, *bones) for one in owner.constraints if not one.mute]
+    bones = obj.pose.bones if obj.pose else ()
+    constraints: list[Any] = [one for owner in (obj, *bones) for one in owner.constraints if not one.mute]
     followed = [getattr(one, "target", None) for one in constraints]
     followed += [weighted.target for one in constraints if one.type == "ARMATURE" for weighted in one.targets]
-    return {leader for leader in followed if leader is not None} - {thing}
+    return {leader for leader in followed if leader is not None} - {obj}

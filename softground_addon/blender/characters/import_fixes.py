@@ -35,8 +35,8 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
     InputError
         If it is linked from another file.
     """
-    tops = dict.fromkeys([thing, *ancestors(thing)][-1] for thing in (armature, *meshes_on(scene, armature)))
-    linked = next((thing for thing in tops if thing.library), None)
+    tops = dict.fromkeys([obj, *ancestors(obj)][-1] for obj in (armature, *meshes_on(scene, armature)))
+    linked = next((obj for obj in tops if obj.library), None)
     if linked is not None:
         raise InputError(
             f"'{linked.name}' is linked from another file: make a library override of it (Object > Library Override > "
@@ -44,9 +44,9 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
         )
     empty = bpy.data.objects.new(name, None)
     (armature.users_collection or (scene.collection,))[0].objects.link(empty)
-    for thing in tops:
-        thing.parent = empty
-        thing.matrix_parent_inverse.identity()
+    for obj in tops:
+        obj.parent = empty
+        obj.matrix_parent_inverse.identity()
     return empty
 
 

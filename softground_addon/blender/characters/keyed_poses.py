@@ -115,8 +115,8 @@ _NO_DELTA = {
 }
 
 
-def _has_deltas(thing: bpy.types.Object) -> bool:
-    return any(tuple(getattr(thing, name)) != none for name, none in _NO_DELTA.items())
+def _has_deltas(obj: bpy.types.Object) -> bool:
+    return any(tuple(getattr(obj, name)) != none for name, none in _NO_DELTA.items())
 
 
 def _follows_its_parent(bone: bpy.types.Bone) -> bool:
@@ -142,25 +142,25 @@ def _from_parent(bone: bpy.types.Bone) -> Array:
     return matrix
 
 
-def _transforms(thing: bpy.types.Object | bpy.types.PoseBone, path: str, times: Array) -> Array:
+def _transforms(obj: bpy.types.Object | bpy.types.PoseBone, path: str, times: Array) -> Array:
     """What the channels of an object or a bone come to over time, (F, 4, 4).
 
     The object's curves have its channels at `path`; those that no curve animates stay as they are.
     """
-    curves = [curve for curve in _curves(thing.id_data.animation_data) if curve.data_path.startswith(path)]
-    channel = partial(_channel, thing, curves, path, times)
+    curves = [curve for curve in _curves(obj.id_data.animation_data) if curve.data_path.startswith(path)]
+    channel = partial(_channel, obj, curves, path, times)
     result = np.zeros((len(times), 4, 4))
     with np.errstate(invalid="ignore"):  # of broken keys
-        result[:, :3, :3] = _turns(thing.rotation_mode, channel) * channel("scale")[:, None]
+        result[:, :3, :3] = _turns(obj.rotation_mode, channel) * channel("scale")[:, None]
     result[:, :3, 3] = channel("location")
     result[:, 3, 3] = 1.0
     return result
 
 
 def _channel(
-    thing: bpy.types.Object | bpy.types.PoseBone, curves: Iterable[bpy.types.FCurve], path: str, times: Array, name: str
+    obj: bpy.types.Object | bpy.types.PoseBone, curves: Iterable[bpy.types.FCurve], path: str, times: Array, name: str
 ) -> Array:
-    values = np.tile(np.array(getattr(thing, name), dtype=float), (len(times), 1))
+    values = np.tile(np.array(getattr(obj, name), dtype=float), (len(times), 1))
     for curve in curves:
         if curve.data_path == path + name:
             values[:, curve.array_index] = _values(curve, times)

@@ -21,7 +21,7 @@ _FLAT = 1e-9
 """An object whose scale along one axis is smaller than this part of the largest is squashed flat."""
 
 
-def check_things(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, ...]) -> None:
+def check_props(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, ...]) -> None:
     """Raise InputError, naming the remedy, if an object that should print cannot.
 
     Parameters
@@ -34,26 +34,24 @@ def check_things(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, 
     for source in sources:
         if not source.object:
             continue
-        thing = next((thing for thing in scene.objects if thing.name_full == source.object), None)
-        if thing is None:
+        obj = next((obj for obj in scene.objects if obj.name_full == source.object), None)
+        if obj is None:
             raise InputError(
                 f"Sole '{source.name}' of '{owner}': object '{source.object}' is gone, choose another one or remove "
                 "the sole."
             )
-        if thing.type != "MESH":
+        if obj.type != "MESH":
+            raise InputError(f"'{obj.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")
+        if obj.mode == "EDIT":
+            raise InputError(f"'{obj.name}', which prints, is in Edit Mode: leave it with Tab first.")
+        if obj == scene.softground.ground:
             raise InputError(
-                f"'{thing.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'."
-            )
-        if thing.mode == "EDIT":
-            raise InputError(f"'{thing.name}', which prints, is in Edit Mode: leave it with Tab first.")
-        if thing == scene.softground.ground:
-            raise InputError(
-                f"'{thing.name}' is the ground and cannot print on itself: choose another object for sole "
+                f"'{obj.name}' is the ground and cannot print on itself: choose another object for sole "
                 f"'{source.name}' of '{owner}', or another ground."
             )
 
 
-def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
+def surface_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Array, NDArray[np.intp]]:
     """Vertices (V, 3) and triangles (T, 3) of a mesh object in its own frame, with its modifiers.
 
     Without them where the object is hidden in the scene: Blender does not evaluate it then.
@@ -65,16 +63,16 @@ def surface_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Array, 
     """
     scene.view_layers[0].update()
     depsgraph = scene.view_layers[0].depsgraph
-    evaluated = thing.evaluated_get(depsgraph) if depsgraph else thing
+    evaluated = obj.evaluated_get(depsgraph) if depsgraph else obj
     mesh = evaluated.to_mesh()
     try:
         vertices, triangles = mesh_arrays.positions(mesh), mesh_arrays.triangles(mesh)
     finally:
         evaluated.to_mesh_clear()
     if not len(triangles):
-        raise InputError(f"'{thing.name}' has no faces to print with: give its mesh faces, or choose another object.")
+        raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or choose another object.")
     if not np.isfinite(vertices).all():
-        raise InputError(f"The mesh of '{thing.name}' holds vertices that are nowhere (NaN or infinite): delete them.")
+        raise InputError(f"The mesh of '{obj.name}' holds vertices that are nowhere (NaN or infinite): delete them.")
     return vertices.astype(float), triangles
 
 
@@ -96,23 +94,23 @@ def prop_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> 
     InputError
         If its mesh has no faces, or its scale is 0 or changes.
     """
-    thing = next(thing for thing in scene.objects if thing.name_full == source.object)
+    obj = next(obj for obj in scene.objects if obj.name_full == source.object)
     turn = nearest_rotation(matrices[:1, :3, :3])[0]
     stretch = turn.T @ matrices[0, :3, :3]
     sizes = np.linalg.svd(stretch, compute_uv=False)
     if not sizes.min() > _FLAT * max(sizes.max(), 1e-300):
         raise InputError(
-            f"'{thing.name}' has a scale of zero: set its scale, or apply it (Object > Apply > Scale), also on its "
+            f"'{obj.name}' has a scale of zero: set its scale, or apply it (Object > Apply > Scale), also on its "
             "parents."
         )
     rotation = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(stretch))
     change = np.abs(matrices[:, :3, :3] - rotation @ stretch).max(axis=(1, 2)) / sizes.max()
     if change.max() > _SAME_SIZE:
         raise InputError(
-            f"'{thing.name}' changes its size or shape, but prints as a rigid body: take the keys off its scale, or "
+            f"'{obj.name}' changes its size or shape, but prints as a rigid body: take the keys off its scale, or "
             "let a child that keeps its size print."
         )
-    vertices, triangles = surface_of(scene, thing)
+    vertices, triangles = surface_of(scene, obj)
     vertices = vertices @ stretch.T
     mass = mass_properties(vertices, triangles)
     transforms = displacement(rotation, -mass.centre, matrices[:, :3, 3])

@@ -25,7 +25,7 @@ class Recording:
         Transposed matrices of the bones in the armature's space, as Blender gives them [Blender units].
     world : (F, 4, 4) float array
         Of the armature [Blender units].
-    things : mapping of str to (F, 4, 4) float array
+    props : mapping of str to (F, 4, 4) float array
         World matrices of the objects by their names [m].
     units : SceneUnits
         What frames and Blender units come to.
@@ -35,7 +35,7 @@ class Recording:
     bones: tuple[str, ...]
     poses: NDArray[np.float32]
     world: Array
-    things: Mapping[str, Array]
+    props: Mapping[str, Array]
     units: SceneUnits
 
     @property
@@ -50,8 +50,8 @@ class Recording:
 
     def of(self, samples: NDArray[np.intp]) -> Recording:
         """Some of the samples."""
-        things = {name: matrices[samples] for name, matrices in self.things.items()}
-        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], things, self.units)
+        props = {name: matrices[samples] for name, matrices in self.props.items()}
+        return Recording(self.frames[samples], self.bones, self.poses[samples], self.world[samples], props, self.units)
 
     def _in_metres(self, matrices: Array) -> Array:
         matrices[..., :3, :] *= self.units.unit_scale_m

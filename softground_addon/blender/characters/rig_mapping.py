@@ -125,16 +125,16 @@ def _with_missing(
     return {**joints, **{joint: found[joint] for joint in wanted if joint in found and joint not in joints}}
 
 
-def instances_armature(thing: bpy.types.Object) -> bool:
+def instances_armature(obj: bpy.types.Object) -> bool:
     """Whether an object shows an armature of the collection that it instances, as linked characters are at first."""
-    collection = thing.instance_collection
+    collection = obj.instance_collection
     return collection is not None and any(part.type == "ARMATURE" for part in collection.all_objects)
 
 
-def instances_mesh(thing: bpy.types.Object) -> bool:
+def instances_mesh(obj: bpy.types.Object) -> bool:
     """Whether an object shows a mesh of the collection that it instances, and no armature."""
-    collection = thing.instance_collection
-    if collection is None or instances_armature(thing):
+    collection = obj.instance_collection
+    if collection is None or instances_armature(obj):
         return False
     return any(part.type == "MESH" for part in collection.all_objects)
 

@@ -24,7 +24,7 @@ from ..settings import found, name_of, units_of
 from .control_poses import PoseRecorder
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
 from .motion_assembly import assemble_motion
-from .prop_extraction import check_things, prop_motion
+from .prop_extraction import check_props, prop_motion
 from .recording import Recording
 from .rig_mapping import CHOOSE_CONTACTS, RigMapping, SoleSource, require_armature
 from .skin_sampling import RigSkin, meshes_on, read_skin
@@ -102,14 +102,14 @@ def sample_character(
     _check_frames(frames)
     bones = [*bones_of(mapping), *(recorder.bones if recorder else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
-    things = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
+    props = list(dict.fromkeys(source.object for source in mapping.soles if source.object))
     rig, skin = name_of(armature), None
     if on_bones and meshes_on(scene, armature):
         skin = yield from meanwhile(0, read_skin.slices(scene, armature))
         armature = found(rig)
     units = units or units_of(scene)
     bones += skin.bones if skin and len(frames) <= LONGEST else ()
-    recording = yield from record(scene, armature, frames, bones, units, things, recorder)
+    recording = yield from record(scene, armature, frames, bones, units, props, recorder)
     return (yield from recorded_motion(scene, found(rig), mapping, recording, skin, mass=mass, skin_mass=skin_mass))
 
 
@@ -135,7 +135,7 @@ def recorded_motion(
     """
     _check_recording(armature.name, recording)
     carried = {
-        source.name: prop_motion(scene, source, recording.things[source.object])[0]
+        source.name: prop_motion(scene, source, recording.props[source.object])[0]
         for source in mapping.soles
         if source.object
     }
@@ -155,19 +155,19 @@ def record(
     frames: range,
     bones: Iterable[str],
     units: SceneUnits,
-    things: Sequence[str] = (),
+    props: Sequence[str] = (),
     recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
     """Where some bones of a rig and some objects are over time; yields the number of frames read."""
     names = list(dict.fromkeys(bones))
     with without_layer(armature):
-        keyed = not things and is_moved_by_keys_alone(armature, names)
+        keyed = not props and is_moved_by_keys_alone(armature, names)
     if keyed:
         return (yield from _read_keys(armature.name_full, frames, names, units, recorder))
-    return (yield from _evaluate(scene, armature.name_full, frames, names, units, things, recorder))
+    return (yield from _evaluate(scene, armature.name_full, frames, names, units, props, recorder))
 
 
-def sample_thing(
+def sample_prop(
     scene: bpy.types.Scene,
     name: str,
     mapping: RigMapping,
@@ -176,7 +176,7 @@ def sample_thing(
     frames: range,
     units: SceneUnits,
 ) -> Sampling:
-    """Read frame by frame a thing without a rig: one or more objects that fall, roll or slide together.
+    """Read frame by frame a prop without a rig: one or more objects that fall, roll or slide together.
 
     Parameters
     ----------
@@ -189,12 +189,12 @@ def sample_thing(
     """
     _check_mass(name, mass)
     sources = tuple(source for source in mapping.soles if source.object)
-    check_things(scene, name, sources)
+    check_props(scene, name, sources)
     _check_frames(frames)
-    things = list(dict.fromkeys(source.object for source in sources))
-    recording = yield from _evaluate(scene, "", frames, [], units, things)
+    props = list(dict.fromkeys(source.object for source in sources))
+    recording = yield from _evaluate(scene, "", frames, [], units, props)
     _check_finite(name, recording)
-    parts = [prop_motion(scene, source, recording.things[source.object]) for source in sources]
+    parts = [prop_motion(scene, source, recording.props[source.object]) for source in sources]
     volumes = np.array([volume for _, volume in parts])
     shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
     motions = tuple(motion for motion, _ in parts)
@@ -230,17 +230,17 @@ def _read_keys(
     chain = with_parents(object_named(armature), bones)
     poses = np.empty((len(frames), len(chain), 4, 4), dtype=np.float32)
     for done, name in enumerate(chain):
-        thing = object_named(armature)
-        above = thing.data.bones[name].parent
+        obj = object_named(armature)
+        above = obj.data.bones[name].parent
         parent = np.swapaxes(poses[:, chain.index(above.name) if above else done], -1, -2)
-        with without_layer(thing):
-            poses[:, done] = np.swapaxes(keyed_pose(thing, name, times, parent), -1, -2)
+        with without_layer(obj):
+            poses[:, done] = np.swapaxes(keyed_pose(obj, name, times, parent), -1, -2)
             if recorder:
-                recorder.note_keys(thing, name, times, poses[:, done])
+                recorder.note_keys(obj, name, times, poses[:, done])
         yield len(frames) * (done + 1) // len(chain)
-    thing = object_named(armature)
-    with without_layer(thing):
-        world = keyed_world(thing, times)
+    obj = object_named(armature)
+    with without_layer(obj):
+        world = keyed_world(obj, times)
     if recorder:
         recorder.world[:] = world
     return Recording(
@@ -248,7 +248,7 @@ def _read_keys(
         bones=tuple(chain),
         poses=poses,
         world=world,
-        things={},
+        props={},
         units=units,
     )
 
@@ -259,15 +259,15 @@ def _evaluate(
     frames: range,
     bones: Sequence[str],
     units: SceneUnits,
-    things: Sequence[str],
+    props: Sequence[str],
     recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
-    """Record the matrices frame by frame, yielding the number of frames done; without an armature, of things alone."""
+    """Record the matrices frame by frame, yielding the number of frames done; without an armature, of props alone."""
     poses = np.empty((len(frames), len(bones), 4, 4), dtype=np.float32)
-    thing_matrices = np.empty((len(frames), len(things), 4, 4))
+    prop_matrices = np.empty((len(frames), len(props), 4, 4))
     armature_matrices = np.tile(np.eye(4), (len(frames), 1, 1))
-    simulated = any(is_simulated(object_named(thing)) for thing in things)
-    source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, things)
+    simulated = any(is_simulated(object_named(obj)) for obj in props)
+    source = user_scene(scene) if simulated else sampling_scene(scene, armature, bones, props)
     with source as name:
         for frame in _simulated_before(scene, frames.start) if simulated else ():
             with handlers_silent():
@@ -290,24 +290,24 @@ def _evaluate(
                     poses[done] = buffer[places]
                     if recorder:
                         recorder.note(done, evaluated)
-            for place, thing in enumerate(things):
-                thing_matrices[done, place] = object_named(thing).evaluated_get(depsgraph).matrix_world
+            for place, obj in enumerate(props):
+                prop_matrices[done, place] = object_named(obj).evaluated_get(depsgraph).matrix_world
             yield done + 1
     yield len(frames)
 
-    thing_matrices[..., :3, :] *= units.unit_scale_m
+    prop_matrices[..., :3, :] *= units.unit_scale_m
     return Recording(
         frames=np.array(frames, dtype=float),
         bones=tuple(bones),
         poses=poses,
         world=armature_matrices,
-        things={thing: thing_matrices[:, place] for place, thing in enumerate(things)},
+        props={obj: prop_matrices[:, place] for place, obj in enumerate(props)},
         units=units,
     )
 
 
 @contextmanager
-def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], things: Sequence[str]) -> Iterator[str]:
+def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], props: Sequence[str]) -> Iterator[str]:
     """Name of a scene in which only the given bones and objects are evaluated; gone afterwards, whatever happens.
 
     It holds a probe that depends on them instead of themselves: so they are evaluated even where the user hides them,
@@ -320,9 +320,9 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
     try:
         for setting in _SCENE_TIME:
             setattr(temporary.render, setting, getattr(scene.render, setting))
-        for thing, bone in (*((armature, bone) for bone in bones), *((thing, "") for thing in things)):
+        for obj, bone in (*((armature, bone) for bone in bones), *((obj, "") for obj in props)):
             dependence = probe.constraints.new("COPY_LOCATION")
-            dependence.target, dependence.subtarget = object_named(thing), bone
+            dependence.target, dependence.subtarget = object_named(obj), bone
         temporary.collection.objects.link(probe)
         yield names[0]
     finally:
@@ -333,9 +333,9 @@ def sampling_scene(scene: bpy.types.Scene, armature: str, bones: Sequence[str], 
                 bpy.data.objects.remove(left_probe)
 
 
-def is_simulated(thing: bpy.types.Object) -> bool:
+def is_simulated(obj: bpy.types.Object) -> bool:
     """Whether Blender's rigid bodies move an object, or one that it is parented to."""
-    node: bpy.types.Object | None = thing
+    node: bpy.types.Object | None = obj
     while node is not None:
         if node.rigid_body and node.rigid_body.type == "ACTIVE":
             return True
@@ -379,7 +379,7 @@ def object_named(name: str) -> bpy.types.Object:
     """Object by its full name, which tells linked ones from local ones."""
     found = bpy.data.objects.get(name)
     if found is None or found.name_full != name:
-        found = next((thing for thing in bpy.data.objects if thing.name_full == name), None)
+        found = next((obj for obj in bpy.data.objects if obj.name_full == name), None)
     if found is None:
         raise InputError(f"Object '{name}' is gone: choose another one for the character.")
     return found
@@ -419,7 +419,7 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
     for source in mapping.soles:
         if not source.bone and not source.object:
             raise InputError(f"Sole '{source.name}' of '{name}' has neither a bone nor an object: choose one.")
-    check_things(scene, name, mapping.soles)
+    check_props(scene, name, mapping.soles)
     missing = [bone for bone in bones_of(mapping) if bone not in bones]
     if missing:
         raise InputError(f"Armature '{name}' has no bone '{missing[0]}': choose the bones of the character again.")
@@ -433,19 +433,19 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
 
 def is_animated(armature: bpy.types.Object) -> bool:
     """Whether anything could move the rig: keys, NLA, drivers or constraints, its own or its parents'."""
-    thing: bpy.types.Object | None = armature
-    while thing is not None:
-        animation = thing.animation_data
+    obj: bpy.types.Object | None = armature
+    while obj is not None:
+        animation = obj.animation_data
         if animation and (animation.action or animation.drivers or any(track.strips for track in animation.nla_tracks)):
             return True
-        if thing.constraints or (thing.type == "ARMATURE" and any(bone.constraints for bone in thing.pose.bones)):
+        if obj.constraints or (obj.type == "ARMATURE" and any(bone.constraints for bone in obj.pose.bones)):
             return True
-        thing = thing.parent
+        obj = obj.parent
     return bool(armature.data.animation_data)
 
 
 def _check_finite(name: str, recording: Recording) -> None:
-    for matrices in chain([recording.armature], map(recording.bone, recording.bones), recording.things.values()):
+    for matrices in chain([recording.armature], map(recording.bone, recording.bones), recording.props.values()):
         bad = ~(np.abs(matrices) <= _FARTHEST).all(axis=(1, 2))
         if bad.any():
             raise InputError(

@@ -27,40 +27,40 @@ def chosen(
     InputError
         If there is nothing to add.
     """
-    picked = list(dict.fromkeys(thing for thing in (active, *selected) if thing is not None))
+    picked = list(dict.fromkeys(obj for obj in (active, *selected) if obj is not None))
     known = {character.armature for character in scene.softground.characters}
-    rigs = list(dict.fromkeys(skin_rig(scene, rig) for thing in picked for rig in _rigs_of(thing, known)))
+    rigs = list(dict.fromkeys(skin_rig(scene, rig) for obj in picked for rig in _rigs_of(obj, known)))
     fresh = [rig for rig in rigs if rig not in known]
-    things = [thing for thing in picked if thing.type == "MESH" and not _rigs_of(thing, known)]
-    moving = [thing for thing in things if moves(thing)]
+    props = [obj for obj in picked if obj.type == "MESH" and not _rigs_of(obj, known)]
+    moving = [obj for obj in props if moves(obj)]
     if rigs and (not moving or (active is not None and _rigs_of(active, known))):
         return fresh or rigs[:1], []
     if fresh or moving:
-        return fresh, moving if fresh else things
+        return fresh, moving if fresh else props
     walkers = [rig for rig in walkers_of(scene) if rig not in known]
     if len(walkers) == 1:
         return walkers, []
-    if not things:
+    if not props:
         if len(walkers) > 1:
             raise InputError(f"Several rigs move here ({_names(walkers)}): select those that walk.")
         require_armature(active)
-    return [], things
+    return [], props
 
 
-def moves(thing: bpy.types.Object) -> bool:
+def moves(obj: bpy.types.Object) -> bool:
     """Whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
-    return is_animated(thing) or is_simulated(thing)
+    return is_animated(obj) or is_simulated(obj)
 
 
-def _rigs_of(thing: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def _rigs_of(obj: bpy.types.Object, known: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """The armature that an object is or wears, or hangs on if it is not `known` yet; those below an empty."""
-    if thing.type == "ARMATURE" or instances_armature(thing):
-        return [thing]
-    if thing.type == "MESH":
-        above = [one for one in ancestors(thing) if one.type == "ARMATURE" and one not in known]
-        wears = thing.find_armature()
+    if obj.type == "ARMATURE" or instances_armature(obj):
+        return [obj]
+    if obj.type == "MESH":
+        above = [one for one in ancestors(obj) if one.type == "ARMATURE" and one not in known]
+        wears = obj.find_armature()
         return [wears] if wears else above[:1]
-    return [below for below in thing.children_recursive if below.type == "ARMATURE"]
+    return [below for below in obj.children_recursive if below.type == "ARMATURE"]
 
 
 def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Object:
@@ -75,21 +75,21 @@ def skin_rig(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.Ob
     return followers[0] if len(followers) == 1 else armature
 
 
-def _all_leaders(thing: bpy.types.Object) -> set[bpy.types.Object]:
+def _all_leaders(obj: bpy.types.Object) -> set[bpy.types.Object]:
     """What an object follows by its constraints and parents, and what those follow."""
     found: set[bpy.types.Object] = set()
-    waiting = [thing]
+    waiting = [obj]
     while waiting:
         one = waiting.pop()
         further = (leaders(one) | set(ancestors(one))) - found
         found |= further
         waiting += further
-    return found - {thing}
+    return found - {obj}
 
 
 def walkers_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The armatures of a scene that move; where some of them move a skin, those."""
-    moving = [thing for thing in scene.objects if thing.type == "ARMATURE" and is_animated(thing)]
+    moving = [obj for obj in scene.objects if obj.type == "ARMATURE" and is_animated(obj)]
     rigs = list(dict.fromkeys(skin_rig(scene, rig) for rig in moving))
     return [rig for rig in rigs if meshes_on(scene, rig)] or rigs
 
@@ -104,7 +104,7 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
     """
     if scene.softground.characters:
         return
-    armatures = [thing for thing in scene.objects if thing.type == "ARMATURE"]
+    armatures = [obj for obj in scene.objects if obj.type == "ARMATURE"]
     if not armatures:
         inside = next(filter(instances_armature, scene.objects), None)
         if inside:
@@ -127,5 +127,5 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
     add_character(scene, rigs[0])
 
 
-def _names(things: Sequence[bpy.types.Object]) -> str:
-    return ", ".join(f"'{thing.name}'" for thing in things)
+def _names(props: Sequence[bpy.types.Object]) -> str:
+    return ", ".join(f"'{obj.name}'" for obj in props)

@@ -71,20 +71,20 @@ class RigSkin:
 def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """The rendered mesh objects that an armature deforms or that hang on its bones."""
     return [
-        thing
-        for thing in scene.objects
-        if thing.type == "MESH" and not thing.hide_render and (_deformed_by(thing, armature) or _hangs(thing, armature))
+        obj
+        for obj in scene.objects
+        if obj.type == "MESH" and not obj.hide_render and (_deformed_by(obj, armature) or _hangs(obj, armature))
     ]
 
 
-def _deformed_by(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
-    return any(m.type == "ARMATURE" and m.object == armature for m in thing.modifiers) or (
-        thing.parent == armature and thing.parent_type == "ARMATURE"
+def _deformed_by(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return any(m.type == "ARMATURE" and m.object == armature for m in obj.modifiers) or (
+        obj.parent == armature and obj.parent_type == "ARMATURE"
     )
 
 
-def _hangs(thing: bpy.types.Object, armature: bpy.types.Object) -> bool:
-    return thing.parent == armature and thing.parent_type == "BONE" and thing.parent_bone in armature.data.bones
+def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return obj.parent == armature and obj.parent_type == "BONE" and obj.parent_bone in armature.data.bones
 
 
 @sliced
@@ -97,16 +97,14 @@ def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigS
         If one is being edited.
     """
     pieces, rig = [], name_of(armature)
-    for name in [name_of(thing) for thing in meshes_on(scene, armature)]:
-        thing, armature = found(name), found(rig)
-        if thing.mode == "EDIT":
-            raise InputError(
-                f"'{thing.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first."
-            )
-        if not len(_mesh_of(thing).polygons):
+    for name in [name_of(obj) for obj in meshes_on(scene, armature)]:
+        obj, armature = found(name), found(rig)
+        if obj.mode == "EDIT":
+            raise InputError(f"'{obj.name}', which '{armature.name}' wears, is in Edit Mode: leave it with Tab first.")
+        if not len(_mesh_of(obj).polygons):
             continue
-        if _hangs(thing, armature):
-            pieces.append(_hung(thing, armature))
+        if _hangs(obj, armature):
+            pieces.append(_hung(obj, armature))
         else:
             pieces.append((yield from _deformed(name, rig)))
         yield
@@ -142,19 +140,19 @@ class _Piece:
     hung: bool = False
 
 
-def _mesh_of(thing: bpy.types.Object) -> bpy.types.Mesh:
-    mesh = thing.data
-    assert isinstance(mesh, bpy.types.Mesh), thing.name
+def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+    mesh = obj.data
+    assert isinstance(mesh, bpy.types.Mesh), obj.name
     return mesh
 
 
-def _hung(thing: bpy.types.Object, armature: bpy.types.Object) -> _Piece:
-    mesh, bone = _mesh_of(thing), armature.data.bones[thing.parent_bone]
+def _hung(obj: bpy.types.Object, armature: bpy.types.Object) -> _Piece:
+    mesh, bone = _mesh_of(obj), armature.data.bones[obj.parent_bone]
     parent = np.eye(4)
     if not bone.use_relative_parent:
         parent = np.array(bone.matrix_local)
         parent[:3, 3] += parent[:3, 1] * bone.length
-    to_armature = parent @ np.array(thing.matrix_parent_inverse @ thing.matrix_basis)
+    to_armature = parent @ np.array(obj.matrix_parent_inverse @ obj.matrix_basis)
     count = len(mesh.vertices)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
@@ -169,18 +167,18 @@ def _hung(thing: bpy.types.Object, armature: bpy.types.Object) -> _Piece:
 
 def _deformed(name: ObjectName, rig: ObjectName) -> Slices[_Piece]:
     vertex, group, weight = yield from _weights(name)
-    thing, armature = found(name), found(rig)
-    mesh, bones = _mesh_of(thing), armature.data.bones
+    obj, armature = found(name), found(rig)
+    mesh, bones = _mesh_of(obj), armature.data.bones
     count = len(mesh.vertices)
-    names = tuple(group.name for group in thing.vertex_groups)
+    names = tuple(group.name for group in obj.vertex_groups)
     if vertex.max(initial=-1) >= count or group.max(initial=-1) >= len(names):
-        raise InputError(f"'{thing.name}' was changed while it was read: try again.")
+        raise InputError(f"'{obj.name}' was changed while it was read: try again.")
     deforms = np.array([name in bones and bones[name].use_deform for name in names] or [False])[group]
     vertex, group, weight = vertex[deforms], group[deforms], weight[deforms]
     used, group = np.unique(group, return_inverse=True)
     total = np.bincount(vertex, weight, count)
     held = total[vertex] > _LEAST_WEIGHT
-    to_armature = np.array(armature.matrix_world.inverted_safe() @ thing.matrix_world)
+    to_armature = np.array(armature.matrix_world.inverted_safe() @ obj.matrix_world)
     return _Piece(
         _moved(to_armature, mesh_arrays.positions(mesh)),
         mesh_arrays.triangles(mesh),

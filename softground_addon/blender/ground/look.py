@@ -18,8 +18,8 @@ from .materials import MARK, OVER, ensure_material, ensure_over
 def follow(scene: bpy.types.Scene) -> None:
     """Show the scene's surface on its ground wherever the add-on's own material is."""
     ground = scene.softground.ground
-    for thing in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
-        _show(thing, scene.softground.material.surface, over_theirs=False)
+    for obj in dict.fromkeys((ground, display_mesh_of(ground))) if ground else ():
+        _show(obj, scene.softground.material.surface, over_theirs=False)
 
 
 def apply(ground: bpy.types.Object, surface: str) -> int:
@@ -30,22 +30,22 @@ def apply(ground: bpy.types.Object, surface: str) -> int:
     int
         Number of the user's materials that it is mixed over.
     """
-    thing = display_mesh_of(ground)
-    if not thing.material_slots:
-        thing.data.materials.append(ensure_material(surface))
-    _show(thing, surface, over_theirs=True)
-    return sum(slot.material is not None and slot.material.get(OVER) is not None for slot in thing.material_slots)
+    obj = display_mesh_of(ground)
+    if not obj.material_slots:
+        obj.data.materials.append(ensure_material(surface))
+    _show(obj, surface, over_theirs=True)
+    return sum(slot.material is not None and slot.material.get(OVER) is not None for slot in obj.material_slots)
 
 
-def take_off(thing: bpy.types.Object) -> None:
+def take_off(obj: bpy.types.Object) -> None:
     """Give an object the user's materials back, over which the add-on's were mixed."""
-    for slot in _writable_slots(thing):
+    for slot in _writable_slots(obj):
         if (mixed := slot.material) and (theirs := mixed.get(OVER)):
             _replace(slot, theirs)
 
 
-def _show(thing: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
-    for slot in _writable_slots(thing):
+def _show(obj: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
+    for slot in _writable_slots(obj):
         now = slot.material
         if now is None:
             if over_theirs:
@@ -58,9 +58,9 @@ def _show(thing: bpy.types.Object, surface: str, *, over_theirs: bool) -> None:
             slot.material = ensure_over(now, surface)
 
 
-def _writable_slots(thing: bpy.types.Object) -> Iterator[Any]:
-    for slot in thing.material_slots:
-        owner = thing if slot.link == "OBJECT" else thing.data
+def _writable_slots(obj: bpy.types.Object) -> Iterator[Any]:
+    for slot in obj.material_slots:
+        owner = obj if slot.link == "OBJECT" else obj.data
         if owner.library is None:
             yield slot
 

@@ -42,7 +42,7 @@ def _result(layout: Any, summary: Any) -> None:
 
 
 def _warnings(layout: Any, warnings: Sequence[str]) -> None:
-    """How many things a bake has warned of; they are long, and shown when asked for."""
+    """How many warnings a bake has; they are long, and shown when asked for."""
     if warnings:
         text = f"{len(warnings)} Warnings" if len(warnings) > 1 else "1 Warning"
         layout.operator("softground.show_warnings", text=text, icon="ERROR", translate=False)

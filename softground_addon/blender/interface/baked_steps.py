@@ -92,7 +92,7 @@ class BakedStep:
 
     @cached_property
     def _baked_outline(self) -> Array:
-        """Seen from above, as it was baked, (N, 2) [m]: of a foot its sole, of other things what they touched."""
+        """Seen from above, as it was baked, (N, 2) [m]: of a foot its sole, of a prop what it touched."""
         made_by, step = self.baked.pressed_by, self.baked
         if made_by is not None and made_by.pressing.sole.prop is None:
             steps = made_by.steps(step.load_frames)

@@ -178,12 +178,10 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
             added = character_setup.add_vertex_contacts(character, context.object)
         else:
             characters = scene.softground.characters
-            things = [thing for thing in context.selected_objects if all(thing != one.armature for one in characters)]
-            wearer = next(
-                (one for one in characters if any(one.armature in ancestors(thing) for thing in things)), None
-            )
+            props = [obj for obj in context.selected_objects if all(obj != one.armature for one in characters)]
+            wearer = next((one for one in characters if any(one.armature in ancestors(obj) for obj in props)), None)
             character = wearer or active_character(scene)
-            added = character_setup.add_object_contacts(scene, character, things)
+            added = character_setup.add_object_contacts(scene, character, props)
         self.report({"INFO"}, f"'{character_setup.title_of(character)}' also prints with {', '.join(added)}")
         return {"FINISHED"}
 

@@ -30,7 +30,7 @@ Reports = list[tuple[Literal["INFO", "WARNING"], str]]
 
 class SOFTGROUND_OT_add_character(Reading):
     """Add the selected characters: their feet, hips and limbs are recognized by the skin, by their names or by the rest
-    pose. Selected objects without a rig are added as things that fall, roll or slide. The animation is read, which Esc
+    pose. Selected objects without a rig are added as props that fall, roll or slide. The animation is read, which Esc
     cancels"""
 
     bl_idname = "softground.add_character"
@@ -74,7 +74,7 @@ def _added(
 def _add(
     scene: bpy.types.Scene, active: bpy.types.Object | None, selected: list[bpy.types.Object]
 ) -> jobs.Job[Reports]:
-    rigs, things = selection.chosen(scene, active, selected)
+    rigs, props = selection.chosen(scene, active, selected)
     reports: Reports = []
     for name in [settings.name_of(rig) for rig in rigs]:
         character = yield from character_setup.adding_character(scene, settings.found(name))
@@ -83,12 +83,12 @@ def _add(
             reports.append(("INFO", f"Added '{character.name}' with {soles}"))
         else:
             reports.append(("WARNING", f"Added '{character.name}', but found no feet: {CHOOSE_CONTACTS}"))
-    added = character_setup.add_things(scene, things) if things else []
+    added = character_setup.add_props(scene, props) if props else []
     if added:
         reports.append(("INFO", "Added " + ", ".join(f"'{one.name}' of {one.mass:g} kg" for one in added)))
-    for thing in things:
-        if not selection.moves(thing):
-            reports.append(("WARNING", f"'{thing.name}' does not move: give it keys or a rigid body before you bake"))
+    for obj in props:
+        if not selection.moves(obj):
+            reports.append(("WARNING", f"'{obj.name}' does not move: give it keys or a rigid body before you bake"))
     return reports
 
 
@@ -146,27 +146,27 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
 
 def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active object if it is a selected instance of a collection with meshes."""
-    thing = context.active_object
-    return thing if thing is not None and thing.select_get() and instances_mesh(thing) else None
+    obj = context.active_object
+    return obj if obj is not None and obj.select_get() and instances_mesh(obj) else None
 
 
 def _check_no_instance(context: bpy.types.Context) -> None:
-    if thing := _selected_instance(context):
+    if obj := _selected_instance(context):
         raise InputError(
-            f"'{thing.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
+            f"'{obj.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
             "Apply > Make Instances Real), select the mesh that is walked on, and press Create Ground again."
         )
 
 
 def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active object if it is a selected mesh that no character wears or carries and that does not print itself."""
-    thing = context.active_object
-    if thing is None or thing.type != "MESH" or not thing.select_get() or thing.find_armature():
+    obj = context.active_object
+    if obj is None or obj.type != "MESH" or not obj.select_get() or obj.find_armature():
         return None
     characters = settings.scene_of(context).softground.characters
-    above = frame_ranges.ancestors(thing)
-    belongs = any(one.armature in above or any(sole.object == thing for sole in one.soles) for one in characters)
-    return None if belongs else thing
+    above = frame_ranges.ancestors(obj)
+    belongs = any(one.armature in above or any(sole.object == obj for sole in one.soles) for one in characters)
+    return None if belongs else obj
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):

@@ -11,7 +11,7 @@ from .. import session, settings
 from ..characters.import_fixes import scale_to_metres
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
-from ..settings import is_set_up, is_thing
+from ..settings import is_prop, is_set_up
 from . import bake_result, outdated, prediction, preset_menu
 from .character_editing import active_character, active_sole, suggested_mass
 from .panel_base import ADVANCED, SidebarPanel
@@ -31,7 +31,7 @@ class SOFTGROUND_UL_characters(bpy.types.UIList):
         _property: Any,
         _index: int = 0,
     ) -> None:
-        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_thing(item) else "ERROR"
+        icon = "ARMATURE_DATA" if item.armature else "MESH_UVSPHERE" if is_prop(item) else "ERROR"
         layout.prop(item.armature or item, "name", text="", emboss=False, icon=icon)
 
 

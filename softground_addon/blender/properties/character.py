@@ -41,7 +41,7 @@ class SoftGroundPart(bpy.types.PropertyGroup):
 
 
 class SoftGroundSole(bpy.types.PropertyGroup):
-    """One thing that prints; `name` is what the report calls it."""
+    """One contact shape; `name` is what the report calls it."""
 
     side: EnumProperty(
         name="Side",
@@ -75,7 +75,7 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
 
     armature: PointerProperty(
         name="Armature",
-        description="Animated armature that leaves the prints; empty for things that fall, roll and slide",
+        description="Animated armature that leaves the prints; empty for props that fall, roll and slide",
         type=bpy.types.Object,
         poll=_is_armature,
     )

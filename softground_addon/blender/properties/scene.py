@@ -30,8 +30,7 @@ _CELL_SIZE = (
     "prints does not depend on it"
 )
 _TREAD = (
-    "Depth of the bars of shoe soles that the ground's render material shows in prints. "
-    "0 for bare feet, paws and things"
+    "Depth of the bars of shoe soles that the ground's render material shows in prints. 0 for bare feet, paws and props"
 )
 
 

@@ -22,9 +22,9 @@ from ...core.settings import BakeSettings
 from .. import settings
 from ..characters.control_poses import PoseRecorder
 from ..characters.import_fixes import size_of
-from ..characters.prop_extraction import check_things
+from ..characters.prop_extraction import check_props
 from ..characters.rig_mapping import RigMapping
-from ..characters.rig_sampling import sample_character, sample_thing
+from ..characters.rig_sampling import sample_character, sample_prop
 from ..ground import ground_checks, ground_mesh, painted_ground
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
@@ -90,7 +90,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
             "Character."
         )
     for one in wanted.characters:
-        check_things(scene, one.name, one.soles)
+        check_props(scene, one.name, one.soles)
     start, end = wanted.frames
     if end <= start:
         raise InputError(f"The frame range {start}-{end} is empty: set End after Start in the Bake panel.")
@@ -228,7 +228,7 @@ def sample_characters(
                 units=wanted,
             )
         else:
-            job = sample_thing(scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted)
+            job = sample_prop(scene, one.name, mapping, mass=one.mass_kg, frames=frames, units=wanted)
         motions.append((yield from counted(job, "sample", len(frames), part=number, parts=len(wanted.characters))))
         if recorder:
             rigs.append(ReadRig(controls, recorder.poses()))

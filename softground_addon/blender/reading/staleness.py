@@ -105,7 +105,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{display_mesh.name}' has been edited",
     }
-    of_things = {
+    of_objects = {
         ANIMATION: "The animation of '{}' has changed",
         PLACE: "'{}' or a parent of it was moved",
         MOVEMENT: "The rig of '{}', or what it follows, has changed",
@@ -113,7 +113,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     }
     kinds = (key.partition(":") for key in changed)
     return tuple(
-        dict.fromkeys(texts.get(kind) or of_things.get(kind, _UNKNOWN).format(name) for kind, _, name in kinds)
+        dict.fromkeys(texts.get(kind) or of_objects.get(kind, _UNKNOWN).format(name) for kind, _, name in kinds)
     )
 
 

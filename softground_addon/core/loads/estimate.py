@@ -48,7 +48,7 @@ def estimate_loads(
         The undisturbed ground.
     force_model : 'WHOLE_BODY' or 'IMPULSE'
     material : GroundMaterial
-        Its characteristic time shapes the impulse model and the landings of things without a skeleton; the
+        Its characteristic time shapes the impulse model and the landings of props without a skeleton; the
         whole-body model of a character does not depend on it.
     crisp_landings : bool
         See `whole_body_forces`.

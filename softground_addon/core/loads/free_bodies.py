@@ -1,4 +1,4 @@
-"""When a thing without a skeleton touches the ground and what the ground does to it, from its mass and its motion.
+"""When a prop without a skeleton touches the ground and what the ground does to it, from its mass and its motion.
 
 A body in the air feels nothing. On the ground it feels its weight, and what changes its momentum: m·(g + a). What stops
 a fall stops it within the ground's characteristic time, as in the paper (Eq. 8): animation and simulation stop it from

@@ -56,7 +56,7 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
         among them only where the ground ends.
     """
     if motion.centre is not None:
-        return []  # a thing may lie anywhere
+        return []  # a prop may lie anywhere
     shortest = REST_TIME * motion.pendulum_time / motion.time_step
     carried = contacts.touching.any(axis=1)
     missed = []

@@ -31,7 +31,7 @@ ADULT_LEG = 0.9
 """Leg length that times are given for [m]; they scale with its square root (equal Froude numbers)."""
 
 TALLEST, SMALLEST = 20.0, 0.05
-"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, few things are smaller."""
+"""Bodies beyond these are mostly of a file in other units [m]: nothing on legs was taller, little is smaller."""
 
 COARSER = 4.0
 """How much coarser the cells are at most, along the longest sole, than the preset says, for those along the shortest to
@@ -87,7 +87,7 @@ class SolePatch:
 
 @dataclass(frozen=True)
 class Sole:
-    """One thing that can print: a foot, a hand, a snowshoe.
+    """One contact shape: a foot, a hand, a snowshoe.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class CharacterMotion:
     gravity : float
         Magnitude of gravity [m/s²].
     centre : (F, 3) float array or None
-        Centre of mass of a thing without a skeleton, which falls, rolls and slides [m]; None for a character, whose
+        Centre of mass of a prop without a skeleton, which falls, rolls and slides [m]; None for a character, whose
         joints tell it.
     four_legged : bool
         An animal on four legs: its mass is distributed otherwise than a man's.

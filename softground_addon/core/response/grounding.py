@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
 RIGID = 0.05
-"""What a thing without a side may move against the ankle and still be worn on the foot, in leg lengths."""
+"""What a contact shape without a side may move against the ankle and still be worn on the foot, in leg lengths."""
 LOWER_FOOT = 0.02
 """How much lower one foot must stand for the hips to follow it rather than the other, in leg lengths."""
 HIPS_TIME = 0.10

@@ -11,7 +11,7 @@ from softground_addon.blender.characters.character_setup import (
     add_bone_contacts,
     add_character,
     add_object_contacts,
-    add_things,
+    add_props,
 )
 from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.reading import analysis
@@ -100,7 +100,7 @@ def test_a_thing_beside_a_character_that_answers_the_ground(scene):
     add_character(scene, shots.walker(scene, frames=30))
     thing = ball(location=(3, 0, 0))
     key_path(thing, dropped_path(3.0, 0.0, 0.5, frames=30))
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     before = np.array([[curve.evaluate(f) for f in range(1, 31)] for curve in curves_of(thing)])
     scene.softground.tilt.use = scene.softground.grounding.use = True
     report = bake(scene, cell_size=0.02, frame_start=1, frame_end=30).report
@@ -118,7 +118,7 @@ def curves_of(thing):
 def test_live_mode_presses_a_thing_and_takes_it_back(scene):
     thing = ball()
     key_path(thing, dropped_path(0.0, 0.0, 0.5, frames=40))
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     scene.softground.cell_size = 0.02
     bpy.ops.softground.create_ground()
     scene.frame_set(1)
@@ -144,7 +144,7 @@ def test_a_wheel_that_rolls_leaves_one_continuous_rut(scene):
         wheel.rotation_quaternion = Quaternion((0, 1, 0), x / 0.35) @ Quaternion((1, 0, 0), np.pi / 2)
         wheel.keyframe_insert("location", frame=frame)
         wheel.keyframe_insert("rotation_quaternion", frame=frame)
-    add_things(scene, [wheel])
+    add_props(scene, [wheel])
     scene.softground.characters[0].mass = 40
     bake(scene, cell_size=0.02)
     z = heights(scene).reshape(-1, 3) + np.array(scene.softground.ground.matrix_world)[:3, 3]
@@ -162,7 +162,7 @@ def test_two_things_make_the_same_ground_in_either_order(scene):
     for order in ([one, other], [other, one]):
         scene.softground.characters.clear()
         scene.softground.ground = None
-        add_things(scene, order)
+        add_props(scene, order)
         bake(scene, cell_size=0.02)
         grounds.append(heights(scene))
     assert (np.abs(grounds[0]) > 0).any()
@@ -181,11 +181,11 @@ def test_two_walkers_and_a_ball_make_the_same_ground_in_any_order(scene):
         scene.softground.characters.clear()
         scene.softground.ground = None
         if order[0]:
-            add_things(scene, [thing])
+            add_props(scene, [thing])
         for number in order:
             add_character(scene, walkers[number])
         if not order[0]:
-            add_things(scene, [thing])
+            add_props(scene, [thing])
         bake(scene, cell_size=0.02, frame_start=1, frame_end=30)
         grounds.append(heights(scene))
     assert grounds[0].tobytes() == grounds[1].tobytes()
@@ -202,7 +202,7 @@ def test_a_simulated_rigid_body_falls_where_blender_drops_it(scene):
     thing.rigid_body.collision_shape = "SPHERE"
     scene.frame_end = 40
     scene.frame_set(13)
-    (character,) = add_things(scene, [thing])
+    (character,) = add_props(scene, [thing])
     assert character.mass == pytest.approx(7.0)
     assert (scene.softground.frame_start, scene.softground.frame_end) == (1, 40)
     step = bake(scene).report["steps"][0]
@@ -217,7 +217,7 @@ def test_rigid_bodies_are_stepped_to_a_late_start_a_frame_at_a_time(scene):
     bpy.ops.object.select_all(action="DESELECT")
     thing = ball(location=(0.0, 0.0, 50.0))
     bpy.ops.rigidbody.object_add()
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     scene.softground.frame_start, scene.softground.frame_end = 30, 40
     scene.frame_set(5)
     reading, shown = read_shot(scene, settings_of(scene)), []
@@ -237,7 +237,7 @@ def test_wheels_on_one_frame_are_one_thing_and_share_its_mass(scene):
     for wheel in wheels:
         wheel.parent = parent
     rigs.key(parent, "location", {1: (0, 0, 0), 20: (1, 0, 0)})
-    (character,) = add_things(scene, wheels)
+    (character,) = add_props(scene, wheels)
     assert (character.name, len(character.soles)) == ("Bicycle", 2)
     (motion,) = jobs.run(read_shot(scene, settings_of(scene))).motions
     assert motion.centre[0] == pytest.approx([0.5, 0, 0.25], abs=1e-4)
@@ -249,7 +249,7 @@ def test_any_lasting_scale_is_the_things_own_shape(scene, scale):
     cube = bpy.context.active_object
     cube.scale = scale
     rigs.key(cube, "location", {1: cube.location, 10: cube.location})
-    add_things(scene, [cube])
+    add_props(scene, [cube])
     scene.softground.characters[0].mass = 100
     (step,) = bake(scene, frame_end=10).report["steps"]
     assert step["area_m2"] == pytest.approx(0.16 * abs(scale[0] * scale[1]), rel=0.03)
@@ -261,7 +261,7 @@ def test_modifiers_shape_what_prints(scene):
     cube.modifiers.new("Round", "SUBSURF").levels = 4
     rigs.key(cube, "location", {1: (0, 0, 0.2), 10: (0, 0, 0.2)})
     scene.view_layers[0].update()
-    add_things(scene, [cube])
+    add_props(scene, [cube])
     scene.softground.characters[0].mass = 100
     (step,) = bake(scene, frame_end=10).report["steps"]
     assert step["area_m2"] < 0.08
@@ -284,7 +284,7 @@ def in_a_hidden_collection(thing):
 def test_a_hidden_thing_prints_as_one_that_shows(scene, hide):
     thing = ball()
     key_path(thing, dropped_path(0.0, 0.0, 1.0, frames=40))
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     hide(thing)
     scene.view_layers[0].update()
     (step,) = bake(scene).report["steps"]
@@ -341,7 +341,7 @@ def turned_into_the_ground(scene, thing):
 def test_a_thing_that_cannot_print_is_refused_with_its_name_and_the_remedy(scene, spoil, message):
     thing = ball()
     key_path(thing, dropped_path(0.0, 0.0, 1.0, frames=40))
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     spoil(scene, thing)
     with pytest.raises(InputError, match=message):
         bake(scene)
@@ -351,14 +351,14 @@ def test_what_is_no_thing_is_not_added(scene):
     thing = ball()
     scene.softground.ground = thing
     with pytest.raises(InputError, match="'Ball' is the ground"):
-        add_things(scene, [thing])
+        add_props(scene, [thing])
     scene.softground.ground = None
-    add_things(scene, [thing])
+    add_props(scene, [thing])
     with pytest.raises(InputError, match="prints already"):
-        add_things(scene, [thing])
+        add_props(scene, [thing])
     light = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     with pytest.raises(InputError, match=r"'Lamp'.*of type Light"):
-        add_things(scene, [light])
+        add_props(scene, [light])
     assert len(scene.softground.characters) == 1
 
 
