@@ -14,7 +14,6 @@ from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit
-from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
 
@@ -25,28 +24,16 @@ APART = 1.2
 
 
 @dataclass(frozen=True, eq=False)
-class BakedStep:
+class BakedStep(record.EditableStep):
     """One step.
 
     Attributes
     ----------
     number : int
         In the order of the bake, from 1; copies follow.
-    name : str
-        Its id.
-    baked : Footprint
-        As it was baked; of a copy, that which it is a copy of.
-    left : Footprint or None
-        As it was left; None where nothing of it is.
-    edit : StepEdit
     """
 
     number: int
-    name: str
-    baked: Footprint
-    left: Footprint | None
-    edit: StepEdit
-    is_copy: bool = False
 
     @property
     def is_edited(self) -> bool:
@@ -127,10 +114,7 @@ def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
 
 
 def _steps(left: record.BakeRecord) -> list[BakedStep]:
-    return [
-        BakedStep(number, step.name, step.baked, step.left, step.edit, step.is_copy)
-        for number, step in enumerate(left.steps, start=1)
-    ]
+    return [BakedStep(**vars(step), number=number) for number, step in enumerate(left.steps, start=1)]
 
 
 def active(scene: bpy.types.Scene) -> BakedStep | None:

@@ -111,8 +111,6 @@ class EditableStep:
 
     Attributes
     ----------
-    number : int
-        See `edits`.
     name : str
         Its id.
     baked : Footprint
@@ -123,7 +121,6 @@ class EditableStep:
     is_copy : bool
     """
 
-    number: int
     name: str
     baked: Footprint
     left: Footprint | None
@@ -142,7 +139,7 @@ def steps_of(
     for number in (*range(count), *(n for n in changes if n >= count)):
         edit, baked, copy = changes.get(number, step_edits.UNCHANGED), footprints[number % count], number // count
         left = None if edit.mute else pressed_again.get(number, None if copy else baked)
-        steps.append(EditableStep(number, step_edits.step_id(baked, copy), baked, left, edit, copy > 0))
+        steps.append(EditableStep(step_edits.step_id(baked, copy), baked, left, edit, copy > 0))
     return steps
 
 
