@@ -27,6 +27,8 @@ OFF_SKIN = 0.012
 """The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
 NEAR = 0.015
 """Calm skin this near to where it rests touches, in body heights (`skin.bearing.TOUCH`)."""
+SUNK = 0.08
+"""Feet dip through the ground by up to this in cycles as they are sold, in body heights."""
 BESIDE = 0.15
 """A step within this of touching skin is that skin's, in body heights: a foot's length."""
 DISAGREE = 0.2
@@ -266,12 +268,14 @@ class _Touching:
     skin: LowSkin
     on: Mask
     """Which parts are where they rest, (F, P)."""
+    down: Mask
+    """The same, with parts that have sunk into the ground: some of their skin is at its level."""
 
     def near(self, step: Footprint, frames: slice, reach: float) -> Mask:
         """At which of some frames skin touches within reach of a step."""
         apart = np.linalg.norm(self.skin.position[frames, :, :2] - step.position[:2], axis=-1)
         calm = self.skin.rise[frames] < self.skin.calm
-        return np.asarray((self.on[frames] & calm & (apart < reach)).any(axis=1))
+        return np.asarray((self.down[frames] & calm & (apart < reach)).any(axis=1))
 
     @property
     def rests(self) -> Mask:
@@ -303,7 +307,8 @@ def _skin(
                 f"move the ground {ground_way} by as much, or the character {body_way}.",
             )
         )
-    touching = _Touching(skin, np.abs(height - over) < NEAR * skin.height)
+    rise = (height - over) / skin.height
+    touching = _Touching(skin, np.abs(rise) < NEAR, (rise < NEAR) & (rise > -SUNK))
     if steps:
         found += yield from _skin_and_steps(motion, touching, steps)
     return found

@@ -74,6 +74,16 @@ def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_
     assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
 
 
+@pytest.mark.parametrize(("depth", "agrees"), [(0.05, True), (0.3, False)])
+def test_a_step_whose_skin_has_sunk_into_the_ground_is_that_skins(depth, agrees):
+    loads = stands()
+    sunk = skin_at(loads.motion.skin.frames, PLACES)
+    middle = len(sunk.frames) // 2
+    sunk.position[middle - 3 : middle + 4, 0, 2] -= depth
+    findings = found(replace(loads, motion=replace(loads.motion, skin=sunk)))
+    assert ("step_without_skin" not in findings) == agrees
+
+
 def test_a_foot_that_bears_on_the_edge_of_its_sole_leaves_no_print_and_says_so():
     loads = stands()
     loads.motion.soles[0].transforms[:] = pose(PLACES[0], 0.0, np.pi / 2)
