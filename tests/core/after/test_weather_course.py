@@ -1,5 +1,7 @@
 """Weather that changes: sums over parts of the time against a simulation in small steps of its own."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ def changing(seed):
     most = np.array([0.03 / HOUR, 8.0, 12.0, 30e-3 / HOUR, 1e-3 / HOUR, 1500.0])
     phase = random.uniform(0, 6, 6)
 
+    @cache
     def at(frame):
         on = jumps[:, min(int((frame - SPAN.first) / (2 * PARTS) * 8), 8)]
         swing = 0.6 + 0.4 * np.sin(frame / 60.0 + phase)
@@ -34,8 +37,8 @@ def changing(seed):
 def simulated(at, matter, since, frame, share):
     """What happens from one frame to another, step by step, layer by layer."""
     step = SPAN.step / FINER
-    water, density, settled = [], [], []
-    thawed = blown = lost = rained = excess = wet_time = 0.0
+    water, density, began = [], [], []
+    settling = thawed = blown = lost = rained = excess = wet_time = 0.0
     opened, age = 1.0, 0.0
     for number in range(round((frame - SPAN.first) / step)):
         now = SPAN.first + (number + 0.5) * step
@@ -50,13 +53,14 @@ def simulated(at, matter, since, frame, share):
         age += time
         water.append(snowfall * time * new / 1000.0)
         density.append(new)
-        settled = [*(one + w.settling_rate(temperature) * time for one in settled), 0.0]
+        settling += float(w.settling_rate(temperature)) * time
+        began.append(settling)
         melt = melted = w.DEGREE_DAY * max(temperature, 0.0) * time
         while melt > 0 and water:
             taken = min(melt, water[-1])
             water[-1], melt = water[-1] - taken, melt - taken
             if water[-1] == 0.0:
-                water.pop(), density.pop(), settled.pop()
+                water.pop(), density.pop(), began.pop()
         thawed += melt * 1000.0 / w.SNOW.bulk_density
         if matter.blown:
             flux = float(w.blown_flux(wind, matter.blown))
@@ -65,8 +69,7 @@ def simulated(at, matter, since, frame, share):
         rained += rain * time
         excess += max(rain - share * capacity, 0.0) * time
         lost = max(lost + (drying - rain) * time - (melted if matter.snow_depth else 0.0), 0.0)
-    layers = [one * 1000.0 / float(w.settled_density(s, d)) for one, d, s in zip(water, density, settled, strict=True)]
-    cover = sum(layers)
+    cover = float(np.sum(np.array(water) * 1000.0 / w.settled_density(settling - np.array(began), np.array(density))))
     under = cover + thawed if matter.snow_depth else cover
     return {
         "cover": cover,
