@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import os
+import signal
 import string
 import struct
 import tracemalloc
@@ -37,25 +38,72 @@ from softground_addon.core.record.edits import StepEdit
 from tests.blender import shots
 
 QUICK = 40
+WHOLE: list[int] = []
+"""Inputs of each kind in the marathon."""
+
+HANG_S = 20
+"""What an input may take [s of the processor, so that a busy machine decides nothing]."""
 
 
 def counts(whole):
-    """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon; all kinds make 50,000."""
+    """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon."""
+    WHOLE.append(whole)
     return pytest.mark.parametrize(
         "count",
         [QUICK, pytest.param(whole // 10, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
     )
 
 
+def hangs(*_):
+    raise AssertionError(f"an input takes more than {HANG_S} s")
+
+
+@contextlib.contextmanager
+def no_hang():
+    """Raise in what takes too long; where the system has such a clock."""
+    if not hasattr(signal, "ITIMER_PROF"):
+        yield
+        return
+    before = signal.signal(signal.SIGPROF, hangs)
+    signal.setitimer(signal.ITIMER_PROF, HANG_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
 def each(strategy, count, check):
-    """Check so many inputs."""
+    """Check so many inputs, each within its time."""
+    drawn = 0
 
     @settings(max_examples=count, database=None, suppress_health_check=list(HealthCheck))
     @given(strategy)
     def all_of_them(value):
-        check(value)
+        nonlocal drawn
+        drawn += 1
+        with no_hang():
+            check(value)
 
     all_of_them()
+    print(f"{drawn:,} inputs")
+    assert drawn >= count
+
+
+def test_the_tiers_draw_what_is_promised():
+    assert sum(WHOLE) >= 50_000
+    assert sum(whole // 10 for whole in WHOLE) >= 2_000
+
+
+def test_an_input_that_hangs_is_noticed(monkeypatch):
+    monkeypatch.setitem(globals(), "HANG_S", 0.1)
+
+    def check(_):
+        while True:
+            pass
+
+    with pytest.raises(AssertionError, match="takes more than"):
+        each(st.just(1), 1, check)
 
 
 def mutated(content):
