@@ -158,13 +158,19 @@ def record(
     props: Sequence[str] = (),
     recorder: PoseRecorder | None = None,
 ) -> Generator[int, None, Recording]:
-    """Where some bones of a rig and some objects are over time; yields the number of frames read."""
-    names = list(dict.fromkeys(bones))
+    """Where some bones of a rig and some objects are over time; yields the number of frames read.
+
+    Raises InputError, with the frame, where that is no place.
+    """
+    names, rig = list(dict.fromkeys(bones)), armature.name
     with without_layer(armature):
         keyed = not props and is_moved_by_keys_alone(armature, names)
     if keyed:
-        return (yield from _read_keys(armature.name_full, frames, names, units, recorder))
-    return (yield from _evaluate(scene, armature.name_full, frames, names, units, props, recorder))
+        recording = yield from _read_keys(armature.name_full, frames, names, units, recorder)
+    else:
+        recording = yield from _evaluate(scene, armature.name_full, frames, names, units, props, recorder)
+    _check_finite(rig, recording)
+    return recording
 
 
 def sample_prop(
@@ -455,7 +461,6 @@ def _check_finite(name: str, recording: Recording) -> None:
 
 
 def _check_recording(name: str, recording: Recording) -> None:
-    _check_finite(name, recording)
     axes = recording.armature[:, :3, :3]
     gram = np.swapaxes(axes, -1, -2) @ axes
     size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
