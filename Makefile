@@ -47,6 +47,8 @@ moving: $(READY)
 
 # Processes side by side gain nothing from threads that wait for each other's processors.
 test slow marathon: export OPENBLAS_NUM_THREADS := 1
+# Tests start a hundred processes, none of which is to compile this project anew.
+test slow marathon: export PYTHONDONTWRITEBYTECODE :=
 
 # What measures processor time has the machine to itself; where none of $(TESTS) does, pytest exits with 5.
 QUICK := $(shell sed -n "s/^addopts.* -m '\([^']*\)'.*/\1/p" pyproject.toml)

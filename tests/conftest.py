@@ -15,6 +15,12 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 
+def pytest_ignore_collect(collection_path, config):
+    """Files without tests that run alone are left out where only those are asked for: to import all takes longer."""
+    alone = config.option.markexpr.endswith("and alone")
+    return True if alone and collection_path.is_file() and b"mark.alone" not in collection_path.read_bytes() else None
+
+
 @pytest.fixture(scope="session")
 def addon():
     """SoftGround switched on until the last test: registered once, since Blender knows no second of the same."""
