@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from softground_addon.blender import jobs
+from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.reading import analysis
+from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.record.typical_depth import typical_of
+from softground_addon.core.simulation import simulate
 from tests.blender import shots
 from tests.blender.responders import source_motion
 
@@ -73,6 +77,19 @@ def test_the_force_is_that_of_somebody_who_walks_runs_or_jumps(baked):
 def test_the_typical_step_is_as_deep_as_predicted(baked):
     name, result, _ = baked
     assert predicted[name] == pytest.approx(result.report["totals"]["typical_depth_m"], rel=0.02)
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("cell_size", [0.005, 0.01])
+@pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))
+def test_it_is_so_with_either_pressure_and_cells_of_any_size(scene, name, cell_size, pressure):
+    shots.import_motion(name)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.load_preset(name="Snow")
+    scene.softground.pressure, scene.softground.cell_size = pressure, cell_size
+    loads, ground = analysis.read(scene).loads, SoftGround(FlatTerrain(), settings.snapshot(scene).material, pressure)
+    pressed = [footprint for result in simulate(loads, ground, cell_size) for footprint in result.footprints]
+    assert analysis.expected_depth(scene) == pytest.approx(typical_of(pressed), rel=0.02)
 
 
 @pytest.mark.parametrize("name", sorted(shots.MOTION_FILES))

@@ -9,7 +9,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.prediction import FEW, TYPICAL, contact_loads
-from softground_addon.core.record.typical_depth import main_contacts
+from softground_addon.core.record.typical_depth import main_contacts, typical_of
 from softground_addon.core.simulation import simulate
 from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
@@ -120,6 +120,15 @@ def test_feet_that_come_down_on_their_own_prints_add_as_much_as_is_predicted(har
     expected = pressed([loads], material, "UNIFORM")
     assert contact_loads([loads], FlatTerrain(), CELL).deepest(material, most=most) == pytest.approx(expected, rel=0.03)
     assert expected < 1.2 * first
+
+
+@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("speed", [0.004, 0.006, 0.008, 0.01])
+def test_feet_that_come_down_a_little_beside_their_prints_are_predicted_by_what_they_add(speed, pressure):
+    """Cells that the step before has covered in part take the rest of a print."""
+    loads = walk(steps=8, speed=speed)
+    expected = typical_of(prints_of([loads], SNOW, pressure))
+    assert contact_loads([loads], FlatTerrain(), CELL).typical(SNOW, pressure) == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])

@@ -5,6 +5,8 @@ How much of the sole meets the ground is measured at points of its own (`sole_po
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,12 +55,43 @@ def cell_coverage(
     (N, rows, columns) float array
     """
     fine = ground.window
+    coverage = np.zeros((len(transforms), fine.cells), np.float32)
+    patches = patches_over_cells(sole, transforms, ground, lowest=lowest, tolerance=tolerance)
+    for number, (cells, clearance, covered) in enumerate(patches):
+        touching = covered * touching_fraction(clearance, sinkage[:, None].astype(np.float32), tolerance)
+        coverage[:, cells] = np.maximum(coverage[:, cells], touching) if number else touching
+    coverage = coverage.reshape(-1, fine.rows, fine.columns)
+    if divisions > 1:
+        parts = (-1, fine.rows // divisions, divisions, fine.columns // divisions, divisions)
+        coverage = coverage.reshape(parts).mean(axis=(2, 4))
+    return coverage
+
+
+def patches_over_cells(
+    sole: Sole, transforms: Array, ground: Surface, *, lowest: Array, tolerance: float
+) -> Iterator[tuple[NDArray[np.intp], Single, Single]]:
+    """What each patch of a sole covers of the ground's cells, whether it touches them or not, at each of N steps.
+
+    Parameters
+    ----------
+    sole, transforms, ground, lowest, tolerance
+        See `cell_coverage`.
+
+    Yields
+    ------
+    cells : (C,) int array
+        row·columns + column within the window of the ground.
+    clearance : (N, C) float array
+        Height of the underside over each, less that of the sole's lowest point [m].
+    covered : (N, C) float array
+        Fraction of each that bears and is under the patch.
+    """
+    fine = ground.window
     level = float(np.min(ground.heights, where=ground.bears, initial=FAR))  # 32 bits suffice for what lies above it
     base = np.where(ground.bears, ground.heights - level, 0.0).astype(np.float32).ravel()
     above = (lowest + level).astype(float)
     x, y = fine.centres(ground.cell_size)
     indices = np.arange(fine.cells).reshape(fine.rows, fine.columns)
-    coverage = np.zeros((len(transforms), fine.cells), np.float32)
     inside = WALL / TOLERANCE * tolerance  # cells that are so far above the lowest point are those of walls
     walled = has_steps(ground, inside)
     for number, patch in enumerate(sole.patches):
@@ -67,18 +100,12 @@ def cell_coverage(
         cells, underside, covered = _underside(patch, pose, x[columns], y[rows], above, ground.cell_size)
         cells = indices[rows, columns].ravel()[cells]
         underside -= base[cells]
-        covered *= touching_fraction(underside, sinkage[:, None].astype(np.float32), tolerance)
         covered[pose[:, 2, 2] < LEAST_FACING] = 0.0
         if walled:
             covered[underside < -inside] = 0.0
-        coverage[:, cells] = np.maximum(coverage[:, cells], covered) if number else covered
-    coverage = coverage.reshape(-1, fine.rows, fine.columns)
-    if not ground.bears.all():
-        coverage *= ground.bears
-    if divisions > 1:
-        parts = (-1, fine.rows // divisions, divisions, fine.columns // divisions, divisions)
-        coverage = coverage.reshape(parts).mean(axis=(2, 4))
-    return coverage
+        if not ground.bears.all():
+            covered *= ground.bears.ravel()[cells]
+        yield cells, underside, covered
 
 
 def _underside(
