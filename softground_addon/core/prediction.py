@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,18 +56,13 @@ class ContactLoads:
         Those of the most steps first.
     poses : tuple of (GroundUnder, float)
         The ground under bodies at some steps, and the normal force at those [N]; the hardest first.
+    table : ContactTable or None
+        Of the soles, if there are any.
     """
 
     soles: tuple[SoleContact, ...]
     poses: tuple[tuple[GroundUnder, float], ...]
-
-    @cached_property
-    def _impulse(self) -> Array:
-        return np.array([contact.force @ contact.duration for contact in self.soles])
-
-    @cached_property
-    def _table(self) -> ContactTable:
-        return ContactTable(self.soles)
+    table: ContactTable | None
 
     def deepest(self, material: GroundMaterial, pressure: Pressure = "UNIFORM", most: int | None = None) -> float:
         """Depth of the deepest print [m], 0 if there is none.
@@ -83,40 +77,28 @@ class ContactLoads:
             at so many poses of bodies, which press the hardest.
         """
         depth = max((depth_under(under, force, material) for under, force in self.poses[:most]), default=0.0)
-        if not self.soles:
+        if self.table is None:
             return depth
-        sinking = self._table.sink(material)
+        sinking = self.table.sink(material)
         furthest = np.argsort(-sinking.reached, kind="stable")[:most]
         furthest = furthest[sinking.reached[furthest] > 0]
         if most is not None:
-            furthest = self._table.with_those_under(furthest, 2 * most)
-        return max(depth, float(_depths(self._table, furthest, sinking, material, pressure).max()))
+            furthest = self.table.with_those_under(furthest, 2 * most)
+        return max(depth, float(_depths(self.table, furthest, sinking, material, pressure).max()))
 
     def typical(self, material: GroundMaterial, pressure: Pressure = "UNIFORM") -> float:
         """Depth of the typical print [m]; see `typical_depth`."""
         return typical_depth(self, material, pressure)
 
-    def working_out_typical(self, material: GroundMaterial, pressure: Pressure) -> Slices[float]:
-        """See `typical_depth`."""
-        sinking = self._table.sink(material)
-        main = np.flatnonzero(main_contacts(self._impulse))
-        main = main[np.argsort(sinking.reached[main], kind="stable")]
-        beside = max(0, (len(main) - TYPICAL) // 2)
-        chosen = main[beside : len(main) - beside]
-        together = self._table.with_those_under(chosen, 2 * TYPICAL)
-        yield
-        depths = yield from self._table.pressing(together, sinking, material, pressure)
-        return median_depth(depths[chosen])
-
     def modulus_for(self, material: GroundMaterial, share: float) -> float:
         """The modulus [Pa] with which prints are about so many times as deep: by how far the ground gives way under
         the lowest points alone, which is known at once."""
-        if not self.soles:
+        if (table := self.table) is None:
             return material.youngs_modulus / share
-        main = main_contacts(self._impulse)
+        main = main_contacts(table.impulse())
 
         def reached(modulus: float) -> float:
-            return float(np.median(self._table.sink(replace(material, youngs_modulus=modulus)).reached[main]))
+            return float(np.median(table.sink(replace(material, youngs_modulus=modulus)).reached[main]))
 
         modulus = material.youngs_modulus
         aim = share * reached(modulus)
@@ -137,9 +119,17 @@ def typical_depth(contacts: ContactLoads, material: GroundMaterial, pressure: Pr
     material : GroundMaterial
     pressure : 'UNIFORM' or 'CENTRE_OF_PRESSURE'
     """
-    if not contacts.soles:
+    if (table := contacts.table) is None:
         return contacts.deepest(material, pressure, most=FEW)
-    return (yield from contacts.working_out_typical(material, pressure))
+    sinking = table.sink(material)
+    main = np.flatnonzero(main_contacts(table.impulse()))
+    main = main[np.argsort(sinking.reached[main], kind="stable")]
+    beside = max(0, (len(main) - TYPICAL) // 2)
+    chosen = main[beside : len(main) - beside]
+    together = table.with_those_under(chosen, 2 * TYPICAL)
+    yield
+    depths = yield from table.pressing(together, sinking, material, pressure)
+    return median_depth(depths[chosen])
 
 
 @sliced
@@ -169,7 +159,9 @@ def contact_loads(
     of_size = {cell_size: cells}
     soles: list[SoleContact] = []
     poses: list[tuple[GroundUnder, float]] = []
-    for number, (character, size) in enumerate(zip(loads, square_sizes(loads, cell_size), strict=True)):
+    sizes = square_sizes(loads, cell_size)
+    yield
+    for number, (character, size) in enumerate(zip(loads, sizes, strict=True)):
         squares = of_size.setdefault(size, UndisturbedCells(terrain, None, size))
         for index, sole in enumerate(character.motion.soles):
             if sole.sole.prop:
@@ -180,7 +172,8 @@ def contact_loads(
                 soles += yield from sole_contacts(character, number, index, cells, squares)
     soles.sort(key=lambda contact: -len(contact.force))
     poses.sort(key=lambda pose: -pose[1])
-    return ContactLoads(tuple(soles), tuple(poses))
+    table = (yield from ContactTable.of(soles)) if soles else None
+    return ContactLoads(tuple(soles), tuple(poses), table)
 
 
 def matching_modulus(

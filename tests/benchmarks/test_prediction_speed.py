@@ -10,7 +10,7 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.prediction import contact_loads, typical_depth
 from tests.core.walkers import walk
 
-LIMITS = {50: 30e-3, 1000: 30e-3}
+LIMITS = {50: 15e-3, 1000: 15e-3}
 """Most that a slice of a prediction may cost, by the number of contacts in the shot [s]."""
 REPEATS = 8
 
