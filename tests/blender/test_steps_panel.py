@@ -107,6 +107,23 @@ def test_a_step_is_added_at_the_cursor_from_the_current_frame_on(baked):
     assert stored(baked) == before
 
 
+def test_several_steps_are_chosen_and_changed_together_in_what_was_changed(baked):
+    before = stored(baked)
+    one, two, three = baked_steps.of(baked)[:3]
+    bpy.ops.softground.change_step(step=one.name, strength=0.5)
+    bpy.ops.softground.choose_step(step=one.name)
+    for step in (two, three, two):  # the last one no more
+        bpy.ops.softground.choose_step(step=step.name, extend=True)
+    assert [step.name for step in baked_steps.chosen(baked)] == [three.name, one.name]
+    bpy.ops.softground.change_step(scale=1.2)
+    edits = baked_ground.edits_of(baked.softground.ground)
+    assert edits == {one.name: StepEdit(strength=0.5, scale=1.2), three.name: StepEdit(scale=1.2)}
+    bpy.ops.softground.mute_step()
+    assert [step.left is None for step in baked_steps.of(baked)[:3]] == [True, False, True]
+    bpy.ops.softground.reset_step()
+    assert stored(baked) == before
+
+
 def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
     step = baked_steps.of(baked)[1]
     bpy.ops.softground.change_step(step=step.name, strength=1.3, move=(0.05, 0.07), turn=0.2)

@@ -43,3 +43,11 @@ def test_the_drag_is_one_undo_step_and_lasts(facts):
 
 def test_nothing_goes_wrong_on_the_console(facts):
     assert "softground_addon" not in facts["printed"]  # as in the lines of a traceback
+
+
+def test_a_box_chooses_the_steps_in_it_and_they_are_dragged_together(facts):
+    chosen, wanted = facts["boxed"]
+    assert chosen == wanted
+    one, other = facts["dragged together"]
+    assert one == pytest.approx(0.2, abs=0.02)
+    assert other == pytest.approx(one, abs=1e-5)

@@ -118,9 +118,15 @@ def _steps(left: record.BakeRecord) -> list[BakedStep]:
 
 
 def active(scene: bpy.types.Scene) -> BakedStep | None:
-    """The step that is chosen."""
+    """The step that is chosen; of several, the one that the panel shows."""
     chosen = session.current().step
     return next((step for step in of(scene) if step.name == chosen), None)
+
+
+def chosen(scene: bpy.types.Scene) -> list[BakedStep]:
+    """All steps that are chosen, first the one that the panel shows."""
+    steps = {step.name: step for step in of(scene)}
+    return [steps[name] for name in session.chosen_steps() if name in steps]
 
 
 def forget() -> None:

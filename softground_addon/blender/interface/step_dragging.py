@@ -1,9 +1,9 @@
-"""Steps in the viewport: the chosen one is outlined with its number, and any of them is picked and dragged."""
+"""Steps in the viewport: the chosen ones are outlined with their numbers, and any are picked, boxed and dragged."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -19,7 +19,7 @@ from ..baking.step_preview import StepPreview
 from ..ground import baked_ground
 from . import baked_steps, overlay
 from .baked_steps import BakedStep
-from .step_editing import OnSteps, changed, show
+from .step_editing import OnSteps, changed, show, toggle
 
 Array = NDArray[np.float64]
 
@@ -27,20 +27,30 @@ TURN_STEP = 5.0
 """How far the mouse wheel turns a step that is dragged [deg]."""
 REACH = 1.4
 """A click picks a step within so many times the size of its outline."""
-_HINT = "Drag a print   ·   Wheel: turn it   ·   Shift: move it finely   ·   Esc: leave it"
+_HINT = (
+    "Drag a print   ·   Shift Click: choose more   ·   Drag beside them: choose by a box   ·   Wheel: turn it   ·   "
+    "Shift: move it finely   ·   Esc: leave it"
+)
 FINE = 0.1
 """How much slower a print follows the mouse while Shift is held."""
 
 
 @dataclass
 class _Drag:
-    """A step that is being dragged: the bake that it is of, what shows it, and where it is."""
+    """A step that is being dragged: those that go with it, the bake, what shows it, and where it is."""
 
     step: BakedStep
+    steps: Sequence[BakedStep]
     bake: step_edits.EditableBake
     preview: StepPreview
     mouse: Array
     edit: StepEdit
+
+    def edits(self, edit: StepEdit) -> dict[str, StepEdit]:
+        """Those of all steps that are dragged, where the one under the mouse has this, by their ids."""
+        first = self.step.edit
+        by, turn = np.subtract(edit.move_m, first.move_m), edit.turn_deg - first.turn_deg
+        return {step.name: _carried(step.edit, by, turn) for step in self.steps} | {self.step.name: edit}
 
 
 @dataclass
@@ -49,10 +59,19 @@ class _Shown:
 
     picking: bool = False
     under: str = ""
-    edit: StepEdit | None = None
+    edits: Mapping[str, StepEdit] = field(default_factory=dict)
+    box: Sequence[tuple[int, int]] = ()
 
 
 _shown = _Shown()
+
+
+def _carried(edit: StepEdit, by: Array, turn: float) -> StepEdit:
+    """An edit moved by so much [m] and turned by so much [deg]."""
+    x, y = np.clip(np.round(np.array(edit.move_m) + by, 6), -FARTHEST, FARTHEST).tolist()
+    return replace(
+        edit, move_m=(x, y), turn_deg=(edit.turn_deg + turn + 180.0) % 360.0 - 180.0 if turn else edit.turn_deg
+    )
 
 
 class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
@@ -96,8 +115,8 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         if event.type == "MOUSEMOVE" and region is not None:
             self._follow(context, _on_plane(region, view, event, self._drag.step.height), fine=event.shift)
         elif event.type in ("WHEELUPMOUSE", "WHEELDOWNMOUSE"):
-            turn = self._drag.edit.turn_deg + TURN_STEP * (1 if event.type == "WHEELUPMOUSE" else -1)
-            self._change(context, replace(self._drag.edit, turn_deg=(turn + 180.0) % 360.0 - 180.0))
+            turn = TURN_STEP * (1 if event.type == "WHEELUPMOUSE" else -1)
+            self._change(context, _carried(self._drag.edit, np.zeros(2), turn))
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             return self._drop(context)
         return {"RUNNING_MODAL"}
@@ -106,6 +125,8 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         """Outline the print under the mouse, and take hold of it at a click."""
         scene = settings.scene_of(context)
         step = _under(baked_steps.of(scene), region, view, event) if region is not None else None
+        if _shown.box:
+            return self._box(scene, event, region, view)
         if event.type == "MOUSEMOVE":
             name = step.name if step else ""
             if name != _shown.under:
@@ -113,15 +134,35 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
                 _redraw()
             return {"PASS_THROUGH"}
         if event.type == "LEFTMOUSE" and event.value == "PRESS" and region is not None:
-            if step is not None:
-                session.current().step = step.name
+            if step is None:
+                _shown.box = [(event.mouse_x - region.x, event.mouse_y - region.y)] * 2
+            elif event.shift:
+                toggle(step.name)
+            else:
+                if step.name not in session.chosen_steps():
+                    session.choose_steps(step.name)
                 bake = step_edits.editable(scene)
                 preview = StepPreview(scene.softground.ground, bake)
                 mouse = _on_plane(region, view, event, step.height)
-                self._drag = _Drag(step, bake, preview, step.baked.position[:2] if mouse is None else mouse, step.edit)
-                session.redraw()
+                mouse = step.baked.position[:2] if mouse is None else mouse
+                self._drag = _Drag(step, baked_steps.chosen(scene), bake, preview, mouse, step.edit)
+            session.redraw()
+            _redraw()
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
+
+    def _box(self, scene: bpy.types.Scene, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
+        """Follow the mouse with a box, and choose the steps whose middles are in it as the button is let go."""
+        if region is not None:
+            _shown.box = [_shown.box[0], (event.mouse_x - region.x, event.mouse_y - region.y)]
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            inside = _within(_shown.box, baked_steps.of(scene), region, view) if region is not None else []
+            names = [*(session.chosen_steps() if event.shift else ()), *inside]
+            session.choose_steps(names[0] if names else "", names)
+            _shown.box = ()
+            session.redraw()
+        _redraw()
+        return {"RUNNING_MODAL"}
 
     def _follow(self, context: bpy.types.Context, mouse: Array | None, *, fine: bool) -> None:
         drag = self._drag
@@ -129,20 +170,21 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
             return
         by = (mouse - drag.mouse) * (FINE if fine else 1.0)
         drag.mouse = mouse
-        move = np.clip(np.round(np.array(drag.edit.move_m) + by, 6), -FARTHEST, FARTHEST)
-        self._change(context, replace(drag.edit, move_m=(float(move[0]), float(move[1]))))
+        self._change(context, _carried(drag.edit, by, 0.0))
 
     def _change(self, context: bpy.types.Context, edit: StepEdit) -> None:
         drag, scene = self._drag, settings.scene_of(context)
         if drag is not None and edit != drag.edit:
-            drag.preview.show(changed(scene, [(drag.step, edit)]))
-            drag.edit = _shown.edit = edit
+            edits = drag.edits(edit)
+            drag.preview.show(changed(scene, [(step, edits[step.name]) for step in drag.steps]))
+            drag.edit, _shown.edits = edit, edits
             _redraw()
 
     def _drop(self, context: bpy.types.Context) -> set[str]:
         drag, scene = self._drag, settings.scene_of(context)
         assert drag is not None
-        edits, is_moved = changed(scene, [(drag.step, drag.edit)]), drag.edit != drag.step.edit
+        of_steps, is_moved = drag.edits(drag.edit), drag.edit != drag.step.edit
+        edits = changed(scene, [(step, of_steps[step.name]) for step in drag.steps])
         self._leave(context, set())
         if is_moved:
             show(scene, edits, drag.bake)
@@ -153,7 +195,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
         if self._drag is not None:
             self._drag.preview.end()
             self._drag = None
-        _shown.picking, _shown.under, _shown.edit = False, "", None
+        _shown.picking, _shown.under, _shown.edits, _shown.box = False, "", {}, ()
         context.workspace.status_text_set(None)
         _redraw()
         return result
@@ -205,8 +247,23 @@ def _under(steps: Sequence[BakedStep], region: Any, view: Any, event: bpy.types.
     return best
 
 
+def _within(box: Sequence[tuple[int, int]], steps: Sequence[BakedStep], region: Any, view: Any) -> list[str]:
+    """Ids of the steps whose middles are seen within a box, two of its corners being given [px]."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d  # noqa: PLC0415
+
+    metre = 1.0 / bpy.context.scene.unit_settings.scale_length
+    low, high = np.min(box, axis=0), np.max(box, axis=0)
+    names = []
+    for step in steps:
+        middle = step.outline().mean(axis=0) * metre
+        place: Any = location_3d_to_region_2d(region, view, Vector(middle.tolist()))
+        if place is not None and (low <= place[:]).all() and (place[:] <= high).all():
+            names.append(step.name)
+    return names
+
+
 def draw_outlines() -> None:
-    """Outline the chosen step, and the one that could be picked; for the viewport's draw handler."""
+    """Outline the chosen steps, and the one that could be picked; for the viewport's draw handler."""
     context: Any = bpy.context
     if context.scene is None or not (_shown.picking or session.current().step):
         return
@@ -224,7 +281,7 @@ def draw_outlines() -> None:
 
 
 def draw_numbers() -> None:
-    """The numbers of the outlined steps; for the viewport's draw handler in pixels."""
+    """The numbers of the outlined steps, and the box that chooses; for the viewport's draw handler in pixels."""
     context: Any = bpy.context
     if context.scene is None or not (_shown.picking or session.current().step):
         return
@@ -240,6 +297,10 @@ def draw_numbers() -> None:
             blf.position(0, place.x, place.y, 0)
             blf.color(0, 1.0, 1.0, 1.0, 1.0)
             blf.draw(0, f"{step.number}")
+    if _shown.box:
+        (x, y), (other_x, other_y) = _shown.box
+        corners = np.array([(x, y, 0), (other_x, y, 0), (other_x, other_y, 0), (x, other_y, 0)], float)
+        overlay.draw_line(overlay.closed(corners), overlay.SIDES[""], overlay.LINE)
 
 
 def _outlined(scene: bpy.types.Scene) -> list[tuple[BakedStep, StepEdit, bool]]:
@@ -247,11 +308,11 @@ def _outlined(scene: bpy.types.Scene) -> list[tuple[BakedStep, StepEdit, bool]]:
     ground = scene.softground.ground
     if ground is None or not baked_ground.is_baked(ground):
         return []
-    chosen = session.current().step
+    chosen = session.chosen_steps()
     return [
-        (step, (_shown.edit or step.edit) if step.name == chosen else step.edit, step.name in (chosen, _shown.under))
+        (step, _shown.edits.get(step.name, step.edit), step.name in (*chosen, _shown.under))
         for step in baked_steps.of(scene)
-        if _shown.picking or step.name == chosen
+        if _shown.picking or step.name in chosen
     ]
 
 

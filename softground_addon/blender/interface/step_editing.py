@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ...core.errors import InputError
 from ...core.record.edits import FARTHEST, LARGEST, LONGEST_SHIFT, SMALLEST, STRONGEST, StepEdit, new_copy, with_edit
@@ -79,18 +79,34 @@ def copied(scene: bpy.types.Scene, copies: Iterable[tuple[BakedStep, StepEdit]])
     session.choose_steps(names[0], names)
 
 
+def toggle(name: str) -> None:
+    """Choose a step with those that are chosen, or no more."""
+    names = [one for one in session.chosen_steps() if one != name]
+    if len(names) == len(session.chosen_steps()):
+        names.insert(0, name)
+    session.choose_steps(names[0] if names else "", names)
+
+
 class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
-    """Choose this step, and go to the frame at which its foot comes down"""
+    """Choose this step, and go to the frame at which its foot comes down. Shift: with the others, or no more"""
 
     bl_idname = "softground.choose_step"
     bl_label = "Choose Step"
     bl_options = {"INTERNAL"}
 
     step: StringProperty(name="Step", description="Id of the step", options={"HIDDEN"})
+    extend: BoolProperty(name="Extend", description="Choose it with the others, or no more", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.extend = event.shift
+        return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        session.choose_steps(self.step)
+        if self.extend:
+            toggle(self.step)
+        else:
+            session.choose_steps(self.step)
         step = baked_steps.active(scene)
         if step is None:
             return {"CANCELLED"}

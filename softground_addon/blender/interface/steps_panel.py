@@ -35,7 +35,10 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         layout.use_property_split = False
         scene = settings.scene_of(context)
         steps, chosen = baked_steps.of(scene), baked_steps.active(scene)
-        _list(layout, steps, chosen)
+        several = baked_steps.chosen(scene)
+        _list(layout, steps, chosen, several)
+        if len(several) > 1:
+            layout.label(text=f"{len(several)} steps are chosen", translate=False)
         layout.operator("softground.drag_step", icon="VIEW_PAN")
         if chosen is not None:
             _buttons(layout, chosen)
@@ -43,13 +46,13 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
             layout.operator("softground.reset_steps", icon="LOOP_BACK")
 
 
-def _list(layout: Any, steps: Any, chosen: BakedStep | None) -> None:
+def _list(layout: Any, steps: Any, chosen: BakedStep | None, several: list[BakedStep]) -> None:
     """Some of the steps, those around the chosen one; with a way to those before and after."""
     at = chosen.number - 1 if chosen else 0
     first = max(0, min(at - SHOWN // 2, len(steps) - SHOWN))
     box = layout.box().column(align=True)
     for step in steps[first : first + SHOWN]:
-        _row(box, step, is_chosen=step is chosen)
+        _row(box, step, is_chosen=step in several)
     row = layout.row(align=True)
     for text, icon, other in (("Earlier", "TRIA_LEFT", at - 1), ("Later", "TRIA_RIGHT", at + 1)):
         part = row.row(align=True)

@@ -87,6 +87,26 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.5
     facts["baked again"] = edits()
 
+    # a box chooses, and what is chosen is dragged together
+    yield from look_from_above(hand)
+    with_viewport(hand, bpy.ops.softground.drag_step, "INVOKE_DEFAULT")
+    wanted = steps()[1:3]
+    places = [on_screen(hand, step.outline().mean(axis=0)) for step in wanted]
+    yield from hand.move(min(x for x, _ in places) - 40, min(y for _, y in places) - 40)
+    hand.event("LEFTMOUSE", "PRESS")
+    yield 0.2
+    yield from hand.move(max(x for x, _ in places) + 40, max(y for _, y in places) + 40)
+    yield from hand.picture("steps_boxed", in_docs=False)
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 0.3
+    facts["boxed"] = sorted(module("session").chosen_steps()), sorted(step.name for step in wanted)
+    before = edits()
+    yield from drag(hand, {}, dy=0.2)
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 1.5
+    after = edits()
+    facts["dragged together"] = [after[step.name][2] - before.get(step.name, [0, 0, 0])[2] for step in wanted]
+
 
 def show_alone(panel: type) -> None:
     """Show a panel once more, open and beside the others: what a region has closed stays closed."""
