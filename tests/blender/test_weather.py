@@ -10,6 +10,7 @@ import pytest
 from softground_addon.blender import compat
 from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_keys, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
+from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import matter_of
 from softground_addon.core.after.weather_course import Weather
 from softground_addon.core.after.weather_places import section_of
@@ -142,6 +143,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
             if not matter.wet or nodes.WETNESS in now.attributes:
                 assert read(now, nodes.WETNESS) == pytest.approx(wanted.wetness, abs=1e-3)
             assert read(now, nodes.FRESH) == pytest.approx(wanted.fresh, abs=1e-3)
+            assert not set(nodes.NOW) & set(now.attributes.keys())
             if matter.wet:
                 assert read(now, nodes.DRIED) == pytest.approx(wanted.dried, abs=1e-3)
             if matter.soaking and not about["inputs"].get("relief_look"):
@@ -283,6 +285,36 @@ def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     for name, identifier in weather_modifier.inputs_of(modifier).items():  # as the panel shows them
         holder, path = compat.input_field(modifier, identifier)
         assert holder.path_resolve(path) == values[name]
+
+
+def test_the_final_mesh_stands_under_the_weather_of_the_last_frame(opened):
+    scene = opened()
+    scene.frame_end = 200
+    without = exports.final_mesh(scene, scene.softground.ground).data
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    wanted = positions(scene, 200)
+    scene.frame_set(5)
+    still = exports.final_mesh(scene, scene.softground.ground).data
+    # The playback adds a height to the place at rest, the mesh holds where that led: they differ by a rounding.
+    assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
+    assert scene.frame_current == 5
+    assert set(still.attributes.keys()) == {*without.attributes.keys(), nodes.WETNESS, nodes.FRESH}
+    weather_modifier.modifier_of(carrier(scene)).show_viewport = False
+    plain = exports.final_mesh(scene, scene.softground.ground).data
+    assert contents(plain) == contents(without)
+
+
+def test_alembic_carries_the_weather(opened, tmp_path):
+    scene = opened()
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    wanted = positions(scene, 200)
+    exports.export_alembic(scene, scene.softground.ground, tmp_path / "ground.abc", 200, 201)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "ground.abc"), as_background_job=False)
+    scene.frame_set(200)
+    imported = bpy.context.view_layer.objects.active
+    mesh = imported.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    world = read(mesh, "position", 3) @ np.array(imported.matrix_world.to_3x3()).T
+    assert np.sort(world[:, 2]) == pytest.approx(np.sort(wanted[:, 2]), abs=1e-5)
 
 
 def test_what_is_blown_full_looks_trodden_no_more(opened):

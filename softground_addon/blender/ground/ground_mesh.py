@@ -206,14 +206,19 @@ def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
 
 
 @contextmanager
-def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> Iterator[bpy.types.Object]:
+def stand_in(
+    ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None, *, weather_at: int | None = None
+) -> Iterator[bpy.types.Object]:
     """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
 
-    Modifiers that change over time are evaluated at the first frame of the bake.
+    Modifiers that change over time are evaluated at the first frame of the bake, or at one at which the copy is to be
+    under weather.
     """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     for shown_in in ground.users_scene[:1]:
         scene.frame_current = shown_in.softground.frame_start
+    if weather_at is not None:
+        scene.frame_current = weather_at
     copy = ground.copy()
     try:
         copy.hide_viewport = False
@@ -221,7 +226,8 @@ def stand_in(ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> It
             copy.modifiers.clear()
         else:
             copy.data = mesh
-            for own in (playback.modifier_of(copy), weather_modifier.modifier_of(copy)):
+            weather = weather_modifier.modifier_of(copy) if weather_at is None else None
+            for own in (playback.modifier_of(copy), weather):
                 if own:
                     copy.modifiers.remove(own)
         scene.collection.objects.link(copy)

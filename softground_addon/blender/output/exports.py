@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
 from ...core.relief_plan import relief_at
-from ..ground import baked_ground, display_key, ground_mesh, own_data, playback
+from ..ground import baked_ground, display_key, ground_mesh, own_data, playback, weather_modifier
 
 
 def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
@@ -113,7 +114,8 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
 def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Object:
     """A new object with the ground as it stands at the end of the bake: a plain mesh, no modifiers or shape keys.
 
-    What the user's modifiers make of the ground is in the mesh.
+    What the user's modifiers make of the ground is in the mesh, and what weather has made of it by the last frame of
+    the scene, or of the bake if that is later.
 
     Raises
     ------
@@ -124,18 +126,28 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
     mesh = ground_mesh.mesh_of(display_mesh).copy()
     display_key.drop_all(mesh)
     ground_mesh.write_positions(mesh, ground_mesh.displayed_positions(display_mesh))
-    own_data.remove(mesh, (own_data.REST, *own_data.OF_PLAYBACK, *own_data.OF_WEATHER))  # those for shading stay
-    if any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
-        with ground_mesh.stand_in(display_mesh, mesh) as evaluated:
+    of_playing = own_data.made(mesh) & {own_data.REST, *own_data.OF_PLAYBACK, *own_data.OF_WEATHER}
+    weather = weather_modifier.modifier_of(display_mesh)
+    last = _last_frame(scene, ground) if weather and weather.show_viewport else None
+    if last is not None or any(item.show_viewport for item in ground_mesh.users_modifiers(display_mesh)):
+        with ground_mesh.stand_in(display_mesh, mesh, weather_at=last) as evaluated:
             plain, mesh = mesh, bpy.data.meshes.new_from_object(evaluated)
         mesh.name = plain.name
         bpy.data.meshes.remove(plain)
+    for name in of_playing.intersection(mesh.attributes.keys()):  # those for shading stay
+        mesh.attributes.remove(mesh.attributes[name])
     still = bpy.data.objects.new(f"{ground.name} Final", mesh)
     for key in own_data.PROPERTIES:
         mesh.pop(key, None)
     still.matrix_world = Matrix(ground_mesh.to_world_of(display_mesh, 1.0).tolist())
     scene.collection.objects.link(still)
     return still
+
+
+def _last_frame(scene: bpy.types.Scene, ground: bpy.types.Object) -> int:
+    """Of the scene, or of the bake if that is later."""
+    inputs = baked_ground.load(ground)[1]["inputs"]
+    return max(scene.frame_end, math.ceil(inputs["frames"][1] * inputs["time_stretch"]))
 
 
 def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -> None:
