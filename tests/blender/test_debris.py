@@ -1,5 +1,6 @@
 """Debris in Blender: it flies by its node group alone, in any order of frames, and Clear takes all of it away."""
 
+import re
 import subprocess
 import sys
 
@@ -12,9 +13,10 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs
+from softground_addon.blender import compat, jobs, mesh_arrays
 from softground_addon.blender.after import debris_object
 from softground_addon.blender.baking import bake_job, step_edits
+from softground_addon.blender.output import debris_points, exports
 from softground_addon.core.after import flight
 from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
@@ -253,3 +255,48 @@ def test_it_plays_without_the_add_on_and_without_scripts(baked, scene):
     scene.frame_set(20)
     ran = subprocess.run([sys.executable, "-c", COUNT, str(baked[0])], capture_output=True, text=True, check=True)
     assert f"shown {len(shown(debris_object.of(scene.softground.ground)))}" in ran.stdout
+
+
+def arrays_of_points(text, name):
+    """Samples of an array in a USD file in text, by frame."""
+    block = re.search(rf"\b{name}\.timeSamples = \{{(.*?)\n\s*\}}", text, re.DOTALL)[1]
+    found = re.findall(r"([-\d.]+): \[(.*?)\]", block, re.DOTALL)
+    return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in found}
+
+
+def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
+    ground = scene.softground.ground
+    obj, before = debris_object.of(ground), fingerprints.of_file()
+    exports.export_usd(scene, ground, tmp_path / "shot.usda", 8, 20)
+    assert fingerprints.of_file() == before
+    text = (tmp_path / "shot.usda").read_text(encoding="utf-8")
+    has_clouds = bpy.app.version >= debris_points.CLOUDS_SINCE
+    kind = "Points " if has_clouds else 'Mesh "[^"]*Debris'
+    (points,) = (part for part in re.split(r"\bdef ", text) if re.match(kind, part))
+    places = arrays_of_points(points, "points")
+    assert len(places) > 5
+    for frame, place in places.items():
+        expected = wanted(obj, frame)
+        assert np.abs(np.sort(place.reshape(-1, 3), axis=0) - np.sort(expected, axis=0)).max() < 1e-4
+    if has_clouds:
+        widths, speeds = (arrays_of_points(points, name) for name in ("widths", "velocities"))
+        for frame, place in places.items():
+            born = values(obj, "softground_birth") <= frame
+            assert np.sort(widths[frame]) == pytest.approx(2 * np.sort(values(obj, "radius")[born]), rel=1e-5)
+            assert speeds[frame].shape == place.shape
+
+
+def test_alembic_carries_debris_as_points_with_speeds(scene, tmp_path):
+    ground = scene.softground.ground
+    obj, before = debris_object.of(ground), fingerprints.of_file()
+    exports.export_alembic(scene, ground, tmp_path / "shot.abc", 8, 20)
+    assert fingerprints.of_file() == before
+    there = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "shot.abc"), as_background_job=False)
+    (copy,) = [one for one in set(bpy.data.objects) - there if one.type == "MESH" and not len(one.data.polygons)]
+    for frame in (10, 16, 20):
+        scene.frame_set(frame)
+        shown = copy.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        world = mesh_arrays.positions(shown.data) @ np.array(shown.matrix_world)[:3, :3].T
+        assert np.abs(np.sort(world, axis=0) - np.sort(wanted(obj, frame), axis=0)).max() < 1e-4
+        assert len(shown.data.attributes["velocity"].data) == len(world)

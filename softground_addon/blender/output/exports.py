@@ -18,7 +18,12 @@ from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
 from ...core.relief_plan import relief_at
+from ..after import debris_object
 from ..ground import baked_ground, display_key, ground_mesh, own_data, playback, weather_modifier
+from . import debris_points
+
+BYTES_OF_A_POINT = 24
+"""Of debris in a frame of Alembic: place and velocity."""
 
 
 def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
@@ -52,7 +57,7 @@ def export_point_cache(scene: bpy.types.Scene, ground: bpy.types.Object, path: P
 
 
 def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
-    """Write the ground that carries the bake as Alembic, with Blender's exporter.
+    """Write the ground that carries the bake, and its debris as points, as Alembic, with Blender's exporter.
 
     Raises
     ------
@@ -60,9 +65,17 @@ def export_alembic(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path,
         If there is no bake, or the file cannot be written.
     """
     display_mesh = baked_display_mesh(ground)
-    with _only(scene, display_mesh, start, end), replacing(path) as partial:
+    with (
+        _only(scene, display_mesh, start, end),
+        debris_points.selected(scene, ground, clouds=False),
+        replacing(path) as partial,
+    ):
         shown = display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        check_room(path, size_of_alembic(ground_mesh.mesh_of(shown), end - start + 1))  # else Blender ends
+        frames, debris = end - start + 1, debris_object.of(ground)
+        size = size_of_alembic(ground_mesh.mesh_of(shown), frames)
+        if debris is not None:
+            size += frames * BYTES_OF_A_POINT * len(ground_mesh.mesh_of(debris).vertices)
+        check_room(path, size)  # else Blender ends
         options = {
             "selected": True,
             "start": start,
@@ -88,7 +101,7 @@ def size_of_alembic(mesh: bpy.types.Mesh, frames: int) -> int:
 
 
 def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, start: int, end: int) -> None:
-    """Write the ground that carries the bake as USD, with Blender's exporter.
+    """Write the ground that carries the bake, and its debris as points, as USD, with Blender's exporter.
 
     Raises
     ------
@@ -99,7 +112,11 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
         raise InputError(
             f"Blender writes USD from frame 0 on, not from {start}: give another first frame, or export Alembic."
         )
-    with _only(scene, baked_display_mesh(ground), start, end), replacing(path) as partial:
+    with (
+        _only(scene, baked_display_mesh(ground), start, end),
+        debris_points.selected(scene, ground, clouds=True),
+        replacing(path) as partial,
+    ):
         options = {
             "selected_objects_only": True,
             "export_subdivision": "TESSELLATE",

@@ -1,0 +1,70 @@
+"""Debris as plain points, each where it is at the frame, for files of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+from ..after import debris_nodes as nodes
+from ..after import debris_object
+from ..node_graph import NodeGraph, new_group
+
+CLOUDS_SINCE = (4, 3)
+"""Blender that writes point clouds to USD; an earlier one gets the vertices of a mesh."""
+
+
+@contextmanager
+def selected(scene: bpy.types.Scene, ground: bpy.types.Object, *, clouds: bool) -> Iterator[None]:
+    """What a ground's bake throws as an object of points that is selected, and gone afterwards; none without debris.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    ground : bpy.types.Object
+    clouds : bool
+        Whether the format takes point clouds, which have a `radius`. Else they are the vertices of a mesh.
+    """
+    debris = debris_object.of(ground)
+    if debris is None:
+        yield
+        return
+    clouds = clouds and bpy.app.version >= CLOUDS_SINCE
+    points: Any = (bpy.data.pointclouds if clouds else bpy.data.meshes).new(f"{ground.name} Debris")
+    obj, group = bpy.data.objects.new(points.name, points), _group(debris, clouds)
+    try:
+        modifier: Any = obj.modifiers.new(group.name, "NODES")
+        modifier.node_group = group
+        scene.collection.objects.link(obj)
+        obj.select_set(True)
+        yield
+    finally:
+        bpy.data.objects.remove(obj)
+        (bpy.data.pointclouds if clouds else bpy.data.meshes).remove(points)
+        bpy.data.node_groups.remove(group)
+
+
+def _group(debris: bpy.types.Object, clouds: bool) -> Any:
+    """Nodes that give the points of an object and of its instances."""
+    graph = NodeGraph(new_group("SoftGround Debris Points", nodes.MARK))
+    graph.tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source = graph.node("GeometryNodeObjectInfo")
+    source.transform_space = "RELATIVE"
+    source.inputs["Object"].default_value = debris
+    parts = graph.node("GeometryNodeSeparateComponents")
+    graph.link(source.outputs["Geometry"], parts.inputs["Geometry"])
+    pieces = graph.node("GeometryNodeInstancesToPoints")
+    graph.link(parts.outputs["Instances"], pieces.inputs["Instances"])
+    graph.link(graph.attribute(nodes.RADIUS), pieces.inputs["Radius"])
+    joined = graph.node("GeometryNodeJoinGeometry")
+    graph.link(parts.outputs["Point Cloud"], joined.inputs["Geometry"])
+    graph.link(pieces.outputs["Points"], joined.inputs["Geometry"])
+    geometry = graph.forgotten(joined.outputs["Geometry"], nodes.FLIGHT, nodes.RANK)
+    if not clouds:
+        vertices = graph.node("GeometryNodePointsToVertices")
+        graph.link(geometry, vertices.inputs["Points"])
+        geometry = vertices.outputs["Mesh"]
+    graph.finish(geometry)
+    return graph.tree
