@@ -161,6 +161,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         relief_look=options.material.surface if options.relief != "OFF" else "",
         margin_m=typed(options.ground_margin),
         keep_forces=options.keep_forces,
+        longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
     )
 

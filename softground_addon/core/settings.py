@@ -183,6 +183,8 @@ class BakeSettings(SceneUnits):
     margin_m : float
         How far a ground that is made reaches beyond the walk.
     keep_forces : bool
+    longest_bake_s : float
+        A bake that would take longer is refused.
     debris : bool
         Whether steps throw what physics says, which is then missing from their rims.
     """
@@ -212,6 +214,7 @@ class BakeSettings(SceneUnits):
     relief_look: str = field(metadata=_on(Acts.WRITING))
     margin_m: float = field(metadata=_on(Acts.OUTPUT))
     keep_forces: bool = field(metadata=_on(Acts.OUTPUT))
+    longest_bake_s: float = field(metadata=_on(Acts.OUTPUT))
     debris: bool = field(default=False, metadata=_on(Acts.RESPONDING))
 
     @property

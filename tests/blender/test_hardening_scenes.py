@@ -200,6 +200,28 @@ def test_an_absurd_cell_size_is_refused_with_the_estimate(scene, capfd, monkeypa
     assert dry_run("--cell-size", max(size, 2e-3)) == 0
 
 
+@pytest.mark.parametrize("memory", [None, 1e12])
+def test_an_absurd_cell_size_is_refused_on_a_machine_of_any_memory(scene, capfd, monkeypatch, memory):
+    shots.walker(scene, frames=72)
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: memory)
+    said = refused(capfd, "--cell-size", "0.0001")
+    assert "minutes are allowed (Longest Bake" in said
+    assert " 10 minutes are allowed" in refused(capfd, "--cell-size", "0.0001", "--set", "longest_bake=10")
+    scene.frame_set(1)
+    before = fingerprints.of_file()
+    for operator in (bpy.ops.softground.bake, bpy.ops.softground.live, bpy.ops.softground.match_depth):
+        with pytest.raises(RuntimeError, match="minutes are allowed"):
+            operator()
+    assert fingerprints.of_file() == before
+
+
+def test_whoever_allows_a_long_bake_gets_it(scene, capfd, monkeypatch):
+    shots.walker(scene, frames=24)
+    monkeypatch.setattr("softground_addon.core.loads.cell_limits.SECONDS_PER_CELL", 100.0)
+    assert "hours" in refused(capfd, "--cell-size", "0.02")
+    assert dry_run("--cell-size", "0.02", "--set", "longest_bake=10000") == 0, capfd.readouterr().err
+
+
 def test_another_add_ons_failing_handler_does_not_spoil_a_bake(walker):
     calls = []
 

@@ -348,7 +348,7 @@ def _simulate(
 ) -> Job[tuple[list[Footprint], dict[str, object] | None]]:
     """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
     footprints: list[Footprint] = []
-    check_cell_size(loads, wanted.cell_size_m)
+    check_cell_size(loads, wanted.cell_size_m, wanted.longest_bake_s)
     frames: list[float] = []
     forces: list[tuple[Array, ...]] = []
     count = max(len(motion.frames) for motion in shot.motions)

@@ -101,6 +101,7 @@ class SOFTGROUND_PT_mesh(_Closed, bpy.types.Panel):
         column.prop(options.material, "surface")
         column.operator("softground.apply_look", icon="MATERIAL")
         column.prop(options, "cell_size_cm")
+        column.prop(options, "longest_bake")
         column.prop(options.material, "blur_sigma_cm")
         column.prop(options, "detail")
         column.prop(options, "ground_margin")

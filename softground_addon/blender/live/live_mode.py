@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.ground.heightfield import Window
 from ...core.ground_plan import plan_ground
+from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.numerics.cell_keys import cells_at, keys_at
 from ...core.playhead import Playhead
@@ -57,6 +58,7 @@ class LiveMode:
     def __init__(self, scene: bpy.types.Scene) -> None:
         wanted = settings_of(scene)
         known = analysis.read(scene)
+        check_cell_size(known.loads, wanted.cell_size_m, wanted.longest_bake_s)
         if wanted.ground is None:
             assert known.shot.plan is not None
             with analysis.own_changes(scene):
@@ -119,7 +121,7 @@ class LiveMode:
         Raises
         ------
         InputError
-            If the shot cannot be read any more.
+            If the shot cannot be read any more, or its cells would take too much memory or time.
         """
         try:
             return self._answer(scene, time.perf_counter() + seconds)
@@ -162,6 +164,7 @@ class LiveMode:
         known = yield from _in_steps(analysis.refreshing(scene))
         if known is None:
             raise InputError("The shot cannot be read any more.")
+        check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
         whole = self._playhead
         if not self._presses_like(known, asked):
             if self._playhead.ground.cell_size == asked.cell_size_m:

@@ -80,6 +80,15 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     cell_size_cm: in_unit(
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
+    longest_bake: FloatProperty(
+        name="Longest Bake (min)",
+        description="A bake that is estimated to take longer than this is refused before it starts, with the estimate. "
+        "Raise it for one that may take all night",
+        default=20.0,
+        min=1.0,
+        max=10_000.0,
+        precision=0,
+    )
     shape_keys: BoolProperty(
         name="Keep Shape Keys",
         description="Keep the raw and the smoothed heights as shape keys, to blend or sculpt. Left out on grounds of "

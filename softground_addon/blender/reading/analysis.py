@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
-from ...core.loads.cell_limits import pressed_area
+from ...core.loads.cell_limits import check_cell_size, pressed_area
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_velocity
 from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus, typical_depth
@@ -222,6 +222,7 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
         If there is none, or the shot cannot be read.
     """
     analysis, wanted = read(scene), settings.snapshot(scene)
+    check_cell_size(analysis.loads, wanted.cell_size_m, wanted.longest_bake_s)
     aim = depth
     for _ in range(TRIALS):
         modulus = matching_modulus(analysis.contacts, wanted.material, aim, wanted.pressure)

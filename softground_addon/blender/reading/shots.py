@@ -206,7 +206,7 @@ def sample_characters(
     scene: bpy.types.Scene, wanted: BakeSettings
 ) -> Job[tuple[list[CharacterMotion], tuple[ReadRig, ...]]]:
     """The motion of each character; where they are to respond, also how the bones stand that this is keyed on."""
-    check_frames(*wanted.frames, len(wanted.characters))
+    check_frames(*wanted.frames, len(wanted.characters), wanted.longest_bake_s)
     motions, rigs = [], []
     frames = range(wanted.frames[0], wanted.frames[1] + 1)
     for number, one in enumerate(wanted.characters):

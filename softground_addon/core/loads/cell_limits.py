@@ -1,4 +1,4 @@
-"""Whether a shot can be baked: neither cells nor frames that no memory holds, nor cells that swallow a foot."""
+"""Whether a shot can be baked: in memory, in the time that is allowed, with cells that show a foot."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from .estimate import CharacterLoads
 BYTES_PER_CELL = 1000.0
 """What a cell under a print takes from simulation to playback [bytes], as measured on walks at 1 and 0.5 mm."""
 
-SECONDS_PER_CELL = 3e-5
-"""What it takes to simulate [s], about: as measured on walks at 1 and 0.5 mm."""
+SECONDS_PER_CELL = 1e-4
+"""What it takes to write [s]: 50 to 110 µs on walks and a rolling ball with cells of 4 to 1 mm, ..."""
+
+SECONDS_PER_CELL_HELD = 5.5e-5
+"""... and to simulate, for each second that a sole is on it [s/s]: 45 to 70 µs, from standing to walking."""
 
 BYTES_PER_FRAME = 60e3
 """What a frame of a character takes from reading to playback [bytes], as measured on a walk of 100,000 frames."""
@@ -45,14 +48,27 @@ def pressed_area(loads: Sequence[CharacterLoads]) -> float:
     return area
 
 
-def check_cell_size(loads: Sequence[CharacterLoads], cell_size: float, available: float | None = None) -> None:
-    """Raise InputError if the bake would not fit into memory, or a sole into a cell; names a cell size that works.
+def bake_time(loads: Sequence[CharacterLoads], cell_size: float) -> float:
+    """What a bake with cells of that size [m] takes [s], within a factor of two on a machine of 2026."""
+    held = 0.0
+    for character in loads:
+        areas = [sole.sole.area for sole in character.motion.soles]
+        held += float(character.contacts.touching.sum(axis=0) @ areas) * character.motion.time_step
+    return (pressed_area(loads) * SECONDS_PER_CELL + held * SECONDS_PER_CELL_HELD) / cell_size**2
+
+
+def check_cell_size(
+    loads: Sequence[CharacterLoads], cell_size: float, longest: float, available: float | None = None
+) -> None:
+    """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
     Parameters
     ----------
     loads : sequence of CharacterLoads
     cell_size : float
         [m]
+    longest : float
+        What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
     """
@@ -65,40 +81,56 @@ def check_cell_size(loads: Sequence[CharacterLoads], cell_size: float, available
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
-    needed = pressed_area(loads) / cell_size**2 * BYTES_PER_CELL
-    if available is None or needed <= USABLE * available:
+    needed, time = pressed_area(loads) / cell_size**2 * BYTES_PER_CELL, bake_time(loads, cell_size)
+    too_much = _too_much(needed, time, longest, available)
+    if not too_much:
         return
     names = ", ".join(f"'{character.motion.name}'" for character in loads)
-    fits = cell_size * np.sqrt(needed / (USABLE * available)) * 1.05
-    minutes = needed / BYTES_PER_CELL * SECONDS_PER_CELL / 60
+    fits = cell_size * np.sqrt(max(needed / (USABLE * available) if available else 0.0, time / longest)) * 1.05
     raise InputError(
-        f"Cells of {cell_size * 1e3:g} mm would take about {needed / 1e9:,.0f} GB of memory and {minutes:,.0f} minutes "
-        f"for the steps of {names}, and this machine has {available / 1e9:,.0f} GB: set a cell size of at least "
-        f"{fits * 1e3:.2g} mm, or bake fewer frames."
+        f"Cells of {cell_size * 1e3:g} mm would take about {_amount(needed, time)} for the steps of {names}, and "
+        f"{too_much}: set a cell size of at least {fits * 1e3:.2g} mm, or bake fewer frames."
     )
 
 
-def check_frames(first: int, last: int, characters: int, available: float | None = None) -> None:
-    """Raise InputError if so many frames of so many characters would not fit into memory; says what they would take.
+def check_frames(first: int, last: int, characters: int, longest: float, available: float | None = None) -> None:
+    """Raise InputError if so many frames of so many characters do not fit into memory or time; says what they take.
 
     Parameters
     ----------
     first, last : int
     characters : int
+    longest : float
+        What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
     """
     available = machine_memory() if available is None else available
     count = last - first + 1
-    needed = count * characters * BYTES_PER_FRAME
-    if available is None or needed <= USABLE * available:
-        return
-    hours = count * characters / FRAMES_PER_SECOND / 3600
-    raise InputError(
-        f"The {count:,} frames from {first} to {last} would take about {needed / 1e9:,.0f} GB of memory and "
-        f"{hours:,.0f} hours, and this machine has {available / 1e9:,.0f} GB: set the first and the last frame of the "
-        "bake, and look for a key that lies far away from the others."
-    )
+    needed, time = count * characters * BYTES_PER_FRAME, count * characters / FRAMES_PER_SECOND
+    too_much = _too_much(needed, time, longest, available)
+    if too_much:
+        raise InputError(
+            f"The {count:,} frames from {first} to {last} would take about {_amount(needed, time)}, and {too_much}: "
+            "set the first and the last frame of the bake, and look for a key that lies far away from the others."
+        )
+
+
+def _too_much(needed: float, time: float, longest: float, available: float | None) -> str:
+    """Which limit memory [bytes] or time [s] are beyond; empty where neither is."""
+    if available is not None and needed > USABLE * available:
+        return f"this machine has {available / 1e9:,.0f} GB"
+    if time > longest:
+        return f"{_duration(longest)} are allowed (Longest Bake in Advanced > Mesh and Look, or --set longest_bake=N)"
+    return ""
+
+
+def _amount(needed: float, time: float) -> str:
+    return f"{needed / 1e9:,.{int(needed < 1e10)}f} GB of memory and {_duration(time)}"
+
+
+def _duration(time: float) -> str:
+    return f"{np.ceil(time / 60):,.0f} minutes" if time < 7200 else f"{time / 3600:,.0f} hours"
 
 
 def machine_memory() -> float | None:

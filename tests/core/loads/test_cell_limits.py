@@ -6,11 +6,18 @@ import pytest
 
 from softground_addon.core.errors import InputError
 from softground_addon.core.loads import cell_limits
-from softground_addon.core.loads.cell_limits import check_cell_size, check_frames, machine_memory, pressed_area
+from softground_addon.core.loads.cell_limits import (
+    bake_time,
+    check_cell_size,
+    check_frames,
+    machine_memory,
+    pressed_area,
+)
 from tests.core.walkers import box_sole, standing
 
 WEIGHT = 750.0
 LOADS = standing(box_sole(0.2, 0.1), [(0.0, 0.0, 0.0)], WEIGHT)
+ALL_NIGHT = 36_000.0
 
 
 def named_size(error):
@@ -23,23 +30,49 @@ def test_a_sole_that_stands_covers_its_area_once():
 
 def test_cells_that_no_memory_holds_are_refused_with_a_size_that_fits():
     with pytest.raises(InputError, match="GB of memory") as error:
-        check_cell_size([LOADS], 1e-5, available=1e9)
+        check_cell_size([LOADS], 1e-5, ALL_NIGHT, available=1e9)
     assert named_size(error) > 1e-5
-    check_cell_size([LOADS], named_size(error), available=1e9)
-    check_cell_size([LOADS], 1e-5, available=1e15)
+    check_cell_size([LOADS], named_size(error), ALL_NIGHT, available=1e9)
+    check_cell_size([LOADS], 1e-5, ALL_NIGHT, available=1e15)
 
 
 def test_cells_that_swallow_a_sole_are_refused_with_a_size_that_shows_it():
     with pytest.raises(InputError, match="smaller than a cell") as error:
-        check_cell_size([LOADS], 0.3)
+        check_cell_size([LOADS], 0.3, 60.0)
     assert named_size(error) == pytest.approx(0.02)
-    check_cell_size([LOADS], 0.15)
+    check_cell_size([LOADS], 0.15, 60.0)
 
 
 def test_frames_that_no_memory_holds_are_refused_with_what_they_would_take():
     with pytest.raises(InputError, match=r"2,097,149 frames from -1048574 .* 126 GB of memory and 6 hours"):
-        check_frames(-1_048_574, 1_048_574, 1, available=24e9)
-    check_frames(1, 100_000, 1, available=24e9)
+        check_frames(-1_048_574, 1_048_574, 1, ALL_NIGHT, available=24e9)
+    check_frames(1, 100_000, 1, ALL_NIGHT, available=24e9)
+
+
+def test_what_a_bake_takes_grows_with_the_cells_and_with_how_long_a_sole_is_on_them():
+    longer = standing(box_sole(0.2, 0.1), [(0.0, 0.0, 0.0)], WEIGHT, seconds=11.0)
+    cells = pressed_area([LOADS]) / 0.002**2
+    assert bake_time([LOADS], 0.001) == pytest.approx(4 * bake_time([LOADS], 0.002))
+    held = bake_time([longer], 0.002) - bake_time([LOADS], 0.002)
+    assert held == pytest.approx(10.0 * cells * cell_limits.SECONDS_PER_CELL_HELD, rel=0.02)
+
+
+@pytest.mark.parametrize("available", [1e15, None])
+def test_cells_that_take_too_long_are_refused_with_a_size_that_does_not(available):
+    took = bake_time([LOADS], 1e-4)
+    with pytest.raises(
+        InputError, match=rf"GB of memory and {int(took / 60) + 1} minutes .* 1 minutes are allowed"
+    ) as error:
+        check_cell_size([LOADS], 1e-4, 60.0, available)
+    assert 1e-4 < named_size(error) < 1e-3
+    check_cell_size([LOADS], named_size(error), 60.0, available)
+    check_cell_size([LOADS], 1e-4, took, available)
+
+
+def test_frames_that_take_too_long_are_refused():
+    with pytest.raises(InputError, match=r"and 17 minutes, and 10 minutes are allowed"):
+        check_frames(1, 100_000, 1, 600.0, available=1e15)
+    check_frames(1, 100_000, 1, 1200.0, available=1e15)
 
 
 @pytest.mark.parametrize(
