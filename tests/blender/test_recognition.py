@@ -111,3 +111,24 @@ def test_a_fingertip_on_the_ground_does_not_size_the_cells(scene):
     assert "Root" in {sole.bone for sole in character.soles}
     assert 0.02 < character.sole_length < 0.05
     assert scene.softground.cell_size > 0.02 / scene.softground.cells_along_sole
+
+
+def test_a_limb_lies_where_its_skin_does_though_other_bones_bend_it(scene):
+    ends = {"Root": ((0, 0, 0), (0, 0, 0.1)), "Hip": ((0, 0, 1), (0, 0, 1.1)), "Back": ((0, 0, 1), (0, 0, 1.1))}
+    armature = rigs.build("Sleeper", ends, {"Hip": "Root", "Back": "Root"})
+    box("body", 0.5, (0, 0, 1), armature, "Hip")
+    body = bpy.data.objects["body"]
+    body.vertex_groups["Hip"].add(range(8), 0.6, "REPLACE")
+    body.vertex_groups.new(name="Back").add(range(8), 0.4, "REPLACE")
+    down = {frame: min(frame / 15, 1.0) for frame in range(1, FRAMES + 1)}
+    rigs.key(armature, "location", {frame: (0, -0.4 * part, 0) for frame, part in down.items()}, bone="Hip")
+    rigs.key(armature, "location", {frame: (0, -0.9 * part, 0) for frame, part in down.items()}, bone="Back")
+    character = add_character(scene, armature)
+    (sole,) = character.soles
+    sole.kind = "LIMB"
+    reading = sample_character(scene, armature, mapping_of(character), mass=10.0, frames=range(1, FRAMES + 1))
+    motion = jobs.run(jobs.counted(reading, "sample", FRAMES))
+    (limb,) = motion.soles
+    assert motion.ground_level == pytest.approx(0.75 - 0.6 * 0.4 - 0.4 * 0.9, abs=2e-3)
+    assert limb.bears[20:].all()
+    assert limb.lowest()[20:] == pytest.approx(motion.ground_level, abs=2e-3)

@@ -106,7 +106,7 @@ def assemble_motion(
     motions.update(carried)
     if stances:
         for name, bears in stances.bears.items():
-            motions[name] = replace(motions[name], bears=bears)
+            motions[name] = _at_its_skin(replace(motions[name], bears=bears), stances.low.get(name))
 
     return CharacterMotion(
         name=rest.armature.name,
@@ -154,6 +154,18 @@ def _limb_motions(
         transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
         motions[source.name] = SoleMotion(sole, transforms[:, None])
     return motions
+
+
+def _at_its_skin(motion: SoleMotion, low: Array | None) -> SoleMotion:
+    """A limb as high as its lowest skin (F,) [m] while that bears: skin bends where limbs join, and this does not."""
+    bears = motion.bears
+    if low is None or bears is None or not bears.any():
+        return motion
+    frames = np.arange(len(low))
+    lift = np.interp(frames, frames[bears], (low - motion.lowest())[bears])
+    transforms = motion.transforms.copy()
+    transforms[:, :, 2, 3] += lift[:, None]
+    return replace(motion, transforms=transforms)
 
 
 def along_bone(matrices: Array, distance: float) -> Array:

@@ -42,6 +42,8 @@ class SkinStances:
         The sample at which most of a foot's underside is on the ground.
     meshes : mapping of str to FootMesh
         The foot's skin as it is then.
+    low : mapping of str to (F,) float array
+        Height of the lowest skin of each limb [m].
     skin : LowSkin
         Where all of it is lowest.
     """
@@ -50,6 +52,7 @@ class SkinStances:
     bears: Mapping[str, NDArray[np.bool_]]
     standing: Mapping[str, int]
     meshes: Mapping[str, FootMesh]
+    low: Mapping[str, NDArray[np.float64]]
     skin: LowSkin
 
 
@@ -112,9 +115,14 @@ def skin_stances(
         if mesh is not None:
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
+    low = {
+        source.name: tracks.low[:, group == number].min(axis=1) * height
+        for number, source in enumerate(sources)
+        if source.limb and number in present
+    }
     lowest = np.concatenate([tracks.place, tracks.low[..., None]], axis=-1) * height
     skin_there = LowSkin(recording.frames, lowest, tracks.rise * height, tracks.calm * height, height, mass)
-    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, skin_there)
+    return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, skin_there)
 
 
 def _bones_of(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:

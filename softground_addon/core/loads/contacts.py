@@ -131,13 +131,18 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     sharp, offset = (np.array(values) for values in zip(*found, strict=True))
     if seen is not None and np.ptp(offset) > LEAVE_HEIGHT * motion.leg_length:
         return seen  # the feet of one body stand on one ground: these heights are those of feet that swing
-    touching = [
+    dated = [
         _beside(sharp[index], np.delete(sharp, index, axis=0), track.velocity - drift, motion)
         for index, track in enumerate(tracks)
     ]
+    touching = np.stack(dated, axis=1)
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
-    return Contacts(np.stack(touching, axis=1), offset, normal, clearance)
+    if seen is None:
+        return Contacts(touching, offset, normal, clearance)
+    # What a limb that rolls turns to the ground has no speed of its own.
+    limb = np.array([sole.sole.prop is not None for sole in motion.soles])
+    return Contacts(touching | (seen.touching & limb), offset, normal, clearance)
 
 
 def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track]) -> Contacts | None:

@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.intervals import close_short, hysteresis, runs
 from tests.core.character import Slope, character, flat_sole
+from tests.core.prop_bodies import prop_sole, sphere
 
 RATE = 120.0
 
@@ -123,6 +125,30 @@ def test_feet_whose_heights_disagree_about_their_ground_touch_when_their_skin_do
     contacts = detect_contacts(motion, Slope())
     assert np.array_equal(contacts.touching, np.stack([~flies, np.ones_like(flies)], axis=1))
     assert contacts.offset.tolist() == [0.0, 0.0]
+
+
+def test_a_limb_that_rolls_over_the_ground_touches_when_its_skin_does():
+    time = np.arange(120) / RATE
+    path = np.stack([2.0 * time, 0 * time, 0.1 + 0 * time], axis=1)
+    transforms = np.tile(np.eye(4), (120, 1, 1, 1))
+    transforms[:, 0, :3, 3] = path
+    seen = np.ones(120, dtype=bool)
+    seen[:30] = False
+    limb = SoleMotion(prop_sole(*sphere(0.1), name="head"), transforms, bears=seen)
+    foot = replace(flat_sole(np.zeros((120, 3))), bears=np.ones(120, dtype=bool))
+    motion = replace(character([foot, limb], hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0)
+    assert np.array_equal(detect_contacts(motion, Slope()).touching[:, 1], seen)
+
+
+@pytest.mark.parametrize("hangs", [0.0, 0.015])
+def test_a_limb_that_lies_still_just_over_the_ground_touches_though_its_skin_does_not(hangs):
+    down = np.maximum(1.0 - 2.0 * np.arange(180) / RATE, hangs) + 0.1
+    transforms = np.tile(np.eye(4), (180, 1, 1, 1))
+    transforms[:, 0, 2, 3] = down
+    head = SoleMotion(prop_sole(*sphere(0.1), name="head"), transforms, bears=down < 0.1 + 0.012)
+    foot = replace(flat_sole(np.zeros((180, 3))), bears=np.ones(180, dtype=bool))
+    motion = replace(character([foot, head], hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0)
+    assert detect_contacts(motion, Slope()).touching[-60:].all()
 
 
 def step_beside():
