@@ -138,6 +138,8 @@ def _supported(motion: CharacterMotion, contacts: Contacts, force: Array) -> NDA
     overlap = round(SEARCH * unit)
     same_height, highest = SUPPORT_RANGE * motion.leg_length, HIGHEST_SUPPORT * motion.leg_length
     clearance, touching = contacts.clearance, contacts.touching.copy()
+    if contacts.aloft is not None:
+        clearance = np.where(contacts.aloft, np.inf, clearance)
     unsupported = [
         (first, last)
         for first, last in zip(*runs((force > FREE_FALL) & ~touching.any(axis=1)), strict=True)

@@ -69,6 +69,9 @@ BESIDE = 0.33
 later it then may, in sqrt(leg length/gravity) (0.1 s)."""
 SWING = 2.0
 """Time in which a swinging foot has been at its fastest, in the same unit (0.6 s)."""
+HIGHEST_SEEN = 0.018
+"""A sole higher than this over the level on which its skin rests hangs in the air, in body heights
+(`skin.bearing.LEAVE`)."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 
@@ -86,16 +89,20 @@ class Contacts:
         The ground's unit normal under each sole.
     clearance : (N, S) float array
         Distance of each sole from its ground after `offset` is removed [m], infinite where nothing can bear it.
+    aloft : (N, S) bool array, optional
+        Where the skin shows a sole in the air, if it tells.
     """
 
     touching: Mask
     offset: Array
     normal: Array
     clearance: Array
+    aloft: Mask | None = None
 
     def during(self, steps: slice) -> Contacts:
         """The contacts at some of the steps."""
-        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps])
+        aloft = None if self.aloft is None else self.aloft[steps]
+        return Contacts(self.touching[steps], self.offset, self.normal[steps], self.clearance[steps], aloft)
 
 
 def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
@@ -142,7 +149,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
         return Contacts(touching, offset, normal, clearance)
     # What a limb that rolls turns to the ground has no speed of its own.
     limb = np.array([sole.sole.prop is not None for sole in motion.soles])
-    return Contacts(touching | (seen.touching & limb), offset, normal, clearance)
+    return Contacts(touching | (seen.touching & limb), offset, normal, clearance, seen.aloft)
 
 
 def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track]) -> Contacts | None:
@@ -163,7 +170,9 @@ def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track
     if abs(offset) > FLOAT_LIMIT * motion.leg_length:
         return None
     normal = np.stack([track.normal for track in tracks], axis=1)
-    return Contacts(touching, np.full(len(tracks), offset), normal, clearance - offset)
+    clearance -= offset
+    aloft = clearance > HIGHEST_SEEN * motion.skin.height if motion.skin else None
+    return Contacts(touching, np.full(len(tracks), offset), normal, clearance, aloft)
 
 
 def ground_normal(terrain: Terrain, x: Array, y: Array, *, reach: float) -> Array:

@@ -1,5 +1,7 @@
 """Contacts that agree with the forces on the whole body, on bodies whose forces are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,6 +76,18 @@ def test_a_body_that_is_held_up_stands_on_its_lowest_foot_however_it_floats():
     refined = refine_contacts(motion, contacts(np.zeros((120, 2)), clearance), body_dynamics(motion)).touching
     assert refined[:, 0].all()
     assert not refined[:, 1].any()
+
+
+def test_a_sole_that_the_skin_shows_in_the_air_bears_nothing_whatever_holds_the_body_up():
+    motion = character([flat_sole(np.zeros((120, 3)), name=side) for side in "lr"], hips=(0, 0, 0.9), rate=RATE)
+    body = body_dynamics(motion)
+
+    def touching(*aloft):
+        found = contacts(np.zeros((120, 2)), np.tile((0.05, 0.06), (120, 1)))
+        return refine_contacts(motion, replace(found, aloft=np.tile(aloft, (120, 1))), body).touching
+
+    assert not touching(True, True).any()
+    assert touching(False, True).all(axis=0).tolist() == [True, False]
 
 
 def test_a_body_that_hangs_high_stands_on_nothing():

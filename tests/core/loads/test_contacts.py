@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softground_addon.core.loads.contacts import detect_contacts
-from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.motion.motion import LowSkin, SoleMotion
 from softground_addon.core.numerics.intervals import close_short, hysteresis, runs
 from tests.core.character import Slope, character, flat_sole
 from tests.core.prop_bodies import prop_sole, sphere
@@ -138,6 +138,18 @@ def test_a_limb_that_rolls_over_the_ground_touches_when_its_skin_does():
     foot = replace(flat_sole(np.zeros((120, 3))), bears=np.ones(120, dtype=bool))
     motion = replace(character([foot, limb], hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0)
     assert np.array_equal(detect_contacts(motion, Slope()).touching[:, 1], seen)
+
+
+def test_the_skin_tells_which_soles_are_in_the_air_where_the_ground_is_level_under_it():
+    steps = 240
+    path = np.zeros((steps, 3))
+    path[:, 0] = np.linspace(0.0, 4.0, steps)
+    path[:, 2] = np.where(np.arange(steps) < 120, 0.0, 0.06)
+    foot = replace(flat_sole(path), bears=path[:, 2] == 0)
+    skin = LowSkin(np.arange(steps), path[:, None], np.zeros((steps, 1)), 0.3, 1.78)
+    motion = replace(character([foot], hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0, skin=skin)
+    assert np.array_equal(detect_contacts(motion, Slope()).aloft[:, 0], path[:, 2] > 0)
+    assert detect_contacts(motion, Slope(slope=0.05)).aloft is None
 
 
 @pytest.mark.parametrize("hangs", [0.0, 0.015])
