@@ -140,6 +140,18 @@ def test_a_limb_that_rolls_over_the_ground_touches_when_its_skin_does():
     assert np.array_equal(detect_contacts(motion, Slope()).touching[:, 1], seen)
 
 
+def test_a_foot_that_skids_as_it_lands_touches_from_when_its_skin_does():
+    time = np.arange(180) / RATE
+    height = np.maximum(0.5 - 2.0 * time, 0.0)
+    skids = (height == 0) & (time < 0.45)
+    along = 3.0 * np.minimum(time, 0.45)
+    foot = flat_sole(np.stack([along, 0 * time, height], axis=1))
+    motion = character([replace(foot, bears=height == 0)], hips=(0.0, 0.0, 0.9), rate=RATE)
+    assert not detect_contacts(motion, Slope()).touching[skids].any()
+    touching = detect_contacts(replace(motion, ground_level=0.0), Slope()).touching[:, 0]
+    assert np.array_equal(touching, height == 0)
+
+
 def test_the_skin_tells_which_soles_are_in_the_air_where_the_ground_is_level_under_it():
     steps = 240
     path = np.zeros((steps, 3))
