@@ -1,6 +1,7 @@
 """Edits of steps from a file: into the ground, the exports and the report, and with the step through further bakes."""
 
 import json
+import os
 
 import bpy
 import numpy as np
@@ -119,3 +120,16 @@ def test_edits_that_are_not_there_are_named(shot, capsys):
     options = [f"--edits={folder / 'nowhere.json'}", "--dry-run"]
     assert cli.run_standalone(["bake", str(folder / "shot.blend"), *options]) == cli.EXIT_BAD_INPUT
     assert "nowhere.json' cannot be read: No such file" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes")
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("kind", ["pipe", "endless"])
+def test_edits_that_never_end_are_refused(shot, tmp_path, capsys, kind):
+    folder, _ = shot
+    path = tmp_path / "edits.json"
+    os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
+    assert (
+        cli.run_standalone(["bake", str(folder / "shot.blend"), f"--edits={path}", "--dry-run"]) == cli.EXIT_BAD_INPUT
+    )
+    assert "edits.json' cannot be read: it is no regular file" in capsys.readouterr().err

@@ -288,9 +288,7 @@ def _edits(path: Path) -> dict[str, StepEdit]:
         If it cannot be read, or says what cannot be meant.
     """
     try:
-        if path.stat().st_size > LARGEST_TEXT:
-            raise InputError(f"'{path}' is too large for edits of steps: give a file as the bake's report names steps.")
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(files.read_regular(path, LARGEST_TEXT))
     except OSError as error:
         raise InputError(f"The edits '{path}' cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError) as error:
