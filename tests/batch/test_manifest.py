@@ -282,3 +282,13 @@ def test_a_pattern_finds_what_a_shell_finds(tmp_path):
 def test_what_is_nested_or_long_without_end_is_refused(tmp_path, text):
     with pytest.raises(InputError, match="it"):
         manifest.parse(text, tmp_path, "it")
+
+
+def test_settings_lie_within_ten_tables_and_no_more(tmp_path):
+    def shots(depth):
+        path = "a." * depth + "b"
+        return manifest.parse(f"[[shots]]\nfile = 'a.blend'\nin_place = true\nset = {{ {path} = 1 }}", tmp_path, "it")
+
+    assert shots(10)[0].settings == (("a." * 10 + "b", "1"),)
+    with pytest.raises(InputError, match="within more than 10 others"):
+        shots(11)

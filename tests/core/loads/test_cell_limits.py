@@ -96,5 +96,7 @@ def test_the_limits_of_containers_are_heeded(tmp_path, groups, files, limits):
     assert set(cell_limits._container_limits(tmp_path)) == limits
 
 
-def test_the_machine_tells_its_memory():
+def test_the_machine_tells_its_memory_and_no_more_than_its_container_allows(monkeypatch):
     assert (machine_memory() or 1e9) > 1e8
+    monkeypatch.setattr(cell_limits, "_container_limits", lambda: iter([3e12, 1e6]))
+    assert machine_memory() == 1e6
