@@ -211,10 +211,10 @@ def stored(addon, tmp_path_factory):
     return content
 
 
-def rezipped(content, name, change):
+def rezipped(content, name, change, method=zipfile.ZIP_STORED):
     """The record with one member changed and every checksum right."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(buffer, "w") as target:
+    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(buffer, "w", method) as target:
         for member in source.namelist():
             target.writestr(member, change if member == name else source.read(member))
     return buffer.getvalue()
@@ -388,6 +388,24 @@ def test_an_unused_part_that_unpacks_to_a_gigabyte_takes_no_memory(stored, annou
         assert tracemalloc.get_traced_memory()[1] < 5e7
     finally:
         tracemalloc.stop()
+
+
+@pytest.mark.parametrize("name", ["contact_cells.npy", "record.json"])
+def test_a_part_that_unpacks_to_far_more_than_a_record_has_takes_no_memory(stored, name):
+    content = rezipped(stored, name, bytes(2**28), zipfile.ZIP_DEFLATED)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="clear the bake"):
+            record.load(content)
+        assert tracemalloc.get_traced_memory()[1] < 5e7
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("value", [-1.0, 2.0, 1e300, float("nan"), "x", None])
+def test_a_blur_that_no_ground_has_is_refused(value):
+    with pytest.raises(InputError, match="blur_sigma"):
+        baked_ground.baked_with({"inputs": {"material": {"blur_sigma": value}}}, "blur_sigma")
 
 
 @pytest.mark.parametrize("method", METHODS[2:])

@@ -230,6 +230,18 @@ def test_a_record_with_one_impossible_number_is_refused(bake, key, value):
         from_arrays(names, soles, arrays)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("cell_size", value) for value in (1e-7, 0.0, -0.01, 100.0)]
+    + [("frame_step", value) for value in (0.0, -1.0, 1e-9, 1e6)]
+    + [("start_frame", -1e9), ("end_frame", 1e9), ("area_m2", -1.0), ("peak_force_n", 1e300)],
+)
+def test_a_record_whose_numbers_are_far_from_what_they_can_be_is_refused(bake, name, value):
+    names, soles, arrays = to_arrays([replace(one, **{name: value}) for one in bake[1][:4]])
+    with pytest.raises(InputError, match=rf"{name} is .*bake again"):
+        from_arrays(names, soles, arrays)
+
+
 def test_footprints_of_different_cell_sizes_are_refused_and_none_need_a_size(bake):
     _, footprints = bake
     with pytest.raises(InputError, match="bake them again at one cell size"):
