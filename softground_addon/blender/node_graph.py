@@ -211,6 +211,15 @@ class Number:
         """The smaller of two."""
         return self._with("MINIMUM", other)
 
+    def where(self, *acting: Number, otherwise: Number | float = 0.0) -> Number:
+        """This, or another where none of some numbers, the same everywhere and never negative, is above 0.
+
+        What is not asked for is not worked out.
+        """
+        total = sum(acting[1:], acting[0]).above(0.0)
+        value = otherwise.socket if isinstance(otherwise, Number) else otherwise
+        return Number(self.graph, self.graph.choose("FLOAT", total.socket, value, self.socket))
+
     def within_one(self) -> Number:
         """No less than 0, no more than 1."""
         return self.at_least(0.0).at_most(1.0)

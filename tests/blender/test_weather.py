@@ -143,7 +143,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
             if not matter.wet or nodes.WETNESS in now.attributes:
                 assert read(now, nodes.WETNESS) == pytest.approx(wanted.wetness, abs=1e-3)
             assert read(now, nodes.FRESH) == pytest.approx(wanted.fresh, abs=1e-3)
-            assert not set(nodes.NOW) & set(now.attributes.keys())
+            assert nodes.NOW not in now.attributes
             if matter.wet:
                 assert read(now, nodes.DRIED) == pytest.approx(wanted.dried, abs=1e-3)
             if matter.soaking and not about["inputs"].get("relief_look"):
@@ -315,6 +315,26 @@ def test_alembic_carries_the_weather(opened, tmp_path):
     mesh = imported.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     world = read(mesh, "position", 3) @ np.array(imported.matrix_world.to_3x3()).T
     assert np.sort(world[:, 2]) == pytest.approx(np.sort(wanted[:, 2]), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("values", "stored"),
+    [
+        ({"Wind": 8.0}, ()),
+        ({"Snowfall": 2.0}, (nodes.FRESH,)),
+        ({"Drying": 0.4}, (nodes.DRIED,)),
+        ({"Halo": 0.5}, (nodes.DRIED,)),
+        ({"Rain": 30.0}, (nodes.WATER,)),
+        ({"Water Table": 2.0}, (nodes.WATER,)),
+    ],
+)
+def test_only_what_the_sliders_ask_for_is_stored(opened, values, stored):
+    scene = opened("wet_sand")
+    there = set(shown(scene, 300).attributes.keys())
+    bpy.ops.softground.add_weather()
+    set_to(scene, **values)
+    anywhere = set() if "Wind" in values else {nodes.WETNESS}  # no wind blows wet sand
+    assert set(shown(scene, 300).attributes.keys()) - there - set(nodes.OF_WEATHER) == {*stored, *anywhere}
 
 
 def test_what_is_blown_full_looks_trodden_no_more(opened):

@@ -20,6 +20,8 @@ SUMMED = ("Snowfall", "Temperature", "Wind", "Rain", "Drying", "Time Scale")
 """The inputs that are summed up over time, of which keys count."""
 FIRST, STEP = "First Frame", "Frames in a Part"
 """Nodes with the span."""
+KEYED = "Keyed Sliders"
+"""Node with how many sliders are keyed: 0 is none."""
 ENDLESS = 1e9
 LOWEST = "lowest"
 
@@ -36,6 +38,9 @@ def switch_of(name: str) -> str:
 
 class CourseNodes:
     """What has happened since the points' moments, and since those of vertices.
+
+    What only a slider that is at zero would ask for is not worked out, unless any is keyed. `acts` tells by the names
+    of sliders what may be above 0: warmth for *Temperature*.
 
     Parameters
     ----------
@@ -54,9 +59,18 @@ class CourseNodes:
         self.graph, self._matter, self._soaking = graph, matter, soaking
         self.frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
         self._first, self._step = self._value(FIRST, span.first), self._value(STEP, span.step)
+        keyed, none = self._value(KEYED, 0.0), graph.number(0.0)
+        self.acts = {name: said[name].at_least(0.0) + keyed for name in SUMMED}
+        self.acts["Wind"] = self.acts["Wind"] if matter.blown else none
+        self.acts["Water Table"] = 100.0 * NO_WATER - said["Water Table"] if matter.soaking else none
+        self.acts["Halo"] = said["Halo"] if matter.pales else none
+        falling = [self.acts[name] for name in SUMMED if name != "Time Scale"]
+        self.is_any = sum(falling[1:], falling[0]) * self.acts["Time Scale"]
+        self.is_any = self.is_any + self.acts["Water Table"] + self.acts["Halo"]
         points = graph.node("GeometryNodePoints")
         points.inputs["Count"].default_value = PARTS + 2
         self._points = points.outputs[0]
+        self._kept: dict[str, Any] = {}
         self._index = graph.number(graph.node("GeometryNodeInputIndex").outputs["Index"])
         self._number = (self.frame - self._first) / self._step
 
@@ -75,10 +89,10 @@ class CourseNodes:
         looked_up = {}
         for name in dict.fromkeys(stored for stored, _ in packed.values()):
             value = graph.attribute(name, "FLOAT_VECTOR")
-            begin, end = (graph.at_index(self._points, value, one.socket) for one in (part, part + 1.0))
+            begin, end = (graph.at_index(self._kept[name], value, one.socket) for one in (part, part + 1.0))
             more = graph.scaled(graph.vector("SUBTRACT", end, begin), through.socket)
             looked_up[name] = graph.separated(graph.vector("ADD", begin, more))
-        return {key: graph.number(looked_up[name][place]) for key, (name, place) in packed.items()}
+        return {key: self._needed(key, graph.number(looked_up[name][place])) for key, (name, place) in packed.items()}
 
     def between(self, left: Number) -> Number:
         """How far a share of soaking is through those for which there are sums."""
@@ -105,61 +119,56 @@ class CourseNodes:
     def _sum(self, said: Mapping[str, Number], rates: Mapping[str, Number]) -> None:
         graph, matter, time = self.graph, self._matter, self._time
         graph.next_row()
+        snow, warmth, wind, rain, drying = (self.acts[name] for name in SUMMED[:5])
+        self._melting = warmth if matter.snow_depth else warmth * snow
+        drying_and_wetting = drying * (rain + warmth)
+
         temperature = rates["Temperature"]
         least, more, fall, most = w.NEW_SNOW
         density = ((temperature * (1.0 / fall)).exp() * more + least).at_most(most)
-        rate, warmth, _ = w.SETTLING
-        settling = (temperature.at_most(0.0) * warmth).exp() * rate * time
+        rate, growth, _ = w.SETTLING
+        settling = ((temperature.at_most(0.0) * growth).exp() * rate * time).where(snow)
         fallen = rates["Snowfall"] * density * (CENTIMETRES_AN_HOUR / w.WATER_DENSITY) * time
-        melted = temperature.at_least(0.0) * w.DEGREE_DAY * time
-        rained = rates["Rain"] * MILLIMETRES_AN_HOUR * time
-        dried = rates["Drying"] * MILLIMETRES_AN_HOUR * time
+        fallen, melted = fallen.where(snow), (temperature.at_least(0.0) * w.DEGREE_DAY * time).where(warmth)
+        rained = (rates["Rain"] * MILLIMETRES_AN_HOUR * time).where(rain)
+        dried = (rates["Drying"] * MILLIMETRES_AN_HOUR * time).where(drying)
         drier = dried - rained - melted if matter.snow_depth else dried - rained
 
         sums = graph.accumulated(
             graph.combined((fallen - melted).socket, settling.socket, drier.socket), "FLOAT_VECTOR"
         )
-        lowest, following = self._lowest(sums.outputs["Trailing"])
+        lowest, following = self._lowest(sums, warmth * snow + drying_and_wetting)
         reserve, *_ = self._parts(sums.outputs["Trailing"])
         reserve_now, settled_now, water_now = self._parts(sums.outputs["Total"])
         since = settled_now - self._parts(sums.outputs["Leading"])[1]
 
         graph.next_row()
-        depth = self._depth((following[0] - lowest[0]) * w.WATER_DENSITY, density, settling, since)
+        depth = self._depth((following[0] - lowest[0]) * w.WATER_DENSITY, density, settling, since).where(snow)
         spread, filling = rained * w.RAIN_ROUNDING, graph.number(0.0)
-        any_ = rates["Snowfall"] + temperature.at_least(0.0) + rates["Rain"] + rates["Drying"]
         if matter.blown:
-            flux = self._flux(rates["Wind"], matter.blown.threshold) * time
+            flux = (self._flux(rates["Wind"], matter.blown.threshold) * time).where(wind)
             spread = spread + flux * float(w.spread_rate(1.0, matter.blown))
             filling = flux * float(w.fill_rate(1.0, matter.section, matter.blown))
-            any_ = any_ + rates["Wind"]
         cover, rounding, filled = self._to_now(depth, spread, filling)
-        thawed = (reserve - lowest[0]) * (w.WATER_DENSITY / w.SNOW.bulk_density)
-        wet = self._wet(water_now - lowest[2])
-        gone = melted if matter.snow_depth else fallen
-        got, gone, any_ = self._totals(rained, gone, any_ * rates["Time Scale"])
+        cover, rounding = cover.where(snow), rounding.where(rain, wind)
+        thawed = ((reserve - lowest[0]) * (w.WATER_DENSITY / w.SNOW.bulk_density)).where(warmth)
+        wet = self._wet(water_now - lowest[2]).where(drying, otherwise=1.0)
+        got, gone, _ = self._totals(rained, melted if matter.snow_depth else fallen)
         if not matter.snow_depth:
             gone = gone - (reserve_now - lowest[0])
         if not matter.wet:
-            wet = wet * (1.0 - ((got + gone) * (-1.0 / w.SHINE)).exp())
+            wet = wet * (1.0 - ((got + gone.where(self._melting)) * (-1.0 / w.SHINE)).exp())
 
         graph.next_row()
         under = cover + thawed if matter.snow_depth else cover
-        aged = {"cover": cover, "variance": under * w.DRAPE + rounding}
+        aged = {"cover": cover, "variance": under * w.DRAPE + rounding, "wet": wet}
         if matter.blown:
             aged["kept"] = (filled * -1.0).exp()
         if matter.snow_depth:
             aged["thawed"] = thawed
-        if matter.wet:
-            aged["wet"] = wet
-        self._keep(aged, {"wet": wet, "any": any_}, rained, rates["Rain"])
-        self.is_any = self._at_first(self._whole["any"])
-        if matter.soaking:
-            self.is_any = self.is_any + (100.0 * NO_WATER - said["Water Table"])
-        if matter.pales:
-            self.is_any = self.is_any + said["Halo"]
+        self._keep(aged, rained, rates["Rain"])
 
-    def _keep(self, aged: dict[str, Number], whole: Mapping[str, Number], rained: Number, rain: Number) -> None:
+    def _keep(self, aged: dict[str, Number], rained: Number, rain: Number) -> None:
         """Keep with the points what vertices look up."""
         of_hollows: dict[str, Number] = {}
         if soaking := self._matter.soaking:
@@ -169,9 +178,24 @@ class CourseNodes:
                 aged["pale"] = (age * (-1.0 / w.HALO)).exp()
         self.of_places = self._stored("place", aged)
         self.of_hollows = self._stored("hollow", of_hollows)
-        self._whole = self._stored("whole", whole)
-        known = {**self.of_places, "wet": self._whole["wet"]}
-        self.around = {key: self._at_first(packed) for key, packed in known.items()}
+        self.around = {key: self._at_first(key, packed) for key, packed in self.of_places.items()}
+
+    def _needed(self, key: str, number: Number) -> Number:
+        """What vertices look up by this name, or what it is while the sliders that it follows are at nothing."""
+        snow, warmth, wind, rain, drying = (self.acts[name] for name in SUMMED[:5])
+        follows: dict[str, tuple[Number, ...]] = {
+            "cover": (snow,),
+            "variance": (snow, warmth, wind, rain),
+            "thawed": (warmth,),
+            "kept": (wind,),
+            "wet": (drying,) if self._matter.wet else (rain, self._melting),
+            "low": (rain,),
+            "high": (rain,),
+            "seeped": (self.acts["Water Table"],),
+            "pale": (self.acts["Halo"],),
+        }
+        is_whole = key == "kept" or (key == "wet" and self._matter.wet)
+        return number.where(*follows[key], otherwise=1.0 if is_whole else 0.0)
 
     def _depth(self, left: Number, density: Number, settling: Number, since: Number) -> Number:
         """Depth of the snow of each part [kg/m²] that settles within it, and from its end on."""
@@ -207,10 +231,12 @@ class CourseNodes:
         low, high = ((rained - (end - begin) * share).at_least(0.0) for share in self._soaking)
         return self._to_now(low, high, self._time)
 
-    def _lowest(self, sums: Any) -> tuple[list[Number], list[Number]]:
-        """The least of each sum from a moment on, and from the next one on."""
-        graph = self.graph
-        self._points = graph.store(self._points, LOWEST, sums, True, "FLOAT_VECTOR")
+    def _lowest(self, sums: Any, turns: Number) -> tuple[list[Number], list[Number]]:
+        """The least of each sum from a moment on, and from the next one on; 0 is `turns` if none ever turns back."""
+        graph, trailing = self.graph, sums.outputs["Trailing"]
+        at_an_end = graph.vector("MINIMUM", trailing, sums.outputs["Total"])
+        straight = graph.store(self._points, LOWEST, at_an_end, True, "FLOAT_VECTOR")
+        self._points = graph.store(self._points, LOWEST, trailing, True, "FLOAT_VECTOR")
         ahead = 1
         while ahead < PARTS + 2:
             graph.next_row()
@@ -218,6 +244,7 @@ class CourseNodes:
             lower = graph.vector("MINIMUM", here, there)
             self._points = graph.store(self._points, LOWEST, lower, True, "FLOAT_VECTOR")
             ahead *= 2
+        self._points = graph.choose("GEOMETRY", turns.above(0.0).socket, straight, self._points)
         here, there = self._ahead(1)
         return self._parts(here), self._parts(there)
 
@@ -233,7 +260,7 @@ class CourseNodes:
         return self._parts(graph.vector("SUBTRACT", sums.outputs["Total"], sums.outputs["Trailing"]))
 
     def _totals(self, *parts: Number) -> list[Number]:
-        """Sums of three numbers over all."""
+        """Sums of up to three numbers over all."""
         sums = self.graph.accumulated(self.graph.combined(*(part.socket for part in parts)), "FLOAT_VECTOR")
         return self._parts(sums.outputs["Total"])
 
@@ -246,13 +273,13 @@ class CourseNodes:
         keys: Sequence[str] = list(values)
         for begin in range(0, len(keys), 3):
             stored, together = f"{name}_{begin // 3}", keys[begin : begin + 3]
-            pack = self.graph.combined(*(values[key].socket for key in together))
-            self._points = self.graph.store(self._points, stored, pack, True, "FLOAT_VECTOR")
+            pack = self.graph.combined(*(self._needed(key, values[key]).socket for key in together))
+            self._kept[stored] = self.graph.store(self._points, stored, pack, True, "FLOAT_VECTOR")
             kept |= {key: (stored, place) for place, key in enumerate(together)}
         return kept
 
-    def _at_first(self, packed: tuple[str, int]) -> Number:
+    def _at_first(self, key: str, packed: tuple[str, int]) -> Number:
         """A kept number since the first frame."""
         name, place = packed
-        value = self.graph.at_index(self._points, self.graph.attribute(name, "FLOAT_VECTOR"), 0)
-        return self.graph.number(self.graph.separated(value)[place])
+        value = self.graph.at_index(self._kept[name], self.graph.attribute(name, "FLOAT_VECTOR"), 0)
+        return self._needed(key, self.graph.number(self.graph.separated(value)[place]))

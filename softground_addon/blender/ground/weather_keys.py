@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.after.weather_course import PARTS, Span
 from .. import compat
 from . import weather_modifier
-from .weather_course_nodes import FIRST, STEP, SUMMED, keys_of, switch_of
+from .weather_course_nodes import FIRST, KEYED, STEP, SUMMED, keys_of, switch_of
 
 LAST = "softground_weather_last"
 """Custom property of the group: the frame up to which it tells moments apart, keys or none."""
@@ -34,7 +34,7 @@ def follow(display_mesh: bpy.types.Object) -> None:
     nodes = tree.nodes
     first = nodes[FIRST].outputs[0].default_value
     span = span_of(first, max([tree[LAST], *(curve.range()[1] for curve in keyed.values())]))
-    changed = _put(nodes[STEP].outputs[0], span.step)
+    changed = _put(nodes[STEP].outputs[0], span.step) | _put(nodes[KEYED].outputs[0], len(keyed))
     for name in SUMMED:
         curve = keyed.get(name)
         changed |= _put(nodes[switch_of(name)].inputs["Switch"], curve is not None)

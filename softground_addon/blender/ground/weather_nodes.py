@@ -34,9 +34,9 @@ WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softgr
 """What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
 was wet is 0 to 1."""
 
-NOW = ("softground_weather_now_1", "softground_weather_now_2")
-"""Vectors that are there only while the group works."""
-HEIGHT, KEPT = "height", "kept"
+NOW = "softground_weather_now"
+"""A vector that is there only while the group works."""
+HEIGHT, KEPT, PALE = "height", "kept", "pale"
 """Names of what is worked out with that, and not stored."""
 
 NEVER_FULL = 1e9
@@ -119,6 +119,7 @@ def build(
     aged = course.since(since, course.of_places)
     share = _shares(graph, aged["variance"])
     relief = _relief(graph, up)
+    snow, warmth, wind, rain, drying, _, seep, halo = course.acts.values()
     soft = relief + graph.number(graph.dot(_vector(graph, BLUR), share))
     if matter.blown:
         soft = soft * aged["kept"]
@@ -127,85 +128,77 @@ def build(
     inside = graph.number(graph.dot(trodden, graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0)))).within_one() * begun
 
     graph.next_row()
-    cover = course.around["cover"] + (aged["cover"] - course.around["cover"]) * inside
-    height = soft - relief + cover
+    cover = (course.around["cover"] + (aged["cover"] - course.around["cover"]) * inside).where(snow)
+    height = (soft - relief).where(snow, warmth, wind, rain) + cover
     if matter.snow_depth:
         left = (soft + matter.snow_depth).at_least(0.0)
         ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
         around, within = course.around["thawed"].at_most(left), (aged["thawed"] * ratio * ratio).at_most(left)
-        height = height - around - (within - around) * inside
+        height = (height - around - (within - around) * inside).where(warmth, otherwise=height)
     wetness = course.around["wet"]
     if matter.wet:
-        wetness = wetness + (aged["wet"] - wetness) * inside
-    water = None
+        wetness = (wetness + (aged["wet"] - wetness) * inside).where(drying, otherwise=1.0)
+    seen = {HEIGHT: height, FRESH: (cover * (1.0 / COVERED)).within_one(), WETNESS: wetness}
     if matter.soaking:
         graph.next_row()
-        water = _standing(graph, course, said["Water Table"] * 0.01, height)
-        height = height + water
-        wetness = wetness.at_least(water.above(0.0))
-
-    graph.next_row()
-    seen = {HEIGHT: height, FRESH: (cover * (1.0 / COVERED)).within_one()}
-    if matter.wet or water:  # elsewhere it is the same everywhere
-        seen[WETNESS] = wetness
+        water = _standing(graph, course, said["Water Table"] * 0.01, height).where(rain, seep)
+        seen |= {HEIGHT: height + water, WETNESS: wetness.at_least(water.above(0.0)), WATER: water}
     if matter.blown:
         seen[KEPT] = aged["kept"]
-    if water:
-        seen[WATER] = water
     if matter.pales:
         near = graph.number(graph.dot(trodden, (NEAR,) * 3)).within_one() * begun
-        seen[DRIED] = (1.0 - wetness).at_least(said["Halo"] * near * aged["pale"])
-    changed = _changed(graph, group.outputs["Geometry"], seen, wetness, matter, up)
-    graph.finish(graph.choose("GEOMETRY", course.is_any.above(0.0).socket, group.outputs["Geometry"], changed))
+        seen[PALE] = (said["Halo"] * near * aged["pale"]).where(halo)
+    graph.next_row()
+    geometry = group.outputs["Geometry"]
+    changed = _changed(graph, geometry, seen, course.acts, matter, up)
+    graph.finish(graph.choose("GEOMETRY", course.is_any.above(0.0).socket, geometry, changed))
 
 
 def _changed(
     graph: NodeGraph,
     geometry: Any,
     seen: Mapping[str, Number],
-    wetness: Number,
+    acts: Mapping[str, Number],
     matter: Matter,
     up: Sequence[float],
 ) -> Any:
-    """The geometry under weather; `wetness` is that of places of which `seen` has none."""
+    """The geometry under weather; `acts` as those of the course."""
     # Before anything moves: all of it follows from where the playback has the vertices.
-    changed, known = _worked_out(graph, geometry, seen)
-    height, kept = known.pop(HEIGHT), known.pop(KEPT, None)
-    known.setdefault(WETNESS, wetness)
-    changed = _with(graph, changed, _seen(graph, known, kept, matter))
-    return graph.forgotten(_moved(graph, changed, up, height), *NOW[: 1 + (len(seen) > 3)])
-
-
-def _worked_out(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> tuple[Any, dict[str, Number]]:
-    """A geometry that keeps some numbers, and these as they are kept: who asks for one does not work it out again."""
-    known: dict[str, Number] = {}
-    names = list(values)
-    for number, stored in enumerate(NOW):
-        together = names[3 * number : 3 * number + 3]
-        if together:
-            pack = graph.combined(*(values[name].socket for name in together))
-            geometry = graph.store(geometry, stored, pack, True, "FLOAT_VECTOR")
-            parts = graph.separated(_vector(graph, stored))
-            known |= {name: graph.number(part) for name, part in zip(together, parts, strict=False)}
-    return geometry, known
-
-
-def _seen(graph: NodeGraph, stored: dict[str, Number], kept: Number | None, matter: Matter) -> dict[str, Number]:
-    """What is stored for materials; `kept` is the share of the prints that is not blown full."""
-    if WATER in stored:
-        stored[WATER] = graph.number(graph.attribute(WATER)).at_least(stored[WATER])  # the bake's own stays
+    together = (HEIGHT, WETNESS, WATER) if matter.soaking else (HEIGHT, FRESH, KEPT)
+    geometry, seen = _worked_out(graph, geometry, seen, together)
+    geometry = _with(graph, geometry, {FRESH: seen[FRESH]}, acts["Snowfall"])
+    geometry = _with(graph, geometry, {WETNESS: seen[WETNESS]})
     if matter.wet:
-        stored.setdefault(DRIED, 1.0 - stored[WETNESS])
-    if kept:  # what is blown full looks trodden no more
-        stored |= {name: graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM)}
-    return stored
+        dried = (1.0 - seen[WETNESS]).at_least(seen.get(PALE, 0.0))
+        geometry = _with(graph, geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
+    if matter.soaking:  # the bake's own water stays
+        water = graph.number(graph.attribute(WATER)).at_least(seen[WATER])
+        geometry = _with(graph, geometry, {WATER: water}, acts["Rain"], acts["Water Table"])
+    if matter.blown:  # what is blown full looks trodden no more
+        blown = {name: graph.number(graph.attribute(name)) * seen[KEPT] for name in (COMPRESSION, RIM)}
+        geometry = _with(graph, geometry, blown, acts["Wind"])
+    return graph.forgotten(_moved(graph, geometry, up, seen[HEIGHT]), NOW)
 
 
-def _with(graph: NodeGraph, geometry: Any, values: Mapping[str, Number]) -> Any:
-    """A geometry with numbers of these names."""
+def _worked_out(
+    graph: NodeGraph, geometry: Any, values: Mapping[str, Number], together: Sequence[str]
+) -> tuple[Any, dict[str, Number]]:
+    """A geometry that keeps up to three numbers, and all, these as they are kept: they are not worked out again."""
+    names = [name for name in together if name in values]
+    pack = graph.combined(*(values[name].socket for name in names))
+    parts = graph.separated(_vector(graph, NOW))
+    known = {name: graph.number(part) for name, part in zip(names, parts, strict=False)}
+    return graph.store(geometry, NOW, pack, True, "FLOAT_VECTOR"), {**values, **known}
+
+
+def _with(graph: NodeGraph, geometry: Any, values: Mapping[str, Number], *acting: Number) -> Any:
+    """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
+    changed = geometry
     for name, value in values.items():
-        geometry = graph.store(geometry, name, value.socket, True)
-    return geometry
+        changed = graph.store(changed, name, value.socket, True)
+    if not acting:
+        return changed
+    return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).above(0.0).socket, geometry, changed)
 
 
 def _moved(graph: NodeGraph, geometry: Any, up: Sequence[float], height: Number) -> Any:
@@ -229,7 +222,8 @@ def _standing(graph: NodeGraph, course: CourseNodes, table: Number, height: Numb
         steps = graph.vector("MINIMUM", graph.vector("MAXIMUM", steps, (0.0,) * 3), (1.0,) * 3)
         parts.append(graph.number(graph.dot(steps, rise)))
     brim = graph.number(graph.dot(rises[0], (1.0,) * 3)) + graph.number(graph.dot(rises[1], (1.0, 1.0, 0.0)))
-    level = (parts[0] + parts[1]).at_least((brim - table).at_least(0.0) * aged["seeped"])
+    seeped = ((brim - table).at_least(0.0) * aged["seeped"]).where(course.acts["Water Table"])
+    level = (parts[0] + parts[1]).where(course.acts["Rain"]).at_least(seeped)
     return (level - above - height).at_least(0.0) * level.above(0.0)
 
 
