@@ -244,7 +244,7 @@ def test_a_bake_that_is_paused_goes_on_where_it_stopped(shot, tmp_path):
     assert process.stdout is not None
     process.stdout.readline()
     process.send_signal(signal.SIGSTOP)
-    time.sleep(1.0)
+    time.sleep(0.2)
     assert process.poll() is None
     process.send_signal(signal.SIGCONT)
     process.communicate(timeout=300)
