@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
+import numpy as np
 
 COLUMN, ROW = 180.0, 160.0
 """Spacing of the nodes in the editor."""
@@ -196,6 +198,12 @@ class Number:
     def __truediv__(self, other: Number | float) -> Number:
         return self._with("DIVIDE", other)
 
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __array_ufunc__(self, function: np.ufunc, _method: str, *operands: Number | float) -> Number:
+        """Numpy's functions as nodes, so that what is a law for arrays is one for these."""
+        return _FUNCTIONS[function](*(one if isinstance(one, Number) else self.graph.number(one) for one in operands))
+
     def __rsub__(self, other: float) -> Number:
         return Number(self.graph, self.graph.math("SUBTRACT", other, self.socket))
 
@@ -239,3 +247,18 @@ class Number:
     def _with(self, operation: str, other: Number | float) -> Number:
         value = other.socket if isinstance(other, Number) else other
         return Number(self.graph, self.graph.math(operation, self.socket, value))
+
+
+_FUNCTIONS: Mapping[np.ufunc, Callable[..., Number]] = {
+    np.add: Number.__add__,
+    np.subtract: Number.__sub__,
+    np.multiply: Number.__mul__,
+    np.divide: Number.__truediv__,
+    np.minimum: Number.at_most,
+    np.maximum: Number.at_least,
+    np.greater: Number.above,
+    np.exp: Number.exp,
+    np.expm1: lambda one: one.exp() - 1.0,
+    np.log1p: lambda one: (one + 1.0).log(),
+    np.sqrt: Number.root,
+}

@@ -12,10 +12,10 @@ from softground_addon.blender.ground import baked_ground, ground_mesh, weather, 
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import matter_of
-from softground_addon.core.after.weather_course import Weather
-from softground_addon.core.after.weather_places import section_of
-from softground_addon.core.after.weathered_ground import WeatherPlaces, weathered
+from softground_addon.core.after.weather_places import WeatherPlaces, section_of
 from tests.blender import shots
+from tests.core.after.weather_course import Weather
+from tests.core.after.weathered_ground import weathered
 
 FRAMES = (1, 20, 34, 300)
 SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}

@@ -17,7 +17,6 @@ from ..ground import baked_ground, display_key, ground_mesh, playback
 from .publish import at_the_end
 from .step_edits import EditableBake
 
-Array = NDArray[np.float64]
 REACH = 4.0
 """How far around a print the display blur spreads it, in its standard deviations."""
 

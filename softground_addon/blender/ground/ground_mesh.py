@@ -32,7 +32,6 @@ from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUM
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-SHADING_ATTRIBUTES = (COMPRESSION, RIM, AGE)
 SHOWN = ("steps", "max_depth_m", "peak_force_n")
 """Numbers that every summary has."""
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.meshing.refinement import Refinement, Surface
@@ -21,8 +20,6 @@ from ...core.numerics.cell_keys import Keys, keys_of
 from ..settings import exists, find, name_of
 from . import ground_mesh, playback, refined_mesh
 from .hidden_ground import hide, hides, may_hide, show_again
-
-Array = NDArray[np.float64]
 
 DETAIL = "softground_detail"
 """Property of the ground while it is hidden: the copy."""

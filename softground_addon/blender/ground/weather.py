@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.weather import matter_of
-from ...core.after.weather_places import NOT_YET, section_of, weather_places
-from ...core.after.weathered_ground import WeatherPlaces, soaking_shares
+from ...core.after.weather_places import NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint

@@ -1,7 +1,8 @@
-"""`core.after.weather_course` as nodes: sums over parts of the time, on points of which each begins one.
+"""What weather has done from any moment to now, as nodes: sums over parts of the time, on points that begin one each.
 
-They are a few hundred, whatever the ground has of vertices. Each of these looks up what has happened since it was
-stepped on. A slider's value is that of the group's input, or of a curve if it is keyed, for each part.
+Rates are those of each part; within it every integral but that over the settling of its own layer is exact. Points are
+a few hundred, whatever the ground has of vertices. Each of these looks up what has happened since it was stepped on. A
+slider's value is that of the group's input, or of a curve if it is keyed, for each part.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core.after import weather as w
-from ...core.after.weather_course import GAUSS, NO_WATER, PARTS, Span
-from ...core.after.weathered_ground import LEAST_RANGE
+from ...core.after.weather import GAUSS, NO_WATER, PARTS, Span
+from ...core.after.weather_places import LEAST_RANGE
 from ..node_graph import NodeGraph, Number
 
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
@@ -124,12 +125,10 @@ class CourseNodes:
         drying_and_wetting = drying * (rain + warmth)
 
         temperature = rates["Temperature"]
-        least, more, fall, most = w.NEW_SNOW
-        density = ((temperature * (1.0 / fall)).exp() * more + least).at_most(most)
-        rate, growth, _ = w.SETTLING
-        settling = ((temperature.at_most(0.0) * growth).exp() * rate * time).where(snow)
+        density = w.new_snow_density(temperature)
+        settling = (w.settling_rate(temperature) * time).where(snow)
         fallen = rates["Snowfall"] * density * (CENTIMETRES_AN_HOUR / w.WATER_DENSITY) * time
-        fallen, melted = fallen.where(snow), (temperature.at_least(0.0) * w.DEGREE_DAY * time).where(warmth)
+        fallen, melted = fallen.where(snow), (w.melting_rate(temperature) * time).where(warmth)
         rained = (rates["Rain"] * MILLIMETRES_AN_HOUR * time).where(rain)
         dried = (rates["Drying"] * MILLIMETRES_AN_HOUR * time).where(drying)
         drier = dried - rained - melted if matter.snow_depth else dried - rained
@@ -146,18 +145,18 @@ class CourseNodes:
         depth = self._depth((following[0] - lowest[0]) * w.WATER_DENSITY, density, settling, since).where(snow)
         spread, filling = rained * w.RAIN_ROUNDING, graph.number(0.0)
         if matter.blown:
-            flux = (self._flux(rates["Wind"], matter.blown.threshold) * time).where(wind)
-            spread = spread + flux * float(w.spread_rate(1.0, matter.blown))
-            filling = flux * float(w.fill_rate(1.0, matter.section, matter.blown))
+            flux = (w.blown_flux(rates["Wind"], matter.blown) * time).where(wind)
+            spread = spread + w.spread_rate(flux, matter.blown)
+            filling = w.fill_rate(flux, matter.section, matter.blown)
         cover, rounding, filled = self._to_now(depth, spread, filling)
         cover, rounding = cover.where(snow), rounding.where(rain, wind)
         thawed = ((reserve - lowest[0]) * (w.WATER_DENSITY / w.SNOW.bulk_density)).where(warmth)
-        wet = self._wet(water_now - lowest[2]).where(drying, otherwise=1.0)
+        wet = w.wetness(water_now - lowest[2]).where(drying, otherwise=1.0)
         got, gone, _ = self._totals(rained, melted if matter.snow_depth else fallen)
         if not matter.snow_depth:
             gone = gone - (reserve_now - lowest[0])
         if not matter.wet:
-            wet = wet * (1.0 - ((got + gone.where(self._melting)) * (-1.0 / w.SHINE)).exp())
+            wet = wet * w.wetted(got + gone.where(self._melting))
 
         graph.next_row()
         under = cover + thawed if matter.snow_depth else cover
@@ -173,9 +172,9 @@ class CourseNodes:
         of_hollows: dict[str, Number] = {}
         if soaking := self._matter.soaking:
             low, high, age = self._hollows(rained, rain, soaking)
-            of_hollows = {"low": low, "high": high, "seeped": 1.0 - (age * (-1.0 / soaking.seep)).exp()}
+            of_hollows = {"low": low, "high": high, "seeped": w.seeped(age, soaking)}
             if self._matter.pales:
-                aged["pale"] = (age * (-1.0 / w.HALO)).exp()
+                aged["pale"] = w.halo(age)
         self.of_places = self._stored("place", aged)
         self.of_hollows = self._stored("hollow", of_hollows)
         self.around = {key: self._at_first(key, packed) for key, packed in self.of_places.items()}
@@ -199,35 +198,16 @@ class CourseNodes:
 
     def _depth(self, left: Number, density: Number, settling: Number, since: Number) -> Number:
         """Depth of the snow of each part [kg/m²] that settles within it, and from its end on."""
-        slowing, depth = w.SETTLING[2], None
-        for at, weight in GAUSS:
-            compaction = since + settling * (1.0 - at)
-            settled = (density * slowing * compaction + 1.0).log() * (1.0 / slowing) + density
-            part = left * weight / settled
-            depth = part if depth is None else depth + part
-        assert depth is not None
-        return depth
-
-    def _flux(self, wind: Number, threshold: float) -> Number:
-        """As `weather.blown_flux`."""
-        speed = wind * float(w.friction_velocity(1.0))
-        return speed * speed * speed * (w.BAGNOLD * w.AIR_DENSITY / w.GRAVITY) * speed.above(threshold)
-
-    def _wet(self, lost: Number) -> Number:
-        """As `weather.wetness`."""
-        films = lost * (1.0 / w.SURFACE_FILM)
-        dried = films.at_most(1.0) + (films.at_least(1.0).root() - 1.0) * 2.0
-        return (1.0 - dried * (1.0 / w.DRY_AT)).at_least(0.0)
+        first, second, third = (
+            left * weight / w.settled_density(since + settling * (1.0 - at), density) for at, weight in GAUSS
+        )
+        return first + second + third
 
     def _hollows(self, rained: Number, rain: Number, soaking: w.Soaking) -> list[Number]:
         """Rain that has not soaked in at either share, and time, from each moment to now."""
         graph = self.graph
         sums = graph.accumulated((self._time * rain.above(0.0)).socket)
-        more = (soaking.first - soaking.final) / soaking.decay
-        begin, end = (
-            wet * soaking.final - (wet * -soaking.decay).exp() * more
-            for wet in (graph.number(sums.outputs[name]) for name in ("Trailing", "Leading"))
-        )
+        begin, end = (w.soaked(graph.number(sums.outputs[name]), soaking) for name in ("Trailing", "Leading"))
         low, high = ((rained - (end - begin) * share).at_least(0.0) for share in self._soaking)
         return self._to_now(low, high, self._time)
 

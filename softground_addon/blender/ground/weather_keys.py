@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.weather_course import PARTS, Span
+from ...core.after.weather import PARTS, Span
 from .. import compat
 from . import weather_modifier
 from .weather_course_nodes import FIRST, KEYED, STEP, SUMMED, keys_of, switch_of

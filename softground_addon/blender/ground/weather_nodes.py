@@ -1,4 +1,7 @@
-"""The node group of weather over a bake: `core.after.weathered_ground` as nodes, behind the playback's.
+"""The node group of weather over a bake, behind the playback's.
+
+z = rest + kept·relief(sigma) + level. The level is that of untouched ground, which the weather has acted on from the
+start, and in a print that since it was made; relief and bounds of prints lose their edges as variances add up.
 
 Native Blender data that needs nothing of this add-on. What is the same everywhere is worked out once, the rest for each
 vertex, from what `core.after.weather_places` found and the group's own inputs.
@@ -12,9 +15,8 @@ from typing import Any
 
 import bpy
 
-from ...core.after.weather import Matter
-from ...core.after.weather_course import Span
-from ...core.after.weathered_ground import BOUNDS, COVERED, KNOTS, NEAR
+from ...core.after.weather import Matter, Span
+from ...core.after.weather_places import BOUNDS, COVERED, KNOTS, NEAR
 from ..node_graph import NodeGraph, Number, new_group
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import CourseNodes
@@ -26,13 +28,13 @@ MARK = "softground_weather"
 BLUR, TRODDEN = "softground_weather_blur", "softground_weather_trodden"
 TIMES, POOL = "softground_weather_times", "softground_weather_pool"
 LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
-"""Vectors; see `core.after.weathered_ground.WeatherPlaces`. The levels are three and three."""
+"""Vectors; see `core.after.weather_places.WeatherPlaces`. The levels are three and three."""
 OF_HOLLOWS = (POOL, *LEVELS)
 OF_WEATHER = (BLUR, TRODDEN, TIMES, *OF_HOLLOWS)
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
-"""What the group stores for materials; see `core.after.weathered_ground.Weathered`. What has dried of ground that
-was wet is 0 to 1."""
+"""What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
+standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 
 NOW = "softground_weather_now"
 """A vector that is there only while the group works."""
@@ -106,7 +108,7 @@ def build(
     span : Span
         In frames of the scene.
     soaking : (float, float)
-        Of the hollows; see `core.after.weathered_ground.soaking_shares`.
+        Of the hollows; see `core.after.weather_places.soaking_shares`.
     """
     tree.nodes.clear()
     graph = NodeGraph(tree)
@@ -232,7 +234,7 @@ def _vector(graph: NodeGraph, name: str) -> Any:
 
 
 def _shares(graph: NodeGraph, variance: Number) -> Any:
-    """As `weathered_ground.shares`."""
+    """How far a variance is through each of the spans between `BOUNDS`, 0 to 1."""
     spans = [high - low for low, high in pairwise(BOUNDS)]
     factors = tuple(1.0 / span for span in spans)
     offsets = tuple(-low / span for low, span in zip(BOUNDS[:-1], spans, strict=True))

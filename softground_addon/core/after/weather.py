@@ -1,6 +1,7 @@
 """What weather does to ground, process by process: rates, and what follows from their integrals over time.
 
-All in SI units (temperatures in °C), elementwise over arrays. Where an integral is 0 nothing has happened, exactly.
+All in SI units (temperatures in °C), elementwise over arrays, or over the nodes' numbers of `blender.node_graph`: the
+same laws make the node group. Where an integral is 0 nothing has happened, exactly.
 
 References
 ----------
@@ -28,9 +29,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 HOUR, DAY = 3600.0, 86_400.0
 WATER_DENSITY, AIR_DENSITY, GRAVITY = 1000.0, 1.2, 9.81
@@ -64,6 +62,28 @@ LEAST_SECTION = 1e-9
 """A print that holds no more is full [m²]."""
 SEALING = 5.0
 """How much less ground takes up the more it is compressed: exp(-5·compression/layer depth)."""
+
+
+PARTS = 256
+"""Of the time from the first frame of the weather to the last frame at which anything begins or changes."""
+NO_WATER = 1.0
+"""Depth of a water table that no print reaches [m]."""
+GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
+"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a part."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """The frames of the animation from which on there is weather and up to which it is known in parts, and [Hz]."""
+
+    first: float
+    last: float
+    frame_rate: float
+
+    @property
+    def step(self) -> float:
+        """Length of a part in frames."""
+        return (self.last - self.first) / PARTS
 
 
 @dataclass(frozen=True)
@@ -110,7 +130,7 @@ SOAKING = {
 """Sand, loam and clay, dry; wet sand has had its first rain. Snow takes up what falls."""
 
 
-def new_snow_density(temperature: Any) -> Array:
+def new_snow_density(temperature: Any) -> Any:
     """Density of falling snow [kg/m³].
 
     Examples
@@ -119,76 +139,76 @@ def new_snow_density(temperature: Any) -> Array:
     array([ 67.9,  75.4, 119.2, 120. ])
     """
     least, more, fall, most = NEW_SNOW
-    return np.minimum(least + more * np.exp(np.asarray(temperature, dtype=np.float64) / fall), most)
+    return np.minimum(least + more * np.exp(np.divide(temperature, fall)), most)
 
 
-def settling_rate(temperature: Any) -> Array:
+def settling_rate(temperature: Any) -> Any:
     """How fast snow settles at an air temperature [1/s]."""
     rate, warmth, _ = SETTLING
-    return np.asarray(rate * np.exp(warmth * np.minimum(temperature, 0.0)))
+    return rate * np.exp(warmth * np.minimum(temperature, 0.0))
 
 
-def settled_density(settling: Any, density: Any) -> Array:
+def settled_density(settling: Any, density: Any) -> Any:
     """Density of snow that was laid down with a density [kg/m³], after an integral of `settling_rate` over time."""
     slowing = SETTLING[2]
-    return np.asarray(density + np.log1p(slowing * np.asarray(density) * settling) / slowing)
+    return density + np.log1p(slowing * density * settling) / slowing
 
 
-def melting_rate(temperature: Any) -> Array:
+def melting_rate(temperature: Any) -> Any:
     """What warmth melts, as water [m/s]."""
-    return np.asarray(DEGREE_DAY * np.maximum(temperature, 0.0))
+    return DEGREE_DAY * np.maximum(temperature, 0.0)
 
 
-def friction_velocity(wind: Any) -> Array:
+def friction_velocity(wind: Any) -> Any:
     """Of a wind at 10 m over open ground, both [m/s]."""
-    return np.asarray(KARMAN * np.asarray(wind, dtype=np.float64) / np.log(10.0 / ROUGHNESS_LENGTH))
+    return np.multiply(wind, KARMAN / np.log(10.0 / ROUGHNESS_LENGTH))
 
 
-def blown_flux(wind: Any, blown: Blown) -> Array:
+def blown_flux(wind: Any, blown: Blown) -> Any:
     """What a wind [m/s] carries across each metre [kg/(m s)]: nothing below the threshold (Bagnold 1941)."""
     speed = friction_velocity(wind)
-    return np.where(speed > blown.threshold, BAGNOLD * AIR_DENSITY / GRAVITY * speed**3, 0.0)
+    return BAGNOLD * AIR_DENSITY / GRAVITY * speed * speed * speed * np.greater(speed, blown.threshold)
 
 
-def fill_rate(flux: Any, section: float, blown: Blown) -> Array:
+def fill_rate(flux: Any, section: float, blown: Blown) -> Any:
     """Rate at which what is open of a print is blown full [1/s]; `section` is its volume over its width [m²]."""
-    return np.asarray(flux) / (max(section, LEAST_SECTION) * blown.bulk_density)
+    return flux / (max(section, LEAST_SECTION) * blown.bulk_density)
 
 
-def spread_rate(flux: Any, blown: Blown) -> Array:
+def spread_rate(flux: Any, blown: Blown) -> Any:
     """Growth of the variance by which creeping grains blur edges [m²/s]."""
-    return np.asarray(2.0 * HOP / blown.bulk_density * np.asarray(flux))
+    return 2.0 * HOP / blown.bulk_density * flux
 
 
-def soaked(wet: Any, soaking: Soaking) -> Array:
+def soaked(wet: Any, soaking: Soaking) -> Any:
     """What open ground can have taken up after it was rained on for a time [s] [m]: the integral of Horton's rate."""
     more = (soaking.first - soaking.final) / soaking.decay
-    return np.asarray(soaking.final * np.asarray(wet) - more * np.expm1(-soaking.decay * np.asarray(wet)))
+    return soaking.final * wet - more * np.expm1(-soaking.decay * wet)
 
 
-def seeped(age: Any, soaking: Soaking) -> Array:
+def seeped(age: Any, soaking: Soaking) -> Any:
     """Share of its full height that water from below has reached in a print after a time [s]."""
-    return np.asarray(-np.expm1(-np.asarray(age) / soaking.seep))
+    return 1.0 - np.exp(np.divide(age, -soaking.seep))
 
 
-def wetness(lost: Any) -> Array:
+def wetness(lost: Any) -> Any:
     """How wet ground looks, 1 to 0, that would have lost so much water [m] by now, had it stayed a film.
 
     The surface film goes as fast as the air takes it; after that what was lost grows with the square root of time.
     """
-    films = np.asarray(lost, dtype=np.float64) / SURFACE_FILM
+    films = np.divide(lost, SURFACE_FILM)
     dried = np.minimum(films, 1.0) + 2.0 * (np.sqrt(np.maximum(films, 1.0)) - 1.0)
-    return np.asarray(np.maximum(1.0 - dried / DRY_AT, 0.0))
+    return np.maximum(1.0 - dried / DRY_AT, 0.0)
 
 
-def wetted(water: Any) -> Array:
+def wetted(water: Any) -> Any:
     """How wet dry ground looks, 0 to 1, after so much water [m]."""
-    return np.asarray(-np.expm1(-np.asarray(water) / SHINE))
+    return 1.0 - np.exp(np.divide(water, -SHINE))
 
 
-def halo(age: Any) -> Array:
+def halo(age: Any) -> Any:
     """How much paler wet sand around a foot is, 1 to 0, some time after the load [s]."""
-    return np.asarray(np.exp(-np.asarray(age) / HALO))
+    return np.exp(np.divide(age, -HALO))
 
 
 @dataclass(frozen=True)

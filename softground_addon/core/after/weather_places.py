@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,52 @@ from ..ground.heightfield import TILE, SparseGrid, Window
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
-from .weathered_ground import KNOTS, SIGMAS, WeatherPlaces
 
 Array = NDArray[np.float64]
 
+SIGMAS = (0.01, 0.03, 0.09)
+"""Standard deviations at which the relief is known besides its own [m]; in between, linear in the variance."""
+BOUNDS = (0.0, *(sigma**2 for sigma in SIGMAS))
+KNOTS = 5
+"""Shares of a hollow's depth that are known: at even steps of the root of what it holds."""
+NEAR = 4.0
+"""Of the contact that is within `SIGMAS[-1]`, for sand that turns pale: all of it along the edges of a foot."""
+LEAST_RANGE = 1e-6
+"""Shares of soaking that differ by less are one."""
+COVERED = 0.01
+"""New snow that hides what is below [m]."""
 NOT_YET = 1e9
 """Frame of what never comes."""
 LEAST_SHARE = 1e-6
 """Contact that is blurred to less than this counts for nothing."""
+
+
+@dataclass(frozen=True)
+class WeatherPlaces:
+    """What a bake left at K places, as far as weather needs it.
+
+    Attributes
+    ----------
+    blur : (K, 3) float array
+        What the final relief changes by from its own to each of `SIGMAS`, one after the other [m].
+    trodden : (K, 3) float array
+        Share of ground in contact at the first of them, and its changes to the next.
+    times : (K, 3) float array
+        First frame of the first contact there, and last frame that something happened, both from the contacts around
+        where there was none; compression at the first of the sigmas [m].
+    pool : (K, 3) float array
+        What the hollow there holds as a depth of water on it [m], 0 where there is none; height above its bottom [m];
+        how much of its soaking is left.
+    levels : (K, 6) float array
+        Rise of the water at each fifth of the root of the share of what the hollow holds [m], and the frame from
+        which on it is there.
+    """
+
+    blur: Array
+    trodden: Array
+    times: Array
+    pool: Array
+    levels: Array
 
 
 def section_of(footprints: Sequence[Footprint]) -> float:
@@ -76,6 +115,16 @@ def weather_places(
         pool=pool,
         levels=levels,
     )
+
+
+def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
+    """Least and largest share of their soaking that the hollows have left; in between, puddles are interpolated.
+
+    What a hollow gathers is linear in this share from when all ground there takes up less than falls.
+    """
+    capacity, _, left = places.pool.T
+    known = left[capacity > 0]
+    return (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
 
 
 def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:

@@ -9,11 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-
 SIDED: Mapping[str, tuple[str, ...]] = {
     "asis": ("asi", "asis", "ias"),
     "psis": ("psi", "psis", "ips"),

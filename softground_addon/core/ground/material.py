@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 LAYER_DEPTH = 0.30
@@ -63,10 +63,6 @@ class GroundMaterial:
     hardening: float = 0.0
     crust_stress: float = 0.0
     firm_depth: float = 0.0
-
-    def presses_like(self, other: GroundMaterial) -> bool:
-        """Whether both give way alike, however they are displayed."""
-        return replace(self, blur_sigma=other.blur_sigma) == other
 
 
 Pressure = Literal["UNIFORM", "CENTRE_OF_PRESSURE"]

@@ -20,7 +20,6 @@ from .forces import whole_body_forces
 from .load_sharing import POINT_DEVIATION
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 CUTOFF_FACTOR = 1.25
 """Between cut-offs that are as good a choice: their factor about the one that is taken, standard deviation."""

@@ -13,7 +13,6 @@ from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 REST_TIME = 0.5

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..ground.heightfield import SparseGrid
 from ..record.contact_steps import ContactSteps
 from ..record.footprints import Footprint, FootprintRecorder
 from .contact_layout import ContactLayout
 from .ground_cells import GroundCells, Imprints, Timing
-
-Array = NDArray[np.float64]
 
 
 class OpenContact:

@@ -11,18 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import weather as w
+from softground_addon.core.after import weather as w
+from softground_addon.core.after.weather import GAUSS, NO_WATER, PARTS, Span
 
 Array = NDArray[np.float64]
 
-PARTS = 256
-"""Of the time from the first frame of the weather to the last frame at which anything begins or changes."""
 KEYED = ("snowfall", "temperature", "wind", "rain", "drying", "time_scale")
 """What is summed up over time."""
-NO_WATER = 1.0
-"""Depth of a water table that no print reaches [m]."""
-GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
-"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -57,20 +52,6 @@ class Weather:
     time_scale: float | Array = 1.0
     water_table: float = NO_WATER
     halo: float = 0.0
-
-
-@dataclass(frozen=True)
-class Span:
-    """The frames of the animation from which on there is weather and up to which it is known in parts, and [Hz]."""
-
-    first: float
-    last: float
-    frame_rate: float
-
-    @property
-    def step(self) -> float:
-        """Length of a part in frames."""
-        return (self.last - self.first) / PARTS
 
 
 @dataclass(frozen=True)
