@@ -213,7 +213,7 @@ class EditedSteps:
             difference = np.zeros(differs.shape)
             for one, sign in ((before, -1.0), (after, 1.0)):
                 if one is not None:
-                    difference[_part(window, one.window)] += sign * one.tile(getattr(one, quantity))
+                    difference[window.slices(one.window)] += sign * one.tile(getattr(one, quantity))
             differs |= np.abs(difference) > VISIBLE
         return _keys(window, np.flatnonzero(differs))
 
@@ -530,8 +530,3 @@ def _window_of(keys: Keys) -> Window:
     column = keys - row * ROW
     low = int(column.min()), int(row.min())
     return Window(*low, int(column.max()) - low[0] + 1, int(row.max()) - low[1] + 1)
-
-
-def _part(whole: Window, part: Window) -> tuple[slice, slice]:
-    row, column = part.row - whole.row, part.column - whole.column
-    return slice(row, row + part.rows), slice(column, column + part.columns)

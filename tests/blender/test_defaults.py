@@ -14,7 +14,7 @@ from sample_scenes.keys import write_action
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.characters import character_setup
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import ground_mesh, own_data
 from softground_addon.blender.interface import operators
 from softground_addon.core.ground import presets
 from softground_addon.core.motion.motion import COARSER
@@ -145,7 +145,7 @@ def test_shoes_have_a_tread_and_what_rolls_has_none(scene, walker):
     bpy.ops.softground.bake()
     mesh = scene.softground.ground.data
     marks, place = np.empty((len(mesh.vertices), 3), np.float32), np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.attributes[ground_mesh.SOLE].data.foreach_get("vector", marks.ravel())
+    mesh.attributes[own_data.SOLE].data.foreach_get("vector", marks.ravel())
     mesh.attributes["position"].data.foreach_get("vector", place.ravel())
     place += np.array(scene.softground.ground.location, np.float32)
     under_ball = np.linalg.norm(place[:, :2] - (1.0, 0.0), axis=1) < 0.15

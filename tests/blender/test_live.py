@@ -6,7 +6,7 @@ import pytest
 
 from softground_addon.blender import handlers
 from softground_addon.blender.baking import bake_report
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
 from softground_addon.blender.live import live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
@@ -152,7 +152,7 @@ def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
     bpy.ops.softground.live(keep=True)
     mesh = live_shot.softground.ground.data
     marks = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.attributes[ground_mesh.SOLE].data.foreach_get("vector", marks)
+    mesh.attributes[own_data.SOLE].data.foreach_get("vector", marks)
     assert marks.reshape(-1, 3)[:, 2].max() == pytest.approx(0.003, rel=1e-6)
 
 

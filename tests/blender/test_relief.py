@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import ground_mesh, own_data
 from softground_addon.core.record import record
 from tests.blender import shots
 from tests.blender.grounds import as_rendered, bake, heights, plane
@@ -58,8 +58,8 @@ def test_close_up_has_a_fine_mesh_with_the_tread_in_it_and_none_painted(baked):
     _, shown, _, _, attributes = baked["CLOSE_UP"]
     spacing = np.diff(np.unique(shown[:, 0].round(5)))
     assert spacing.min() == pytest.approx(0.0025, abs=1e-4)
-    assert ground_mesh.SOLE not in attributes
-    assert ground_mesh.SOLE in baked["FINE"][4]
+    assert own_data.SOLE not in attributes
+    assert own_data.SOLE in baked["FINE"][4]
 
 
 def test_close_up_is_fine_where_the_camera_comes_near_and_as_the_cells_elsewhere(scene):

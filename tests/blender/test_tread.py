@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground import ground_mesh
+from softground_addon.blender.ground import ground_mesh, own_data
 from tests.blender import shots
 from tests.blender.grounds import bake
 
@@ -34,7 +34,7 @@ def numbers(mesh, name):
 
 def test_prints_carry_the_place_under_the_sole_and_the_depth_of_the_tread(ground):
     mesh = ground.data
-    marks, touched = vectors(mesh, ground_mesh.SOLE), numbers(mesh, ground_mesh.AGE) >= 0
+    marks, touched = vectors(mesh, own_data.SOLE), numbers(mesh, ground_mesh.AGE) >= 0
     assert marks[:, 2].max() == pytest.approx(0.002, rel=1e-6)
     assert (marks[~touched, 2] < 0.002).all()
     inside = marks[marks[:, 2] > 0.0019]
@@ -45,8 +45,8 @@ def test_prints_carry_the_place_under_the_sole_and_the_depth_of_the_tread(ground
 def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scene):
     scene.softground.tread = 0.0
     bake(scene)
-    assert ground_mesh.SOLE not in ground.data.attributes
+    assert own_data.SOLE not in ground.data.attributes
     scene.softground.tread = 0.002
     bake(scene)
     bpy.ops.softground.clear_bake()
-    assert ground_mesh.SOLE not in ground.data.attributes
+    assert own_data.SOLE not in ground.data.attributes

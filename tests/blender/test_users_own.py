@@ -133,7 +133,7 @@ def test_these_are_all_the_modifiers_that_none_may_precede(scene):
     assert sorted(stubborn) == sorted(playback.NEED_THE_MESH)
 
 
-@pytest.mark.parametrize("part", ["attach", "write_soles"])
+@pytest.mark.parametrize("part", ["attach", "write_shading"])
 def test_whatever_fails_while_the_ground_is_written_it_is_given_back(short_walk, monkeypatch, part):
     def fail(*_arguments, **_named):
         raise MemoryError(part)
@@ -160,7 +160,7 @@ def played_heights(scene, shown):
 
 @pytest.mark.parametrize("shape_keys", [True, False])
 @pytest.mark.parametrize("copied", [False, True])
-@pytest.mark.parametrize("part", ["attach", "write_soles"])
+@pytest.mark.parametrize("part", ["attach", "write_shading"])
 def test_a_bake_that_fails_while_it_is_written_leaves_the_one_before(short_walk, monkeypatch, part, copied, shape_keys):
     def fail(*_arguments, **_named):
         raise MemoryError(part)

@@ -141,7 +141,7 @@ def sign(
 def _tread(
     footprints: Sequence[Footprint], position: Array, made_with: BakeSettings, relief: Sequence[StepRelief]
 ) -> Array | None:
-    """What `ground_mesh.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
+    """What `own_data.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
     has one, or relief has it in the mesh."""
     in_relief = {(step.character, step.sole) for step, its in zip(footprints, relief, strict=False) if its.tread}
     shod = shod_of(made_with.inputs()) - in_relief

@@ -23,7 +23,7 @@ from ...core.settings import ObjectName
 from ..after import debris_object
 from ..jobs import Job, Progress
 from ..settings import found, name_of
-from . import created_ground, ground_checks, ground_mesh, hidden_ground, playback, trail_detail
+from . import created_ground, ground_checks, ground_mesh, hidden_ground, own_data, playback, trail_detail
 from .created_ground import Layout
 
 Array = NDArray[np.float64]
@@ -157,9 +157,9 @@ def write(
     shape_keys : bool
         See `ground_mesh.write`.
     marks : (K, 3) float array, optional
-        See `ground_mesh.write_soles`.
+        Where under a sole they lay, as in `own_data.SOLE`.
     water : (K,) float array, optional
-        See `ground_mesh.write_water`.
+        How deep the water on them is [m].
     """
     found(table)  # or nothing is written
     ground_checks.check_playable(found(place.display_mesh))
@@ -171,8 +171,8 @@ def write(
             yield Progress("write", 0.9)
         display_mesh = found(place.display_mesh)
         playback.attach(display_mesh, place.index[spans.point], spans, found(table), up=up)
-        ground_mesh.write_soles(display_mesh, place.index, marks)
-        ground_mesh.write_water(display_mesh, place.index, water)
+        ground_mesh.write_shading(display_mesh, own_data.SOLE, place.index, marks)
+        ground_mesh.write_shading(display_mesh, own_data.WATER, place.index, water)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ from ...core.record.pressed_ground import GroundSample, Trail
 from .. import mesh_arrays
 from ..compat import remove_scene
 from . import display_key, own_data, painted_ground, playback, weather_modifier
-from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SOLE, SUMMARY, WARNINGS, WATER
+from .own_data import AGE, COMPRESSION, PROPERTIES, RECORD, REST, RIM, SUMMARY, WARNINGS
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -315,28 +315,16 @@ def write(
     write_positions(mesh, raw if shape_keys else display)
 
 
-def write_soles(ground: bpy.types.Object, index: Indices, marks: Array | None) -> None:
-    """Say of vertices (K,) where under a sole they lay, (K, 3) as in `SOLE`, and of all others that under none."""
+def write_shading(ground: bpy.types.Object, name: str, index: Indices, values: Array | None) -> None:
+    """Say of vertices (K,) what they are, (K,) or (K, 3), in an attribute that is 0 at all others; None removes it."""
     mesh = mesh_of(ground)
-    if marks is None:
-        own_data.remove(mesh, [SOLE])
+    if values is None:
+        own_data.remove(mesh, [name])
         return
-    whole = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-    whole[index] = marks
-    attribute = own_data.attribute(mesh, SOLE, "FLOAT_VECTOR")
-    attribute.data.foreach_set("vector", whole.ravel())
-
-
-def write_water(ground: bpy.types.Object, index: Indices, depth: Array | None) -> None:
-    """Say of vertices (K,) how deep the water on them is, (K,) [m], and of all others that there is none."""
-    mesh = mesh_of(ground)
-    if depth is None:
-        own_data.remove(mesh, [WATER])
-        return
-    whole = np.zeros(len(mesh.vertices), dtype=np.float32)
-    whole[index] = depth
-    attribute = own_data.attribute(mesh, WATER, "FLOAT")
-    attribute.data.foreach_set("value", whole)
+    whole = np.zeros((len(mesh.vertices), *values.shape[1:]), dtype=np.float32)
+    whole[index] = values
+    kind, field = ("FLOAT", "value") if values.ndim == 1 else ("FLOAT_VECTOR", "vector")
+    own_data.attribute(mesh, name, kind).data.foreach_set(field, whole.ravel())
 
 
 def up_of(ground: bpy.types.Object, unit_scale: float) -> Array:

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from .ground_mesh import COMPRESSION, RIM, SOLE, WATER
+from .own_data import COMPRESSION, RIM, SOLE, WATER
 from .weather_look import bare, under_weather
 from .weather_nodes import FRESH
 

@@ -17,6 +17,7 @@ from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample
+from .. import settings
 from ..ground import ground_mesh
 from ..reading.shots import Shot
 
@@ -79,7 +80,7 @@ class LiveGround:
     """
 
     def __init__(self, ground: bpy.types.Object, vertices: Array, shot: Shot, unit_scale: float) -> None:
-        self._uid = ground.session_uid
+        self._name = settings.name_of(ground)
         x, y, z = vertices.T
         near = ((vertices[:, :2] >= shot.lower) & (vertices[:, :2] <= shot.upper)).all(axis=1)
         near = np.flatnonzero(near)
@@ -112,9 +113,8 @@ class LiveGround:
 
     def object(self, likely: bpy.types.Object | None) -> bpy.types.Object | None:
         """The ground, which mostly is a likely one; None if it is gone or no longer what live mode made of it."""
-        found = likely
-        if found is None or found.session_uid != self._uid:
-            found = next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
+        is_it = likely is not None and likely.session_uid == self._name.uid
+        found = likely if is_it else settings.find(self._name)
         if found is None:
             return None
         mesh = ground_mesh.mesh_of(found)

@@ -250,8 +250,7 @@ class LiveMode:
 
     def discard(self) -> None:
         """Leave the ground as it was before."""
-        owner = next((obj for obj in bpy.data.objects if obj.session_uid == self._owner.uid), None)
-        ground = owner or self._ground.object(None)
+        ground = settings.find(self._owner) or self._ground.object(None)
         if ground is not None:
             baked_ground.clear(ground)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.display_blur import blurred_window, gaussian_kernel
-from ..ground.heightfield import TILE, SparseGrid, Window
+from ..ground.display_blur import blurred, blurred_window
+from ..ground.heightfield import HeightField, SparseGrid
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
@@ -97,17 +97,14 @@ def weather_places(
         Frames of the animation for each frame of the footprints.
     """
     places = position[:, :2].T
-    trodden = _contacts(footprints, cell_size)
-    at_sigma = []
-    for sigma in SIGMAS:
-        # The blur of the display is in what is shown already.
-        smooth = _blurred(_pressed(footprints, cell_size), float(np.hypot(sigma, blur_sigma))).sample(*places)
-        at_sigma.append(smooth)
+    ground, trodden = recompose(footprints, cell_size=cell_size), _contacts(footprints, cell_size)
+    # The blur of the display is in what is shown already.
+    at_sigma = [blurred(ground, float(np.hypot(sigma, blur_sigma))).sample(*places) for sigma in SIGMAS]
     heights = [relief, *(rim - compression for compression, rim in at_sigma)]
-    bounds = [_blurred(trodden, sigma).sample(*places) for sigma in SIGMAS]
+    bounds = [blurred(trodden, sigma).sample(*places) for sigma in SIGMAS]
     inside = [share for share, *_ in bounds]
     first, last = (_mean_frame([(one[0], one[k] * time_stretch) for one in bounds]) for k in (1, 2))
-    pool, levels = _pools(footprints, position, relief, cell_size, blur_sigma, layer_depth, time_stretch)
+    pool, levels = _pools(footprints, ground, position, relief, blur_sigma, layer_depth, time_stretch)
     return WeatherPlaces(
         blur=np.diff(heights, axis=0).T,
         trodden=np.stack([inside[0], inside[1] - inside[0], inside[2] - inside[1]], axis=-1),
@@ -127,11 +124,6 @@ def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
     return (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
 
 
-def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
-    """Compression and rim of the finished ground."""
-    return recompose(footprints, cell_size=cell_size)
-
-
 def _contacts(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
     """Which cells were in contact, 1 or 0, and the same times the first and the last frame at which they were."""
     grid = SparseGrid(cell_size, channels=3)
@@ -147,17 +139,6 @@ def _contacts(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
     return grid
 
 
-def _blurred(grid: SparseGrid, sigma: float) -> SparseGrid:
-    """The whole of a grid blurred; its sums stay."""
-    result = SparseGrid(grid.cell_size, channels=grid.channels)
-    spread = -(-(len(gaussian_kernel(sigma / grid.cell_size)) // 2) // TILE)
-    around = range(-spread, spread + 1)
-    for column, row in sorted({(column + i, row + j) for column, row in grid.tiles for i in around for j in around}):
-        window = Window(column * TILE, row * TILE, TILE, TILE)
-        result.write(window, blurred_window(grid, window, sigma))
-    return result
-
-
 def _mean_frame(blurs: Sequence[tuple[Array, Array]]) -> Array:
     """Mean frame of the contacts around, by the narrowest blur that reaches any; never, where none does."""
     frame = np.full(len(blurs[0][0]), NOT_YET)
@@ -169,16 +150,16 @@ def _mean_frame(blurs: Sequence[tuple[Array, Array]]) -> Array:
 
 def _pools(
     footprints: Sequence[Footprint],
+    ground: HeightField,
     position: Array,
     relief: Array,
-    cell_size: float,
     blur_sigma: float,
     layer_depth: float,
     time_stretch: float,
 ) -> tuple[Array, Array]:
     """`WeatherPlaces.pool` and `levels`: of the latest print whose hollow each place lies in."""
     pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), KNOTS + 1))
-    ground = recompose(footprints, cell_size=cell_size)
+    cell_size = ground.cell_size
     row, column = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (1, 0))
     for footprint in sorted(footprints, key=lambda one: one.end_frame):
         window = footprint.window.expanded(1)

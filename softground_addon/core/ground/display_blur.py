@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import TILE, HeightField, SparseGrid, Window
+from .heightfield import TILE, SparseGrid, Window
+
+Grid = TypeVar("Grid", bound=SparseGrid)
 
 Array = NDArray[np.float64]
 
@@ -64,16 +69,17 @@ def blurred_inside(values: Array, kernel: Array) -> Array:
     return blurred
 
 
-def blurred(field: HeightField, sigma: float) -> HeightField:
-    """The whole height field blurred; its volumes are those of the raw one.
+def blurred(field: Grid, sigma: float) -> Grid:
+    """The whole of a grid blurred; its sums, and so volumes, are those of the raw one.
 
     Parameters
     ----------
-    field : HeightField
+    field : SparseGrid
     sigma : float
         Standard deviation [m].
     """
-    result = HeightField(field.cell_size)
+    result = copy(field)
+    result.tiles = {}
     spread = -(-(len(gaussian_kernel(sigma / field.cell_size)) // 2) // TILE)  # tiles that a touched one blurs into
     around = range(-spread, spread + 1)
     places = {(column + i, row + j) for column, row in field.tiles for i in around for j in around}

@@ -115,6 +115,11 @@ class Window(NamedTuple):
         end_row = max(self.row + self.rows, other.row + other.rows)
         return Window(column, row, end_column - column, end_row - row)
 
+    def slices(self, part: Window) -> tuple[slice, slice]:
+        """Rows and columns that a part of the window takes."""
+        row, column = part.row - self.row, part.column - self.column
+        return slice(row, row + part.rows), slice(column, column + part.columns)
+
     def intersects(self, other: Window) -> bool:
         """Whether the two share a cell."""
         return (

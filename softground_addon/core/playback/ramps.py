@@ -7,12 +7,15 @@ time is the sum of its ramps, so that frames can be shown in any order, and betw
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.key_reduction import bend_lines
+
+Spans = TypeVar("Spans", bound=Any)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -49,13 +52,7 @@ class Ramps:
     @classmethod
     def joined(cls, parts: Sequence[Ramps], channels: int) -> Ramps:
         """All ramps of several sets, which may share points; how many values these have must be told for none."""
-        none = cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels)))
-        point, start, end, change = (
-            np.concatenate([getattr(part, name) for part in (none, *parts)])
-            for name in ("point", "start", "end", "change")
-        )
-        order = np.lexsort((start, point))
-        return cls(point[order], start[order], end[order], change[order])
+        return joined([cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros((0, channels))), *parts])
 
     def at(self, frame: float, points: int) -> Array:
         """Values of points 0 to `points` - 1 at a frame, (points, C)."""
@@ -64,6 +61,13 @@ class Ramps:
         for channel, change in enumerate(self.change.T):
             values[:, channel] += np.bincount(self.point, change * share, minlength=points)
         return values
+
+
+def joined(parts: Sequence[Spans]) -> Spans:
+    """What points have between a `start` and an `end`, of several sets of at least one, by point and time."""
+    whole = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(parts[0])}
+    order = np.lexsort((whole["start"], whole["point"]))
+    return type(parts[0])(**{name: values[order] for name, values in whole.items()})
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..numerics import bilinear
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import QUANTUM, Footprint
 from ..relief.steps import NOTHING, StepRelief
-from .ramps import TOLERANCE, Ramps, fit, grown
+from .ramps import TOLERANCE, Ramps, fit, grown, joined
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -112,7 +112,7 @@ def vertex_histories(
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
     reach = [footprint.window.expanded(_margin(kernels[footprint.cell_size])) for footprint in footprints]
     movements: list[Ramps] = []
-    contacts: list[PointContacts] = []
+    contacts = [PointContacts(np.zeros(0, dtype=np.intp), *np.zeros((3, 0)))]
     error = 0.0
     for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
         own: list[Ramps] = []
@@ -132,7 +132,11 @@ def vertex_histories(
         movements += own
         contacts.append(_point_contacts(footprint, places))
         yield
-    return VertexHistories(Ramps.joined(movements, 2), _joined(contacts), error)
+    return VertexHistories(
+        Ramps.joined(movements, 2),
+        joined(contacts),
+        error,
+    )
 
 
 def _near(footprints: Sequence[Footprint], places: Places, kernels: Mapping[float, Array]) -> list[int]:
@@ -252,14 +256,3 @@ def _point_contacts(footprint: Footprint, places: Places) -> PointContacts:
         footprint.contact_end[touched],
         np.full(len(points), pressure),
     )
-
-
-def _joined(parts: Sequence[PointContacts]) -> PointContacts:
-    """All contacts, by place and time."""
-    none = PointContacts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0), np.zeros(0))
-    point, start, end, pressure = (
-        np.concatenate([getattr(part, name) for part in (none, *parts)])
-        for name in ("point", "start", "end", "pressure")
-    )
-    order = np.lexsort((start, point))
-    return PointContacts(point[order], start[order], end[order], pressure[order])

@@ -103,7 +103,7 @@ class GroundSolver:
             window, surface = self._around(imprints.window)
         whole = self.state.read(window)
         before = quantised(whole)
-        inside = _inside(window, imprints.window)
+        inside = window.slices(imprints.window)
         state = whole[:, inside[0], inside[1]]
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
@@ -176,9 +176,3 @@ class GroundSolver:
             corner=(surface.window.row, surface.window.column),
             sweeps=sweeps,
         )
-
-
-def _inside(whole: Window, part: Window) -> tuple[slice, slice]:
-    """Rows and columns of a window that a part of it takes."""
-    row, column = part.row - whole.row, part.column - whole.column
-    return slice(row, row + part.rows), slice(column, column + part.columns)

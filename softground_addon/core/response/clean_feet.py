@@ -12,8 +12,8 @@ from ..motion.motion import CharacterMotion
 from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
-from .foot_lock import lock, moved, rim_points, slides, underside_on
-from .foot_placement import Placement, place_sole
+from .foot_lock import lock, moved, rim, slides, underside_on
+from .foot_placement import Placement, place_sole, posed_points
 from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
 
 Array = NDArray[np.float64]
@@ -69,7 +69,13 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
             locked = lock(underside_on(lying, floor, motion.frames), touches) @ locked
         held = moved(motion.soles[number], locked)
         placed = place_sole(
-            with_sole(motion, number, held), number, touches, floor, floor, align=0.0, points=rim_points(held)
+            with_sole(motion, number, held),
+            number,
+            touches,
+            floor,
+            floor,
+            align=0.0,
+            points=posed_points(held, rim(held.sole)),
         )
         lift = first.lift + placed.lift
         placements[side] = number, Placement(placed.carry @ locked, lift, np.zeros_like(lift), placed.room)

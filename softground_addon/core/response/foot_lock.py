@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..motion.motion import Sole, SoleMotion, SolePatch
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
-from .foot_placement import PressedGround, between_contacts
+from .foot_placement import PressedGround, between_contacts, posed_points
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -107,25 +107,13 @@ class Underside:
 def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Underside:
     """The rim of a sole over time and its heights above a floor, above its own lowest point where there is none."""
     pieces = rim(motion.sole)
-    points = rim_points(motion)
+    points = posed_points(motion, pieces)
     ground = floor.heights(points[..., 0], points[..., 1], np.broadcast_to(frames[:, None], points.shape[:2]))
     known = np.isfinite(ground)
     own = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
     heights = np.where(known.any(axis=1, keepdims=True), np.where(known, points[..., 2] - ground, np.inf), own)
     piece = np.concatenate([np.full(len(places), patch) for patch, places in pieces])
     return Underside(points, heights, piece, motion.sole.length)
-
-
-def rim_points(motion: SoleMotion) -> Array:
-    """World positions of a sole's `rim`, (F, Q, 3) [m]."""
-    poses = motion.transforms
-    return np.concatenate(
-        [
-            points @ np.swapaxes(poses[:, patch, :3, :3], -1, -2) + poses[:, patch, None, :3, 3]
-            for patch, points in rim(motion.sole)
-        ],
-        axis=1,
-    )
 
 
 def lock(sole: Underside, touching: Mask) -> Array:

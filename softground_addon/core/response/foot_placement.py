@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -87,12 +88,13 @@ def _inside(patch: SolePatch, length: float, edge: float) -> Array:
     return np.stack([x, y, patch.heights[rows, columns]], axis=-1)
 
 
-def posed_points(motion: SoleMotion, edge: float = EDGE) -> Array:
-    """World positions of a sole's `underside`, (F, Q, 3) [m]."""
+def posed_points(motion: SoleMotion, pieces: Sequence[tuple[int, Array]] | None = None) -> Array:
+    """World positions of points in the frames of a sole's patches, or of its `underside`, (F, Q, 3) [m]."""
+    poses = motion.transforms
     return np.concatenate(
         [
-            points @ np.swapaxes(motion.transforms[:, patch, :3, :3], -1, -2) + motion.transforms[:, patch, None, :3, 3]
-            for patch, points in underside(motion.sole, edge)
+            points @ np.swapaxes(poses[:, patch, :3, :3], -1, -2) + poses[:, patch, None, :3, 3]
+            for patch, points in (underside(motion.sole) if pieces is None else pieces)
         ],
         axis=1,
     )

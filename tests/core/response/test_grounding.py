@@ -9,7 +9,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion
 from softground_addon.core.response import response
-from softground_addon.core.response.foot_placement import ANKLE_PITCH, place_sole, posed_points, slide_offset
+from softground_addon.core.response.foot_placement import ANKLE_PITCH, place_sole, posed_points, slide_offset, underside
 from softground_addon.core.response.grounding import Response, leg_of, leg_soles, responding, settle
 from softground_addon.core.response.response import GroundingOptions, TiltOptions, respond, stood_on
 from tests.core.walkers import foot_sole, pose
@@ -67,7 +67,7 @@ def clearance(motion, ground, touching):
     """Height of the lowest point of each standing sole above the ground, by a denser set of points."""
     found = []
     for index, sole in enumerate(motion.soles):
-        points = posed_points(sole, edge=0.03)
+        points = posed_points(sole, underside(sole.sole, edge=0.03))
         z = ground.heights(points[..., 0], points[..., 1], motion.frames[:, None])
         found.append((points[..., 2] - z).min(axis=1)[touching[:, index]])
     return np.concatenate(found)
