@@ -22,6 +22,17 @@ def new_group(name: str, mark: str) -> Any:
     return tree
 
 
+def modifier_with(obj: bpy.types.Object, is_it: Callable[[Any], bool]) -> Any:
+    """The first modifier whose node group is of a kind, whatever the names of both have become; None without one."""
+    return next((one for one in obj.modifiers if (group := getattr(one, "node_group", None)) and is_it(group)), None)
+
+
+def inputs_of(modifier: Any) -> dict[str, str]:
+    """Identifier of each input of a modifier's node group, by its name."""
+    sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
+    return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
+
+
 class NodeGraph:
     """A node group while it is built, laid out in rows."""
 

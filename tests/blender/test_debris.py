@@ -13,7 +13,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
-from softground_addon.blender import compat, jobs, mesh_arrays
+from softground_addon.blender import compat, jobs, mesh_arrays, node_graph
 from softground_addon.blender.after import debris_object
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.output import debris_points, exports
@@ -58,11 +58,11 @@ def scene(baked):
 
 
 def set_input(modifier, name, value):
-    compat.write_input(modifier, debris_object.socket_of(modifier.node_group, name), value)
+    compat.write_input(modifier, node_graph.inputs_of(modifier)[name], value)
 
 
 def get_input(modifier, name):
-    return compat.read_input(modifier, debris_object.socket_of(modifier.node_group, name))
+    return compat.read_input(modifier, node_graph.inputs_of(modifier)[name])
 
 
 def values(obj, name, field="value", size=1):

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from softground_addon.blender.ground import baked_ground, ground_mesh
-from softground_addon.blender.interface import overlay, overlay_shapes
+from softground_addon.blender.interface import baked_steps, overlay, overlay_shapes
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
 from softground_addon.core.record import record
@@ -69,14 +69,13 @@ def test_the_cells_of_another_bake_are_shown_once_there_is_one(scene):
     bpy.ops.softground.add_character()
     bpy.ops.softground.bake()
     ground = scene.softground.ground
-    before = overlay._baked(ground)
-    assert overlay._baked(ground)[0] is before[0]
+    before = baked_steps.bake_on(ground)
+    assert baked_steps.bake_on(ground).footprints is before.footprints
     scene.softground.material.rim_reach *= 2
     bpy.ops.softground.bake()
-    after = overlay._baked(ground)
-    assert after[1] == pytest.approx(2 * before[1])
+    assert baked_steps.bake_on(ground).rim_reach == pytest.approx(2 * before.rim_reach)
     ground_mesh.mesh_of(ground)[ground_mesh.RECORD] = "nonsense"
-    assert overlay._baked(ground) == ((), 0.0)
+    assert baked_steps.bake_on(ground) is baked_steps.NOTHING
 
 
 def test_the_directory_of_a_record_lies_in_its_tail(scene):

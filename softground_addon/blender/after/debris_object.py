@@ -11,6 +11,7 @@ import numpy as np
 from ...core.after import flight
 from ...core.after.debris import Debris
 from .. import compat
+from ..node_graph import inputs_of, modifier_with
 from ..settings import exists
 from . import debris_nodes as nodes
 from . import debris_shapes
@@ -73,8 +74,9 @@ def put(
     )
     modifier: Any = obj.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = group
+    sockets = inputs_of(modifier)
     for name, value in (_AT_FIRST | kept).items():
-        compat.write_input(modifier, socket_of(group, name), value)
+        compat.write_input(modifier, sockets[name], value)
     return obj
 
 
@@ -87,11 +89,8 @@ def of(ground: bpy.types.Object) -> bpy.types.Object | None:
 
 def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
     """An input of the debris as `layout.prop` takes it: its modifier and the path of the property."""
-    for modifier in obj.modifiers:
-        group = getattr(modifier, "node_group", None)
-        if group is not None and group.get(nodes.MARK):
-            return compat.input_field(modifier, socket_of(group, name))
-    return None
+    modifier = _modifier_of(obj)
+    return compat.input_field(modifier, inputs_of(modifier)[name]) if modifier else None
 
 
 def leave_out(ground: bpy.types.Object, steps: Collection[int]) -> None:
@@ -125,22 +124,20 @@ def remove(ground: bpy.types.Object) -> None:
 
 def _settings_of(obj: bpy.types.Object) -> dict[str, Any]:
     """What the artist set of the older debris: wind, amount, how many are shaped, and shapes of their own."""
-    for modifier in obj.modifiers:
-        group = getattr(modifier, "node_group", None)
-        if group is not None and group.get(nodes.MARK):
-            values = {name: compat.read_input(modifier, socket_of(group, name)) for name in (*_AT_FIRST, "Shapes")}
-            if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):
-                values["Shapes"] = None
-            # Vectors belong to the modifier, and go with it.
-            values["Wind"] = None if values["Wind"] is None else tuple(values["Wind"])
-            return {name: value for name, value in values.items() if value is not None}
-    return {}
+    modifier = _modifier_of(obj)
+    if modifier is None:
+        return {}
+    sockets = inputs_of(modifier)
+    values = {name: compat.read_input(modifier, sockets[name]) for name in (*_AT_FIRST, "Shapes")}
+    if values["Shapes"] is not None and values["Shapes"].get(nodes.MARK):
+        values["Shapes"] = None
+    # Vectors belong to the modifier, and go with it.
+    values["Wind"] = None if values["Wind"] is None else tuple(values["Wind"])
+    return {name: value for name, value in values.items() if value is not None}
 
 
-def socket_of(group: Any, name: str) -> str:
-    """The modifier's key of a group's input."""
-    items = group.interface.items_tree
-    return next(str(item.identifier) for item in items if item.name == name and item.in_out == "INPUT")
+def _modifier_of(obj: bpy.types.Object) -> Any:
+    return modifier_with(obj, lambda group: bool(group.get(nodes.MARK)))
 
 
 def _points(debris: Debris, time_stretch: float, gravity: float, unit_scale: float) -> bpy.types.Mesh:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.playback.playback_curves import PlaybackCurves, Spans
 from ..compat import straighten
+from ..node_graph import modifier_with
 from ..settings import find, found, name_of
 from . import own_data
 from . import playback_nodes as nodes
@@ -103,11 +104,8 @@ def barrier_on(ground: bpy.types.Object) -> bpy.types.Modifier | None:
 
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     """The ground's playback, whatever the names of the modifier and its node group have become."""
-    for modifier in ground.modifiers:
-        group = getattr(modifier, "node_group", None)
-        if group is not None and nodes.is_playback(group):
-            return modifier
-    return None
+    modifier: bpy.types.Modifier | None = modifier_with(ground, nodes.is_playback)
+    return modifier
 
 
 def playing(ground: bpy.types.Object) -> list[tuple[bpy.types.Object, Any]]:

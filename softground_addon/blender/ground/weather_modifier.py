@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import bpy
 
+from .. import node_graph
 from . import own_data, playback
 from . import weather_nodes as nodes
 
@@ -14,18 +15,14 @@ MODIFIER = "SoftGround Weather"
 
 def modifier_of(ground: bpy.types.Object) -> bpy.types.Modifier | None:
     """The ground's weather, whatever the names of the modifier and its node group have become."""
-    for modifier in ground.modifiers:
-        group = getattr(modifier, "node_group", None)
-        if group is not None and nodes.is_weather(group):
-            return modifier
-    return None
+    modifier: bpy.types.Modifier | None = node_graph.modifier_with(ground, nodes.is_weather)
+    return modifier
 
 
 def inputs_of(modifier: Any) -> dict[str, str]:
     """Identifier of each of the inputs that set the weather, by its name."""
-    sockets = [one for one in modifier.node_group.interface.items_tree if one.item_type == "SOCKET"]
     known = {name for name, *_ in nodes.INPUTS}
-    return {one.name: one.identifier for one in sockets if one.in_out == "INPUT" and one.name in known}
+    return {name: identifier for name, identifier in node_graph.inputs_of(modifier).items() if name in known}
 
 
 def put(ground: bpy.types.Object, tree: bpy.types.NodeTree) -> Any:

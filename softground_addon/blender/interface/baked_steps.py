@@ -14,6 +14,7 @@ from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit
+from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
 
@@ -92,29 +93,42 @@ class BakedStep(record.EditableStep):
         return corners * step.cell_size
 
 
-_known: dict[tuple[int, bytes], Sequence[BakedStep]] = {}
-"""The steps that were shown last, by their mesh and what tells its record from others."""
+@dataclass(frozen=True, eq=False)
+class ShownBake:
+    """What is shown of a bake: its steps in order, its footprints as they were left, and how far rims reach [m]."""
+
+    steps: Sequence[BakedStep] = ()
+    footprints: Sequence[Footprint] = ()
+    rim_reach: float = 0.0
 
 
-def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
-    """The steps of the bake on the scene's ground, in their order; none where there is no bake that can be read."""
-    ground = scene.softground.ground
+NOTHING = ShownBake()
+
+_known: dict[tuple[int, bytes], ShownBake] = {}
+"""The bake that was shown last, by its mesh and what tells its record from others."""
+
+
+def bake_on(ground: bpy.types.Object | None) -> ShownBake:
+    """The bake on a ground; nothing where there is none that can be read."""
     if ground is None or not baked_ground.is_baked(ground):
-        return ()
+        return NOTHING
     try:
         stored = baked_ground.stored_record(ground)
         key = (baked_ground.display_mesh_of(ground).data.session_uid, bytes(stored[-record.TAIL :]))
         if key not in _known:
-            steps = _steps(record.load(bytes(stored)))
+            left = record.load(bytes(stored))
+            steps = [BakedStep(**vars(step), number=number) for number, step in enumerate(left.steps, start=1)]
+            shown = ShownBake(steps, left.edited, baked_ground.baked_with(dict(left.about), "rim_reach"))
             _known.clear()
-            _known[key] = steps
+            _known[key] = shown
     except InputError:
-        return ()
+        return NOTHING
     return _known[key]
 
 
-def _steps(left: record.BakeRecord) -> list[BakedStep]:
-    return [BakedStep(**vars(step), number=number) for number, step in enumerate(left.steps, start=1)]
+def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
+    """The steps of the bake on the scene's ground, in their order; none where there is no bake that can be read."""
+    return bake_on(scene.softground.ground).steps
 
 
 def active(scene: bpy.types.Scene) -> BakedStep | None:
@@ -130,5 +144,5 @@ def chosen(scene: bpy.types.Scene) -> list[BakedStep]:
 
 
 def forget() -> None:
-    """Forget the steps that were shown."""
+    """Forget the bake that was shown."""
     _known.clear()

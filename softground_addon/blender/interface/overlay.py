@@ -13,15 +13,12 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.record import record
-from ...core.record.footprints import Footprint
 from .. import jobs, session, settings
-from ..ground import baked_ground
 from ..live import live
 from ..operator_base import OnShot, reports_errors
 from ..reading import analysis
 from ..reading.analysis import Analysis
-from . import overlay_shapes, prediction
+from . import baked_steps, overlay_shapes, prediction
 from .modal_bake import Reading
 from .overlay_shapes import Cells, Outline
 
@@ -54,10 +51,6 @@ def _footfalls(known: Analysis) -> list[Outline]:
     if known not in _outlines:
         _outlines[known] = overlay_shapes.footfalls(known.loads, known.shot.terrain)
     return _outlines[known]
-
-
-_bake: dict[tuple[int, bytes], tuple[Sequence[Footprint], float]] = {}
-"""Footprints and rim reach [m] of the bake that was shown last, by its mesh and what tells its record from others."""
 
 
 def draw_shapes() -> None:
@@ -130,26 +123,10 @@ def _cells(scene: bpy.types.Scene) -> tuple[Cells, Cells, float]:
         windows, size, reach = shown
         touched = [overlay_shapes.marked(window, mask) for window, mask in windows]
     else:
-        footprints, reach = _baked(scene.softground.ground)
-        size = footprints[0].cell_size if footprints else 1.0
-        touched = list(overlay_shapes.touched_at(footprints, float(scene.frame_current)))
+        bake = baked_steps.bake_on(scene.softground.ground)
+        reach, size = bake.rim_reach, bake.footprints[0].cell_size if bake.footprints else 1.0
+        touched = list(overlay_shapes.touched_at(bake.footprints, float(scene.frame_current)))
     return *overlay_shapes.contact_and_rim(touched, reach / size), size
-
-
-def _baked(ground: bpy.types.Object | None) -> tuple[Sequence[Footprint], float]:
-    """The footprints on a ground, and the reach of their rims [m]; nothing where there is no bake that can be read."""
-    if ground is None or not baked_ground.is_baked(ground):
-        return (), 0.0
-    try:
-        tail = bytes(baked_ground.stored_record(ground)[-record.TAIL :])
-        key = (baked_ground.display_mesh_of(ground).data.session_uid, tail)
-        if key not in _bake:
-            footprints, about = baked_ground.load(ground)
-            _bake.clear()
-            _bake[key] = footprints, baked_ground.baked_with(about, "rim_reach")
-    except InputError:
-        return (), 0.0
-    return _bake[key]
 
 
 def draw_line(points: Array, colour: Colour, width: float) -> None:
@@ -270,7 +247,6 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(read_again):
         bpy.app.timers.unregister(read_again)
     _outlines.clear()
-    _bake.clear()
 
 
 CLASSES = (SOFTGROUND_OT_overlay, SOFTGROUND_OT_read_again)
