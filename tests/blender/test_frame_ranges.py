@@ -128,3 +128,19 @@ def test_the_panel_says_why_the_bake_and_the_scene_differ(scene, walker):
     assert _apart_from_scene(scene) == "The bake is from 1 to 100, the scene from 0 to 200"
     scene.softground.frame_start, scene.softground.frame_end = 0, 200
     assert not _apart_from_scene(scene)
+
+
+def test_a_pose_of_one_frame_is_held_and_prints_both_feet(scene, walker):
+    walker.animation_data_clear()
+    for bone in walker.pose.bones:
+        bone.matrix_basis.identity()
+        bone.keyframe_insert("location", frame=1)
+    scene.frame_start = scene.frame_end = 1
+    assert frames(scene, walker) == (1, 1)
+    bpy.ops.softground.add_character()
+    scene.softground.cell_size = 0.02
+    assert (scene.softground.frame_start, scene.softground.frame_end) == (1, 1 + scene.render.fps)
+    steps = bake(scene).report["steps"]
+    assert sorted(step["contact"] for step in steps) == ["foot.L", "foot.R"]
+    weight = scene.softground.characters[0].mass * 9.81
+    assert sum(step["peak_force_n"] for step in steps) == pytest.approx(weight, rel=0.02)

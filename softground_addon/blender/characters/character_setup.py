@@ -98,11 +98,16 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
 
 
 def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:
-    """The scene's frames at which an animation plays; all of them without one."""
+    """The scene's frames at which an animation plays; all of them without one. A pose of one frame is held."""
     if not frames:
         return scene.frame_start, scene.frame_end
     stretch = time_stretch_of(scene)
-    return floor(frames[0] / stretch), ceil(frames[1] / stretch)
+    first, last = floor(frames[0] / stretch), ceil(frames[1] / stretch)
+    return first, last if last > first else first + ceil(POSE_TIME * scene.render.fps / scene.render.fps_base)
+
+
+POSE_TIME = 1.0
+"""How long a pose of one frame is held [s]: by then all grounds of the presets have yielded."""
 
 
 def _fit_ground(scene: bpy.types.Scene) -> None:
