@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core.errors import InputError
 from . import session
 from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
@@ -109,7 +110,10 @@ def after_undo(*_: Any) -> None:
 def before_load(*_: Any) -> None:
     """What goes on ends with the file."""
     modal_bake.stop()
-    live.discard()
+    try:
+        live.discard()
+    except InputError:  # a ground in Edit Mode keeps its prints, for Clear Bake
+        live.forget()
     analysis.forget()
 
 

@@ -1,5 +1,7 @@
 """Live mode: what the timeline shows, whatever way the playhead takes, and nothing left behind."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from softground_addon.blender import handlers
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
+from softground_addon.blender.interface import menus
 from softground_addon.blender.live import live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
@@ -293,11 +296,50 @@ def test_nothing_is_written_while_a_render_runs(live_shot):
     assert fingerprints.of_mesh(live_shot.softground.ground.data) != before
 
 
+def status():
+    header = MagicMock()
+    menus.draw_in_status_bar(header, bpy.context)
+    return [call.kwargs["text"] for call in header.layout.label.mock_calls]
+
+
+@pytest.mark.parametrize("end", ["discard", "keep", "delete the ground", "new file"])
+def test_the_status_bar_says_that_live_mode_is_on_until_it_ends(shot, end):
+    assert menus.draw_in_status_bar in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+    assert status() == []
+    bpy.ops.softground.live()
+    (line,) = status()
+    assert line.startswith("Live Footprints")
+    if end == "delete the ground":
+        bpy.data.objects.remove(shot.softground.ground)
+        shot.frame_set(20)
+    elif end == "new file":
+        bpy.ops.wm.read_homefile(use_empty=True)
+    else:
+        bpy.ops.softground.live(keep=end == "keep")
+    assert status() == []
+
+
 def test_a_new_file_ends_live_mode(live_shot):
     live_shot.frame_set(20)
     bpy.ops.wm.read_homefile(use_empty=True)
     assert not live.is_on()
     assert not bpy.context.window_manager.softground.is_live
+
+
+def test_the_add_on_is_disabled_with_the_ground_in_edit_mode_and_the_prints_can_be_cleared_later(live_shot):
+    live_shot.frame_set(30)
+    ground = live_shot.softground.ground
+    bpy.context.view_layer.objects.active = ground
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="Edit Mode"):
+        bpy.ops.softground.live()
+    assert live.is_on()
+    handlers.unregister()
+    handlers.register()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not live.is_on()
+    bpy.ops.softground.clear_bake()
+    assert np.abs(heights(live_shot)).max() < LEVEL
 
 
 def test_a_file_saved_in_live_mode_can_be_cleared_after_it_is_opened_again(live_shot, tmp_path):

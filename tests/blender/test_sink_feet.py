@@ -3,9 +3,10 @@
 from unittest.mock import MagicMock
 
 import bpy
+import numpy as np
 import pytest
 
-from softground_addon.blender import jobs
+from softground_addon.blender import compat, jobs
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking import bake_job, bake_report, sink_feet
 from softground_addon.blender.characters.selection import set_up_automatically
@@ -45,6 +46,33 @@ def test_one_button_lets_the_feet_down_and_leaves_the_prints(baked):
     assert baked.softground.output == "BOTH"
     assert sink_feet.floating_mm(baked) < 2.0
     assert bake_report.stale_reasons(baked) == (), "on level ground the prints are those of the grounded walk"
+
+
+def test_a_second_press_replaces_the_layer_of_the_first(baked):
+    armature = baked.softground.characters[0].armature
+    before = fingerprints.of_object(armature)
+
+    def keys():
+        return {
+            (track.name, curve.data_path, curve.array_index): [tuple(key.co) for key in curve.keyframe_points]
+            for track in armature.animation_data.nla_tracks
+            for strip in track.strips
+            for curve in compat.action_curves(strip.action)
+        }
+
+    bpy.ops.softground.sink_feet()
+    once, actions = keys(), len(bpy.data.actions)
+    bpy.ops.softground.sink_feet()
+    twice = keys()
+    assert list(twice) == list(once)
+    assert len(bpy.data.actions) == actions
+    for curve, expected in once.items():
+        np.testing.assert_allclose(twice[curve], expected, atol=1e-5, err_msg=str(curve))
+    assert sink_feet.floating_mm(baked) < 2.0
+    assert bake_report.stale_reasons(baked) == ()
+    bpy.ops.softground.clear_bake()
+    assert not baked.softground.grounding.use
+    assert fingerprints.of_object(armature) == before
 
 
 def test_feet_that_cannot_be_let_down_leave_the_settings_as_they_were(baked):
