@@ -107,7 +107,8 @@ def test_a_bake_killed_within_its_save_leaves_whole_files_and_a_receipt_that_is_
     chance, ended = random.Random(2), 0
     for attempt in range(kills):
         old = {name: path.read_bytes() for name, path in places.items() if path.exists()}
-        told = [attempt % 25 + 1, chance.choice([1e-6, chance.uniform(0, 0.1)])]
+        step = 2 * attempt % 25 + 1  # so that few attempts reach the renames too
+        told = [step, chance.choice([1e-6, chance.uniform(0, 0.1)])]
         command = [sys.executable, "-c", KILLED_WHILE_SAVING, *told, "bake", shot, "--progress=none", *options]
         done = subprocess.run(list(map(str, command)), cwd=command_line.ROOT, capture_output=True, check=False)
         assert done.returncode in (0, -signal.SIGALRM), done.stderr

@@ -16,11 +16,14 @@ from .estimate import CharacterLoads
 BYTES_PER_CELL = 1000.0
 """What a cell under a print takes from simulation to playback [bytes], as measured on walks at 1 and 0.5 mm."""
 
-SECONDS_PER_CELL = 1e-4
-"""What it takes to write [s]: 50 to 110 µs on walks and a rolling ball with cells of 4 to 1 mm, ..."""
+SECONDS_PER_CELL = 5e-5
+"""What it takes to write [s], and over the square of the cell size ..."""
+
+SECONDS_OF_FINE_CELLS = 6.2e-11
+"""... [s m²]: 61, 65, 107 and 299 µs on a walk with cells of 4, 2, 1 and 0.5 mm, 50 to 90 on others, ..."""
 
 SECONDS_PER_CELL_HELD = 5.5e-5
-"""... and to simulate, for each second that a sole is on it [s/s]: 45 to 70 µs, from standing to walking."""
+"""... and what it takes to simulate, for each second that a sole is on it [s/s]: 45 to 70 µs, standing or walking."""
 
 BYTES_PER_FRAME = 60e3
 """What a frame of a character takes from reading to playback [bytes], as measured on a walk of 100,000 frames."""
@@ -54,7 +57,13 @@ def bake_time(loads: Sequence[CharacterLoads], cell_size: float) -> float:
     for character in loads:
         areas = [sole.sole.area for sole in character.motion.soles]
         held += float(character.contacts.touching.sum(axis=0) @ areas) * character.motion.time_step
-    return (pressed_area(loads) * SECONDS_PER_CELL + held * SECONDS_PER_CELL_HELD) / cell_size**2
+    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2
+    return (pressed_area(loads) * writing + held * SECONDS_PER_CELL_HELD) / cell_size**2
+
+
+def bake_memory(loads: Sequence[CharacterLoads], cell_size: float) -> float:
+    """What it takes of memory [bytes]."""
+    return pressed_area(loads) / cell_size**2 * BYTES_PER_CELL
 
 
 def check_cell_size(
@@ -81,12 +90,14 @@ def check_cell_size(
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
-    needed, time = pressed_area(loads) / cell_size**2 * BYTES_PER_CELL, bake_time(loads, cell_size)
+    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size)
     too_much = _too_much(needed, time, longest, available)
     if not too_much:
         return
-    names = ", ".join(f"'{character.motion.name}'" for character in loads)
-    fits = cell_size * np.sqrt(max(needed / (USABLE * available) if available else 0.0, time / longest)) * 1.05
+    names, fits = ", ".join(f"'{character.motion.name}'" for character in loads), cell_size
+    while _too_much(bake_memory(loads, fits), bake_time(loads, fits), longest, available):
+        fits *= 1.05
+    fits *= 1.05  # it is rounded
     raise InputError(
         f"Cells of {cell_size * 1e3:g} mm would take about {_amount(needed, time)} for the steps of {names}, and "
         f"{too_much}: set a cell size of at least {fits * 1e3:.2g} mm, or bake fewer frames."

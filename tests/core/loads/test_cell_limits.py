@@ -17,7 +17,7 @@ from tests.core.walkers import box_sole, standing
 
 WEIGHT = 750.0
 LOADS = standing(box_sole(0.2, 0.1), [(0.0, 0.0, 0.0)], WEIGHT)
-ALL_NIGHT = 36_000.0
+FOR_EVER = float("inf")
 
 
 def named_size(error):
@@ -30,10 +30,10 @@ def test_a_sole_that_stands_covers_its_area_once():
 
 def test_cells_that_no_memory_holds_are_refused_with_a_size_that_fits():
     with pytest.raises(InputError, match="GB of memory") as error:
-        check_cell_size([LOADS], 1e-5, ALL_NIGHT, available=1e9)
+        check_cell_size([LOADS], 1e-5, FOR_EVER, available=1e9)
     assert named_size(error) > 1e-5
-    check_cell_size([LOADS], named_size(error), ALL_NIGHT, available=1e9)
-    check_cell_size([LOADS], 1e-5, ALL_NIGHT, available=1e15)
+    check_cell_size([LOADS], named_size(error), FOR_EVER, available=1e9)
+    check_cell_size([LOADS], 1e-5, FOR_EVER, available=1e15)
 
 
 def test_cells_that_swallow_a_sole_are_refused_with_a_size_that_shows_it():
@@ -45,28 +45,29 @@ def test_cells_that_swallow_a_sole_are_refused_with_a_size_that_shows_it():
 
 def test_frames_that_no_memory_holds_are_refused_with_what_they_would_take():
     with pytest.raises(InputError, match=r"2,097,149 frames from -1048574 .* 126 GB of memory and 6 hours"):
-        check_frames(-1_048_574, 1_048_574, 1, ALL_NIGHT, available=24e9)
-    check_frames(1, 100_000, 1, ALL_NIGHT, available=24e9)
+        check_frames(-1_048_574, 1_048_574, 1, FOR_EVER, available=24e9)
+    check_frames(1, 100_000, 1, FOR_EVER, available=24e9)
 
 
 def test_what_a_bake_takes_grows_with_the_cells_and_with_how_long_a_sole_is_on_them():
     longer = standing(box_sole(0.2, 0.1), [(0.0, 0.0, 0.0)], WEIGHT, seconds=11.0)
     cells = pressed_area([LOADS]) / 0.002**2
-    assert bake_time([LOADS], 0.001) == pytest.approx(4 * bake_time([LOADS], 0.002))
+    assert bake_time([LOADS], 0.01) == pytest.approx(4 * bake_time([LOADS], 0.02), rel=0.02)
+    assert bake_time([LOADS], 1e-5) == pytest.approx(16 * bake_time([LOADS], 2e-5), rel=0.02)
     held = bake_time([longer], 0.002) - bake_time([LOADS], 0.002)
     assert held == pytest.approx(10.0 * cells * cell_limits.SECONDS_PER_CELL_HELD, rel=0.02)
 
 
 @pytest.mark.parametrize("available", [1e15, None])
 def test_cells_that_take_too_long_are_refused_with_a_size_that_does_not(available):
-    took = bake_time([LOADS], 1e-4)
+    took = bake_time([LOADS], 3e-4)
     with pytest.raises(
         InputError, match=rf"GB of memory and {int(took / 60) + 1} minutes .* 1 minutes are allowed"
     ) as error:
-        check_cell_size([LOADS], 1e-4, 60.0, available)
-    assert 1e-4 < named_size(error) < 1e-3
+        check_cell_size([LOADS], 3e-4, 60.0, available)
+    assert 3e-4 < named_size(error) < 2e-3
     check_cell_size([LOADS], named_size(error), 60.0, available)
-    check_cell_size([LOADS], 1e-4, took, available)
+    check_cell_size([LOADS], 3e-4, took, available)
 
 
 def test_frames_that_take_too_long_are_refused():
