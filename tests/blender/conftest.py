@@ -16,19 +16,34 @@ def scene(addon):
     return bpy.context.scene
 
 
+@pytest.fixture(scope="session")
+def added_walker(addon, tmp_path_factory):
+    """Opens a scene with a character that walks for so many frames, ready to be baked; each is set up once."""
+    files = {}
+
+    def opened(frames):
+        if frames not in files:
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            shots.walker(bpy.context.scene, frames=frames)
+            bpy.ops.softground.add_character()
+            files[frames] = tmp_path_factory.mktemp("walk") / "walk.blend"
+            bpy.ops.wm.save_as_mainfile(filepath=str(files[frames]), copy=True)
+        bpy.ops.wm.read_homefile(filepath=str(files[frames]))  # as a new file, which is not saved anywhere
+        return bpy.context.scene
+
+    return opened
+
+
 @pytest.fixture
-def walk(scene):
+def walk(added_walker):
     """A scene with a character that walks, ready to be baked."""
-    shots.walker(scene)
-    bpy.ops.softground.add_character()
-    return scene
+    return added_walker(72)
 
 
 @pytest.fixture
-def short_walk(scene):
+def short_walk(added_walker):
     """A short walk to be baked with coarse cells."""
-    shots.walker(scene, frames=30)
-    bpy.ops.softground.add_character()
+    scene = added_walker(30)
     scene.softground.cell_size = 0.02
     return scene
 
