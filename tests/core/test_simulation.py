@@ -12,7 +12,6 @@ from softground_addon.core.ground.heightfield import FlatTerrain, Window
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.motion.motion import LowSkin
-from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.simulation import Simulation, simulate
@@ -21,6 +20,7 @@ from tests.core.walkers import (
     GRAVITY,
     MASS,
     box_sole,
+    equilibrium_depth,
     foot_sole,
     loads_of,
     memory_of,

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from softground_addon.core.ground.heightfield import FlatTerrain
+from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.loads.contacts import Contacts
 from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.loads.forces import ContactForces
 from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
+from softground_addon.core.pressing.deformation import target_compression
 from softground_addon.core.simulation import simulate
 
 MASS = 77.5
@@ -195,3 +197,11 @@ def through_scene_frames(loads):
 def memory_of(field):
     """Memory of the cells' values of a height field [bytes]."""
     return sum(tile.nbytes for tile in field.tiles.values())
+
+
+def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> float:
+    """Depth at which the ground carries a lasting force on an area [m], in closed form.
+
+    For a standing character: the weight and the area of all its soles.
+    """
+    return float(target_compression(force / area, material))

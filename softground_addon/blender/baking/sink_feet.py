@@ -19,13 +19,6 @@ from . import bake_report
 from .bake_job import BakeResult, bake
 
 
-def floating_mm(scene: bpy.types.Scene) -> float:
-    """How far the feet float above the prints of the scene's last bake [mm]; 0 where there is none."""
-    ground = scene.softground.ground
-    summary = ground_mesh.summary_of(baked_ground.display_mesh_of(ground)) if ground else {}
-    return float(summary.get(bake_report.FLOATING, 0.0))
-
-
 def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
     """Bake the response only, with grounding, and switch that on once it is there.
 

@@ -74,14 +74,6 @@ def _over_firm(strain: Any, material: GroundMaterial) -> Any:
     return np.minimum(strain, loose) + np.maximum(strain - loose, 0.0) / FIRM_RATIO
 
 
-def equilibrium_depth(force: float, area: float, material: GroundMaterial) -> float:
-    """Depth at which the ground carries a lasting force on an area [m], in closed form.
-
-    For a standing character: the weight and the area of all its soles.
-    """
-    return float(target_compression(force / area, material))
-
-
 def compression_rate(step: Any, material: GroundMaterial, target: Any = 0.0, landing_speed: Any = 0.0) -> Any:
     """Fraction of the target by which the ground gives way in a step (Eq. 11).
 

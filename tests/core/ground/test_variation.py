@@ -10,11 +10,10 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.ground.variation import SOFTEST, PaintedSurface, VariationTiles
-from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.record.footprints import QUANTUM, recompose
 from softground_addon.core.simulation import simulate
 from tests.core.pressing.test_ground_invariants import random_loads
-from tests.core.walkers import box_sole, standing, walk
+from tests.core.walkers import box_sole, equilibrium_depth, standing, walk
 
 MUD = GroundMaterial(0.625e6, 0.35, 0.15)
 

@@ -11,12 +11,12 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.pressing.deformation import (
     compress,
     compression_rate,
-    equilibrium_depth,
     sink,
     target_compression,
     touching_fraction,
 )
 from softground_addon.core.pressing.rim import dilate, displaced_volume, in_contact, rim_weights
+from tests.core.walkers import equilibrium_depth
 
 SNOW = GroundMaterial(youngs_modulus=0.25e6, poisson_ratio=0.05, characteristic_time=0.2)
 coverages = arrays(

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
-from softground_addon.core.pressing.deformation import compress, compression_rate, equilibrium_depth, target_compression
+from softground_addon.core.pressing.deformation import compress, compression_rate, target_compression
 from softground_addon.core.pressing.rim import LEANING_DISTANCE, in_contact, lean_of_landing, leaning, rim_weights
 from softground_addon.core.record.footprints import QUANTUM, recompose
 from softground_addon.core.simulation import simulate
 from tests.core.pressing.test_ground_invariants import Hills, random_loads
 from tests.core.pressing.test_pressure import rolling
-from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, loads_of, pose, pressed, standing, walk
+from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 SAND = GroundMaterial(0.33e6, 0.5, 0.05)

@@ -13,10 +13,9 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.prediction import contact_loads, matching_modulus
-from softground_addon.core.pressing.deformation import equilibrium_depth
 from softground_addon.core.pressing.pressure import KERN, pressure_field
 from softground_addon.core.simulation import simulate
-from tests.core.walkers import box_sole, foot_sole, standing, walk
+from tests.core.walkers import box_sole, equilibrium_depth, foot_sole, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 LENGTH, WIDTH = 0.24, 0.08
