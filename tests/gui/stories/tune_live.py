@@ -71,6 +71,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["no longer live"] = not bpy.context.window_manager.softground.is_live
     scene().frame_set(59)
     yield from hand.look_at_walk()
+    yield 1.0  # the overlay has the animation read as it is drawn
     yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
     yield 1.5  # panels glide to their places
     yield from hand.picture("overlay")
