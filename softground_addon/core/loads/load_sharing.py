@@ -19,7 +19,12 @@ _SUM_WEIGHT = 1e6
 SHARE_DEVIATION = 1.0
 """Standard deviation of the share of a sole in the middle of its contact about an even split: not known at all."""
 POINT_DEVIATION = 0.03
-"""Standard deviation of the point of action of the total force at 1 body weight, in leg lengths."""
+"""Standard deviation of the point of action of the total force at 1 body weight, in leg lengths. Where the
+load passes from step to step it is known no better than it keeps between the sides of a sole that bears alone."""
+ALONE = 0.5
+"""A sole that bears alone tells that at loads above this, in body weights."""
+EVEN_PART = 0.05
+"""Part of a ramp that is even: plates show loads pass on more evenly than a cosine does."""
 LONGEST_RAMP = 1.0
 """Longest time over which a sole takes its load, in sqrt(leg length/gravity) (0.3 s for an adult)."""
 LONG_OVERLAP = 1.2
@@ -32,11 +37,17 @@ def whole_body_shares(motion: CharacterMotion, lowest: Array, touching: Mask, bo
 
     `lowest` is the motion's `lowest_points`.
     """
+    point = point_of_action(motion, lowest, touching, body)
+    known = np.full(len(point), POINT_DEVIATION * motion.leg_length)
+    alone = motion.on_frames & (touching.sum(axis=1) == 1) & (body.force[:, 2] > ALONE)
+    if alone.any():
+        beside = _beside(motion, lowest, point, touching & alone[:, None])
+        known[~_standing(motion, touching)] = np.hypot(known[0], np.sqrt((beside**2).mean()))
     return share_through_transitions(
         lowest[..., :2],
-        point_of_action(motion, lowest, touching, body),
+        point,
         touching,
-        deviation=POINT_DEVIATION * motion.leg_length / np.clip(body.force[:, 2], 0.1, 1.0),
+        deviation=known / np.clip(body.force[:, 2], 0.1, 1.0),
         longest=max(1, round(LONGEST_RAMP * motion.pendulum_time / motion.time_step)),
     )
 
@@ -46,10 +57,29 @@ def point_of_action(motion: CharacterMotion, lowest: Array, touching: Mask, body
     count = touching.sum(axis=1)
     ground = (lowest[..., 2] * touching).sum(axis=1) / np.maximum(count, 1)
     point = body.point_of_action(ground)
-    for first, last in zip(*runs(count > 1), strict=True):
-        if body.slow and last - first > LONG_OVERLAP * motion.pendulum_time / motion.time_step:
-            point[first:last] = body.slow.point_of_action(ground[first:last], slice(first, last))
+    standing = np.flatnonzero(_standing(motion, touching))
+    if body.slow and len(standing):
+        point[standing] = body.slow.point_of_action(ground[standing], standing)
     return point
+
+
+def _standing(motion: CharacterMotion, touching: Mask) -> Mask:
+    """Steps at which soles bear together for longer than `LONG_OVERLAP`, (N,)."""
+    standing = np.zeros(len(touching), dtype=bool)
+    for first, last in zip(*runs(touching.sum(axis=1) > 1), strict=True):
+        standing[first:last] = last - first > LONG_OVERLAP * motion.pendulum_time / motion.time_step
+    return standing
+
+
+def _beside(motion: CharacterMotion, lowest: Array, point: Array, bearing: Mask) -> Array:
+    """How far a point (N, 2) is beside each sole while it bears (N, S), one sole after the other (B,) [m]."""
+    found = []
+    for index, sole in enumerate(motion.soles):
+        steps = bearing[:, index]
+        points = sole.landmark_positions()[steps]
+        (x, y), (u, v) = (points[:, -1, :2] - points[:, 0, :2]).T, (point[steps] - lowest[steps, index, :2]).T
+        found.append((x * v - y * u) / np.maximum(np.hypot(x, y), 1e-9))
+    return np.concatenate(found)
 
 
 def share_by_moment(points: Array, target: Array, touching: Mask) -> Array:
@@ -154,8 +184,9 @@ def _within(step: NDArray[np.intp], start: Array, end: NDArray[np.intp]) -> Mask
 
 
 def _cosine_ramp(length: int) -> Array:
-    """A ramp from 0 to 1 without corners, at the middles of so many steps."""
-    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(length) + 0.5) / length)
+    """A ramp from 0 to 1, at the middles of so many steps."""
+    phase = (np.arange(length) + 0.5) / length
+    return EVEN_PART * phase + (1 - EVEN_PART) * (0.5 - 0.5 * np.cos(np.pi * phase))
 
 
 def _normalised(shares: Array) -> Array:

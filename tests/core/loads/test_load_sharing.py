@@ -95,3 +95,17 @@ def test_who_stands_on_both_feet_bears_evenly_however_the_markers_shake():
     shares = whole_body_shares(motion, lowest_points(motion), touching, body_dynamics(motion))
     assert shares[60:-60].std(axis=0).max() < 0.03
     assert shares.mean(axis=0) == pytest.approx([0.5, 0.5], abs=0.02)
+
+
+def test_a_point_of_action_beside_the_feet_moves_the_shares_less():
+    """A sole that bears alone is narrow: what is beside it is error, there and where the load passes to the next."""
+    step = np.arange(200)
+    touching = np.stack([step < 115, step >= 85], axis=1)
+
+    def leading(beside):
+        motion = standing(200, at=((0.0, 0.0, 0.0), (0.6, 0.0, 0.0)), hips=(0.12, beside, 0.9), rate=200.0)
+        return whole_body_shares(motion, lowest_points(motion), touching, body_dynamics(motion))[100, 1]
+
+    assert leading(0.0) < 0.25
+    assert leading(0.0) < leading(0.1) < leading(0.3) < 0.5
+    assert leading(0.3) > 0.4
