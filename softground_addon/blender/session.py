@@ -44,17 +44,17 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     """Progress of the bake, and whether live mode is on."""
 
     is_baking: BoolProperty(name="Baking", description="A bake is under way", get=_is_baking)
-    cancel_requested: BoolProperty(name="Cancel Requested", description="The bake is to end at its next step")
+    cancel_requested: BoolProperty(name="Cancel Requested", description="Stop the bake at its next step")
     progress: FloatProperty(
-        name="Progress", description="Finished part of the bake", min=0.0, max=1.0, get=_progress_of
+        name="Progress", description="How much of the bake is done", min=0.0, max=1.0, get=_progress_of
     )
-    status: StringProperty(
-        name="Status", description="What the bake is doing, and the time it still needs", get=_status_of
+    status: StringProperty(name="Status", description="What the bake is doing, and the time left", get=_status_of)
+    stale: StringProperty(name="Outdated", description="What has changed since the bake, one change per line")
+    show_overlay: BoolProperty(
+        name="Overlay", description="Show predicted footfalls, soles, forces and cells in the viewport"
     )
-    stale: StringProperty(name="Outdated", description="What has changed since the bake on the ground, line by line")
-    show_overlay: BoolProperty(name="Overlay", description="Show what the add-on knows in the viewport")
     show_footfalls: BoolProperty(
-        name="Footfalls", description="Where the soles will stand, numbered in their order", default=True
+        name="Footfalls", description="Where the soles will land, numbered in order", default=True
     )
     show_soles: BoolProperty(name="Soles", description="Outlines of the soles at the current frame", default=True)
     show_forces: BoolProperty(
@@ -64,11 +64,11 @@ class SoftGroundSession(bpy.types.PropertyGroup):
     )
     show_cells: BoolProperty(
         name="Cells",
-        description="Cells that are in contact (red), and those around them that take up the rim (blue), at the "
+        description="Cells in contact (red) and those around them that take up the rim (blue) at the "
         "current frame, from live mode or the bake",
         default=True,
     )
-    step: StringProperty(name="Step", description="Id of the step of the bake that is chosen")
+    step: StringProperty(name="Step", description="Id of the selected step of the bake")
     is_live: BoolProperty(name="Live", description="The ground gives way while the timeline plays")
 
 

@@ -113,15 +113,15 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "no_motion",
             "warning",
             f"'{motion.name}' does not move in these frames",
-            "look whether its action has keys in them, is assigned with its slot, and is not muted.",
+            "check that its action has keys in them, is assigned with its slot, and is not muted.",
         )
     elif not steps:
         yield Finding(
             "no_print",
             "error",
             f"'{motion.name}' leaves no print in these frames",
-            "look in Contacts, under Advanced, whether its soles are what touches the ground, and in the viewport "
-            "whether they face down.",
+            "check in Contacts, under Advanced, that its soles are what touches the ground, and in the viewport "
+            "that they face down.",
         )
     else:
         load = character.forces.forces[..., 2].max(axis=0) / (motion.mass * motion.gravity)
@@ -132,7 +132,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
                 "sole_without_print",
                 "warning",
                 f"{', '.join(map(repr, mute))} of '{motion.name}' bears load and leaves no print",
-                "look whether its sole faces down, and in Contacts whether its bone is right.",
+                "check that its sole faces down, and that its bone in Contacts is right.",
             )
     missed = missed_steps(motion, character.contacts)
     if missed:
@@ -197,7 +197,7 @@ def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
             "feet_apart",
             "warning",
             f"'{high}' of '{motion.name}' is {apart * 100:.1f} cm higher over the ground than '{low}' where it stands",
-            "look whether both soles are the right bones, and the ground level under them.",
+            "check that both soles have the right bones, and the ground level under them.",
         )
 
 
@@ -356,7 +356,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
                 "on",
-                "look in Contacts, under Advanced, whether its contacts are the parts that touch the ground.",
+                "check in Contacts, under Advanced, that its contacts are the parts that touch the ground.",
             )
         )
     rests = touching.rests

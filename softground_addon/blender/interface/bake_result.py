@@ -69,10 +69,10 @@ def _moved_action(layout: Any, character: Any) -> None:
 
 
 class SOFTGROUND_OT_show_warnings(OnBake, bpy.types.Operator):
-    """Show what the bake has found, and what to do about it"""
+    """Show what the bake found, and what to do about it"""
 
     bl_idname = "softground.show_warnings"
-    bl_label = "Warnings of the Bake"
+    bl_label = "Bake Warnings"
     bl_options = {"INTERNAL"}
 
     @classmethod
@@ -115,7 +115,7 @@ def last_step(scene: bpy.types.Scene) -> int:
 
 
 class SOFTGROUND_OT_go_to_last_step(OnBake, bpy.types.Operator):
-    """Go to the frame at which the last foot leaves its print: from there on all of them are seen"""
+    """Go to the frame where the last foot leaves its print, so that all prints are there"""
 
     bl_idname = "softground.go_to_last_step"
     bl_label = "Go to Last Step"

@@ -46,7 +46,7 @@ class _OnCharacter:
 
 
 class SOFTGROUND_OT_remove_character(_OnCharacter, bpy.types.Operator):
-    """Take the character out of the list; its armature and the ground stay as they are"""
+    """Remove the character from the list; its armature and the ground stay as they are"""
 
     bl_idname = "softground.remove_character"
     bl_label = "Remove Character"
@@ -70,7 +70,7 @@ def suggested_mass(character: Any) -> float:
 
 
 class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
-    """Set the mass to what the volume of the character's skin weighs at the density of water, as bodies do"""
+    """Set the mass from the volume of the character's skin, at the density of water"""
 
     bl_idname = "softground.mass_by_volume"
     bl_label = "Mass by Volume"
@@ -86,8 +86,8 @@ class SOFTGROUND_OT_mass_by_volume(_OnCharacter, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_fix_scale(_OnCharacter, bpy.types.Operator):
-    """Scale the character, whose file was made in other units, by an empty that it then hangs on. Its animation stays
-    as it is"""
+    """Scale a character that was made in other units, by parenting it to a scaled empty. Its own animation does not
+    change"""
 
     bl_idname = "softground.fix_scale"
     bl_label = "Fix Import Scale"
@@ -112,8 +112,8 @@ class _ReadingCharacter(_OnCharacter, Reading):
 
 
 class SOFTGROUND_OT_walk_ahead(_ReadingCharacter):
-    """Let a character that walks on the spot travel as fast as its feet slide, by an empty that it then hangs on. Its
-    animation stays as it is. Esc cancels"""
+    """Make a character that walks on the spot travel as fast as its feet slide, by parenting it to a moving empty.
+    Its own animation does not change. Esc cancels"""
 
     bl_idname = "softground.walk_ahead"
     bl_label = "Walk Ahead"
@@ -138,8 +138,7 @@ def _walking_ahead(scene: bpy.types.Scene) -> jobs.Job[str]:
 
 
 class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
-    """Find the feet and joints of the character again, by its skin, the names of its bones or its rest pose. Esc
-    cancels"""
+    """Find the character's feet and joints again, from its skin, bone names or rest pose. Esc cancels"""
 
     bl_idname = "softground.detect_bones"
     bl_label = "Detect Bones"
@@ -153,8 +152,8 @@ class SOFTGROUND_OT_detect_bones(_ReadingCharacter):
 
 
 class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
-    """Let the selected bones, objects, or vertices of the skin print too: hands, knees, canes, snowshoes. Each presses
-    with whatever side of it faces down"""
+    """Let the selected bones, objects or vertices of the skin print too: hands, knees, canes, snowshoes. Each
+    presses with whichever side faces down"""
 
     bl_idname = "softground.add_contact"
     bl_label = "Add Contact"
@@ -204,7 +203,7 @@ class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
-    """Take the chosen sole out of the list: it leaves no prints"""
+    """Remove the selected sole from the list: it leaves no prints"""
 
     bl_idname = "softground.remove_sole"
     bl_label = "Remove Sole"
@@ -213,7 +212,7 @@ class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if active_sole(settings.scene_of(context)) is None:
-            cls.poll_message_set("Choose a sole in the list first")
+            cls.poll_message_set("Select a sole in the list first")
             return False
         return True
 

@@ -22,7 +22,7 @@ class _Closed(SidebarPanel):
 
 
 class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
-    """How the ground gives way and what it raises"""
+    """How the ground gives way, and how prints look up close"""
 
     bl_label = "Realism"
 
@@ -59,7 +59,7 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
 
 
 class SOFTGROUND_PT_layers(_Closed, bpy.types.Panel):
-    """How deep the loose layer is, and what lies on it and below; each is off at 0"""
+    """Depth of the loose layer, and what lies on it and below; each is off at 0"""
 
     bl_label = "Layers"
 
@@ -71,7 +71,7 @@ class SOFTGROUND_PT_layers(_Closed, bpy.types.Panel):
 
 
 class SOFTGROUND_PT_painted(_Closed, bpy.types.Panel):
-    """Vertex groups or float attributes of the ground by which its material is multiplied"""
+    """Vertex groups or float attributes that vary the ground from place to place"""
 
     bl_label = "Masks"
 
@@ -122,7 +122,7 @@ AROUND_SOLES = 3.0
 
 def vertices(area: float, spacing: float) -> str:
     """Vertices of a close-up along all of a trail, from the area that soles cover [m²]."""
-    return f"About {rounded(AROUND_SOLES * area / spacing**2):,.0f} vertices along all of the trail"
+    return f"About {rounded(AROUND_SOLES * area / spacing**2):,.0f} vertices along the whole trail"
 
 
 def estimate(area: float, cell_size: float) -> str:

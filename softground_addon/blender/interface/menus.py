@@ -64,7 +64,7 @@ def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
 def draw_in_status_bar(header: Any, _context: bpy.types.Context) -> None:
     """Say that live mode is on, and how it ends; in every workspace, unlike `WorkSpace.status_text_set`."""
     if session.current().is_live:
-        header.layout.label(text="Live Footprints  |  Keep or Discard, in the sidebar, ends it")
+        header.layout.label(text="Live Footprints  |  End with Keep or Discard in the sidebar")
 
 
 def register() -> None:

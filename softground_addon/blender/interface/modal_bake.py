@@ -280,15 +280,15 @@ class SOFTGROUND_OT_bake(_BakeFootprints):
 
 
 class SOFTGROUND_OT_bake_again(_BakeFootprints):
-    """Something has changed since the bake on the ground: bake it anew. Esc cancels"""
+    """Something has changed since the last bake: bake again. Esc cancels"""
 
     bl_idname = "softground.bake_again"
     bl_label = "Bake Again"
 
 
 class SOFTGROUND_OT_sink_feet(_Bake):
-    """Let the feet down into their prints, hips and knees with them: switch Grounding on and bake it as a layer above
-    the animation. The prints stay as they are, and Clear Bake takes the layer off. Esc cancels"""
+    """Lower the feet into their prints, with hips and knees: switches Grounding on and bakes it as a layer above the
+    animation. The prints do not change, and Clear Bake removes the layer. Esc cancels"""
 
     bl_idname = "softground.sink_feet"
     bl_label = "Sink Feet"
@@ -303,8 +303,8 @@ class SOFTGROUND_OT_sink_feet(_Bake):
 
 
 class SOFTGROUND_OT_clean_feet(_Bake):
-    """Let feet stand still where they stand: no sliding, no floating, no sinking, on the ground as a hard floor or on a
-    flat one. Hips and legs follow, as a layer above the animation that Clear Bake takes off. Esc cancels"""
+    """Stop standing feet from sliding, floating and sinking, on the ground as a hard floor or on a flat one. Hips
+    and legs follow, in a layer above the animation that Clear Bake removes. Esc cancels"""
 
     bl_idname = "softground.clean_feet"
     bl_label = "Clean Feet"
@@ -324,8 +324,8 @@ class SOFTGROUND_OT_clean_feet(_Bake):
 
 
 class SOFTGROUND_OT_root_motion(_Bake):
-    """Let a cycle on the spot travel as fast as its resting feet imply: keys on the root bone, or else on the armature,
-    in a layer of their own. Esc cancels"""
+    """Make a cycle on the spot travel as fast as its standing feet imply: keys on the root bone, or else on the
+    armature, in a layer of their own. Esc cancels"""
 
     bl_idname = "softground.root_motion"
     bl_label = "Root Motion"
@@ -347,7 +347,7 @@ class SOFTGROUND_OT_root_motion(_Bake):
 
 
 class SOFTGROUND_OT_remove_root_motion(bpy.types.Operator):
-    """Take the travel off again, and the response that lies on it: the animation is as it was"""
+    """Remove the travel, and the response on top of it: the animation is as it was"""
 
     bl_idname = "softground.remove_root_motion"
     bl_label = "Remove Root Motion"
@@ -356,7 +356,7 @@ class SOFTGROUND_OT_remove_root_motion(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether somebody travels by it, and no job runs."""
-        cls.poll_message_set("Nobody has root motion")
+        cls.poll_message_set("No character has root motion")
         return not session.current().is_baking and root_motion.has_root_motion(settings.scene_of(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -365,7 +365,7 @@ class SOFTGROUND_OT_remove_root_motion(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_hold_window(bpy.types.Operator):
-    """Let nothing be changed from a window while a bake runs in another one"""
+    """Block changes from a window while a bake runs in another one"""
 
     bl_idname = "softground.hold_window"
     bl_label = "Wait for the Bake"
@@ -384,7 +384,7 @@ class SOFTGROUND_OT_hold_window(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_cancel_bake(bpy.types.Operator):
-    """End the bake now; the scene stays as it was"""
+    """Stop the bake; the scene stays as it was"""
 
     bl_idname = "softground.cancel_bake"
     bl_label = "Cancel Bake"

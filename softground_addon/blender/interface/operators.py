@@ -29,9 +29,8 @@ Reports = list[tuple[Literal["INFO", "WARNING"], str]]
 
 
 class SOFTGROUND_OT_add_character(Reading):
-    """Add the selected characters: their feet, hips and limbs are recognized by the skin, by their names or by the rest
-    pose. Selected objects without a rig are added as props that fall, roll or slide. The animation is read, which Esc
-    cancels"""
+    """Add the selected characters: feet, hips and limbs are recognized from the skin, the bone names or the rest
+    pose. Selected objects without a rig are added as props that fall, roll or slide. Esc cancels"""
 
     bl_idname = "softground.add_character"
     bl_label = "Add Character"
@@ -102,7 +101,7 @@ class SOFTGROUND_OT_use_as_ground(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a mesh is selected that may be the ground."""
-        cls.poll_message_set("Select the mesh that is walked on, and no character")
+        cls.poll_message_set("Select the mesh to walk on, not a character")
         return _selected_ground(context) is not None or _selected_instance(context) is not None
 
     @reports_errors
@@ -170,7 +169,7 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
-    """Take the footprints off the ground and the response off the characters: all is as before the bake"""
+    """Remove the footprints from the ground and the response from the characters: all is as before the bake"""
 
     bl_idname = "softground.clear_bake"
     bl_label = "Clear Bake"
@@ -204,8 +203,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_apply_look(bpy.types.Operator):
-    """Show the preset's look on the ground: over your own materials where prints are, by copies of them. Clear Bake
-    takes it off again"""
+    """Show the preset's look in the prints, over copies of your own materials. Clear Bake removes it"""
 
     bl_idname = "softground.apply_look"
     bl_label = "Apply Look"
@@ -230,7 +228,7 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_copy_bake_command(bpy.types.Operator):
-    """Copy the command line that bakes this shot as it is saved, into a new file beside it. For a terminal or a farm"""
+    """Copy a command line that bakes the saved file into a new file beside it, for a terminal or a farm"""
 
     bl_idname = "softground.copy_bake_command"
     bl_label = "Copy Bake Command"

@@ -179,7 +179,7 @@ def _faded(colour: Sequence[float], alpha: float) -> Colour:
 
 
 class SOFTGROUND_OT_overlay(OnShot, bpy.types.Operator):
-    """Show predicted footfalls, soles, forces and the cells of the frame in the viewport"""
+    """Show or hide predicted footfalls, soles, forces and cells in the viewport"""
 
     bl_idname = "softground.overlay"
     bl_label = "Footfall Overlay"
@@ -196,7 +196,7 @@ class SOFTGROUND_OT_overlay(OnShot, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_read_again(Reading):
-    """Read the animation for the overlay, after an edit. Esc cancels"""
+    """Read the edited animation again for the overlay. Esc cancels"""
 
     bl_idname = "softground.read_again"
     bl_label = "Read Animation"

@@ -81,7 +81,7 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         character = active_character(settings.scene_of(context))
         if character:
             if not is_set_up(character):
-                layout.label(text="Its rig was deleted: undo that, or remove it with -", icon="ERROR")
+                layout.label(text="Its rig was deleted: undo, or remove the character with -", icon="ERROR")
             elif not any(sole.bone or sole.object for sole in character.soles):
                 _no_contacts(layout, character)
             _scale(layout, character)
@@ -307,7 +307,7 @@ def _apart_from_scene(scene: Any) -> str:
     if not options.characters or (scene.frame_start >= start and end == scene.frame_end):
         return ""
     whose = "The animation" if (start, end) == tuple(options.animated_frames) else "The bake"
-    return f"{whose} is from {start} to {end}, the scene from {scene.frame_start} to {scene.frame_end}"
+    return f"{whose} runs from {start} to {end}, the scene from {scene.frame_start} to {scene.frame_end}"
 
 
 def _live_buttons(layout: Any, state: Any) -> None:
@@ -323,7 +323,7 @@ def _live_buttons(layout: Any, state: Any) -> None:
 
 
 class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):
-    """What to see in the viewport"""
+    """What to show in the viewport"""
 
     bl_label = "Overlay"
     bl_parent_id = ADVANCED
@@ -344,7 +344,7 @@ class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):
 
 
 class SOFTGROUND_PT_output(SidebarPanel, bpy.types.Panel):
-    """What to take out of a bake"""
+    """Use the bake elsewhere"""
 
     bl_label = "Output"
     bl_parent_id = ADVANCED

@@ -74,7 +74,7 @@ class SOFTGROUND_MT_presets(bpy.types.Menu):
 
 
 class SOFTGROUND_OT_load_preset(bpy.types.Operator):
-    """Set the ground's material to a preset"""
+    """Set the ground to a preset"""
 
     bl_idname = "softground.load_preset"
     bl_label = "Load Ground Preset"
@@ -109,7 +109,7 @@ def _chosen(properties: Any) -> presets.Preset:
 
 
 class SOFTGROUND_OT_save_preset(bpy.types.Operator):
-    """Keep the ground's material as a preset of your own"""
+    """Save the ground as a preset of your own"""
 
     bl_idname = "softground.save_preset"
     bl_label = "Add Ground Preset"
@@ -139,7 +139,7 @@ class SOFTGROUND_OT_save_preset(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
-    """Delete the chosen preset from your own presets; the material keeps its values"""
+    """Delete the current preset, if it is your own; the ground keeps its values"""
 
     bl_idname = "softground.remove_preset"
     bl_label = "Remove Ground Preset"
@@ -148,7 +148,7 @@ class SOFTGROUND_OT_remove_preset(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether the chosen preset is one of the user's."""
-        cls.poll_message_set("Presets that come with SoftGround stay; choose one of your own")
+        cls.poll_message_set("Built-in presets cannot be deleted; choose one of your own")
         return _file_for(settings.scene_of(context).softground.material.preset).is_file()
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -167,7 +167,7 @@ def _file_name(name: str) -> str:
 
 
 class SOFTGROUND_OT_predict_depth(OnShot, bpy.types.Operator):
-    """Read the animation and tell how deep the prints will be, before any bake"""
+    """Read the animation and predict how deep the prints will be, before any bake"""
 
     bl_idname = "softground.predict_depth"
     bl_label = "Predict Depth"

@@ -20,7 +20,7 @@ _SHOWN = 5
 
 
 class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
-    """Choose a known set of values for how bodies swing"""
+    """Choose a set of values for how the body sways"""
 
     bl_idname = "softground.tilt_preset"
     bl_label = "Tilt Preset"
@@ -31,7 +31,7 @@ class SOFTGROUND_OT_tilt_preset(bpy.types.Operator):
         items=[
             ("DEFAULT", "Human Balance", "0.6 Hz, damping 0.85"),
             ("AUTHORS", "Paper's Scene", "The gains of the scene that comes with the paper: 1300 and 600"),
-            ("PAPER", "Paper as Printed", "The gains in the paper's text, 30 and 6: a swing of many seconds"),
+            ("PAPER", "Paper as Printed", "The gains in the paper's text, 30 and 6: swings of many seconds"),
         ],
     )
 
@@ -69,8 +69,8 @@ class SOFTGROUND_OT_show_frame(bpy.types.Operator):
 
 
 class SOFTGROUND_OT_slow_down(bpy.types.Operator):
-    """Stretch the scene's time (Output > Frame Range > Time Stretching) from the speed that you gave it to the one that
-    people would choose on this ground. Bake again after it"""
+    """Stretch the scene's time (Output > Frame Range > Time Stretching) to the speed at which people would walk on
+    this ground. Bake again afterwards"""
 
     bl_idname = "softground.slow_down"
     bl_label = "Slow Down"

@@ -80,7 +80,7 @@ def _make_action(armature: bpy.types.Object, curves: dict[str, list[list[float]]
 
 
 class SOFTGROUND_OT_add_sample_scene(bpy.types.Operator):
-    """Add a figure that walks, to try SoftGround with: what is in the scene stays as it is"""
+    """Add a walking figure to try SoftGround with; the rest of the scene stays as it is"""
 
     bl_idname = "softground.add_sample_scene"
     bl_label = "Add Sample Scene"

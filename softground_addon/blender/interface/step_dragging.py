@@ -75,7 +75,7 @@ def _carried(edit: StepEdit, by: Array, turn: float) -> StepEdit:
 
 
 class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
-    """Pick a print in the viewport and drag it to another place; the wheel turns it, Esc leaves it as it was"""
+    """Pick a print in the viewport and drag it elsewhere; the wheel turns it, Esc cancels"""
 
     bl_idname = "softground.drag_step"
     bl_label = "Drag in Viewport"
@@ -83,7 +83,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Prints are dragged in a 3D viewport")
+            self.report({"ERROR"}, "Use Drag in Viewport in a 3D viewport")
             return {"CANCELLED"}
         self._drag: _Drag | None = None
         _shown.picking = True

@@ -39,7 +39,7 @@ class OnStep(OnSteps):
     """Operators that change the steps that are named, or chosen."""
 
     step: StringProperty(
-        name="Steps", description="Ids of the steps, line by line; of the chosen ones if empty", options={"HIDDEN"}
+        name="Steps", description="Ids of the steps, one per line; the selected ones if empty", options={"HIDDEN"}
     )
 
     def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
@@ -88,14 +88,14 @@ def toggle(name: str) -> None:
 
 
 class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
-    """Choose this step, and go to the frame at which its foot comes down. Shift: with the others, or no more"""
+    """Select this step and go to the frame where its foot comes down. Shift: add it to the selection, or remove it"""
 
     bl_idname = "softground.choose_step"
-    bl_label = "Choose Step"
+    bl_label = "Select Step"
     bl_options = {"INTERNAL"}
 
     step: StringProperty(name="Step", description="Id of the step", options={"HIDDEN"})
-    extend: BoolProperty(name="Extend", description="Choose it with the others, or no more", options={"HIDDEN"})
+    extend: BoolProperty(name="Extend", description="Add it to the selection, or remove it", options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.extend = event.shift
@@ -132,18 +132,18 @@ class SOFTGROUND_OT_mute_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
-    """Make the print of this step deeper or shallower, move, turn or scale it, or have it pressed earlier or later"""
+    """Make the print of this step deeper or shallower, move, turn or scale it, or press it earlier or later"""
 
     bl_idname = "softground.change_step"
     bl_label = "Change Step"
     bl_options = {"REGISTER", "UNDO"}
 
     strength: FloatProperty(
-        name="Depth", description="Depth over that of the bake", default=1.0, min=0.0, max=STRONGEST, soft_max=3.0
+        name="Depth", description="Depth relative to the baked print", default=1.0, min=0.0, max=STRONGEST, soft_max=3.0
     )
     move: FloatVectorProperty(
         name="Move",
-        description="How far the print is moved along the scene's X and Y, in metres",
+        description="Distance along the scene's X and Y, in metres",
         size=2,
         min=-FARTHEST,
         max=FARTHEST,
@@ -152,20 +152,20 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
     )
     turn: FloatProperty(
         name="Turn",
-        description="How far the print is turned counter-clockwise",
+        description="Angle by which the print is turned counter-clockwise",
         subtype="ANGLE",
         min=radians(-360),
         max=radians(360),
     )
     scale: FloatProperty(
         name="Size",
-        description="Size of the sole over that of the bake; it presses as hard on each area",
+        description="Size relative to the baked sole; the pressure stays the same",
         default=1.0,
         min=SMALLEST,
         max=LARGEST,
     )
     shift: IntProperty(
-        name="Later", description="Frames by which it presses later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
+        name="Later", description="Number of frames by which the step is later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
@@ -196,7 +196,7 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
-    """Press this step once more, ahead of where it is; the copy can be moved, changed and deleted"""
+    """Press a copy of this step just ahead of it; the copy can be moved, changed and deleted"""
 
     bl_idname = "softground.duplicate_step"
     bl_label = "Duplicate"
@@ -210,7 +210,7 @@ class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
-    """Press the sole of this step at the 3D cursor too, from the current frame on"""
+    """Press the sole of this step at the 3D cursor too, starting at the current frame"""
 
     bl_idname = "softground.add_step"
     bl_label = "Add at Cursor"
@@ -242,7 +242,7 @@ def _moved(step: BakedStep, move: Sequence[float]) -> StepEdit:
 
 
 class SOFTGROUND_OT_reset_step(OnStep, bpy.types.Operator):
-    """Give this step the print that was baked; a copy is deleted"""
+    """Restore the baked print of this step; a copy is deleted"""
 
     bl_idname = "softground.reset_step"
     bl_label = "Reset Step"
@@ -256,7 +256,7 @@ class SOFTGROUND_OT_reset_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_reset_steps(OnSteps, bpy.types.Operator):
-    """Give all steps the prints that were baked, and delete all copies"""
+    """Restore all baked prints, and delete all copies"""
 
     bl_idname = "softground.reset_steps"
     bl_label = "Reset All Steps"

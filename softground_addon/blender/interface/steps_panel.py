@@ -38,7 +38,7 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         several = baked_steps.chosen(scene)
         _list(layout, steps, chosen, several)
         if len(several) > 1:
-            layout.label(text=f"{len(several)} steps are chosen", translate=False)
+            layout.label(text=f"{len(several)} steps selected", translate=False)
         layout.operator("softground.drag_step", icon="VIEW_PAN")
         if chosen is not None:
             _buttons(layout, chosen)

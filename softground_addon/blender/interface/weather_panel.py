@@ -10,7 +10,7 @@ from .panel_base import ADVANCED, SidebarPanel
 
 
 class SOFTGROUND_MT_weather(bpy.types.Menu):
-    """Weather to begin with"""
+    """Weather to start with"""
 
     bl_label = "Weather Presets"
 

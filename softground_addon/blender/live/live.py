@@ -127,7 +127,7 @@ def _scene() -> bpy.types.Scene | None:
 
 
 class SOFTGROUND_OT_live(bpy.types.Operator):
-    """Let the ground give way while the timeline plays, or end that"""
+    """Let the ground give way while the timeline plays, or end live mode"""
 
     bl_idname = "softground.live"
     bl_label = "Live Footprints"
@@ -135,7 +135,7 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
 
     keep: BoolProperty(
         name="Keep",
-        description="When it ends: leave the prints on the ground as a bake, instead of taking them off",
+        description="When live mode ends, keep the prints as a bake instead of removing them",
         default=False,
         options={"SKIP_SAVE"},
     )

@@ -11,20 +11,20 @@ from ..operator_base import OnBake, reports_errors
 
 NONE = "NONE"
 _CHOICES = [
-    (NONE, "None", "No weather yet: all sliders at nothing, those of a modifier that is there as they are"),
+    (NONE, "None", "All sliders at zero; an existing modifier keeps its own"),
     *((key, title, f"Set the sliders to {title}") for key, (title, _) in weather.PRESETS.items()),
 ]
 
 
 class SOFTGROUND_OT_add_weather(OnBake, bpy.types.Operator):
-    """Let weather act on the baked prints by their age: snow covers and rounds them, sun melts them, wind fills them,
-    rain stands in them. A modifier behind the playback, whose sliders act at once, with no new bake"""
+    """Let weather act on the baked prints: snow covers and rounds them, warmth melts them, wind fills them, rain
+    stands in them. A modifier after the playback, whose sliders act at once, with no new bake"""
 
     bl_idname = "softground.add_weather"
     bl_label = "Add Weather"
     bl_options = {"REGISTER", "UNDO"}
 
-    preset: EnumProperty(name="Preset", description="Weather to begin with", items=_CHOICES, default=NONE)
+    preset: EnumProperty(name="Preset", description="Weather to start with", items=_CHOICES, default=NONE)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -38,7 +38,7 @@ class SOFTGROUND_OT_add_weather(OnBake, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_remove_weather(bpy.types.Operator):
-    """Take the weather off the ground; the bake stays as it is"""
+    """Remove the weather from the ground; the bake stays as it is"""
 
     bl_idname = "softground.remove_weather"
     bl_label = "Remove Weather"

@@ -103,7 +103,7 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
-    """Mark in the timeline when each foot strikes the ground and leaves it"""
+    """Mark when each foot strikes the ground and leaves it in the timeline"""
 
     bl_idname = "softground.event_markers"
     bl_label = "Mark Events in Timeline"
@@ -111,7 +111,7 @@ class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
 
     phases: EnumProperty(
         name="Phases",
-        description="What is marked",
+        description="Phases to mark",
         items=[(kind, kind.replace("_", " ").title(), "") for kind in KINDS],
         options={"ENUM_FLAG"},
         default=MARKED,

@@ -136,7 +136,7 @@ FORMATS = {
     "EXR": Format(
         ".exr", "Images (EXR)", "Displacement, and compression, rim and age as a mask, in the ground's UV map", _images
     ),
-    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it stands after the last step", _still),
+    "OBJ": Format(".obj", "Final Mesh (OBJ)", "The ground as it is after the last step", _still),
     **{
         kind: Format(suffix, label, description, _events)
         for kind, (suffix, label, description, _) in event_exports.KINDS.items()
@@ -227,9 +227,9 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
         name="Resolution", description="Width and height of the images", default=2048, min=16, max=LARGEST_IMAGE,
         subtype="PIXEL",
     )  # fmt: skip
-    uv_map: StringProperty(name="UV Map", description="UV map of the images; the one that is rendered if empty")
+    uv_map: StringProperty(name="UV Map", description="UV map for the images; if empty, the one used for rendering")
     outdated: BoolProperty(
-        name="Allow Outdated", description="Export the bake also where it no longer fits what it was made from"
+        name="Allow Outdated", description="Export the bake even if it no longer fits what it was made from"
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
@@ -283,7 +283,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_final_mesh(OnBake, bpy.types.Operator):
-    """Add the ground as it stands after the last step to the scene: a plain mesh of its own, with nothing that moves"""
+    """Add the ground as it is after the last step to the scene, as a plain mesh that does not move"""
 
     bl_idname = "softground.final_mesh"
     bl_label = "Add Final Mesh"

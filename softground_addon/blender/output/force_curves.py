@@ -163,7 +163,8 @@ def _baked(context: bpy.types.Context) -> tuple[list[Footprint], Array]:
 
 
 class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
-    """Put force and contact of every sole on an empty, as animated properties for the Graph Editor and for drivers"""
+    """Put the force and contact of every sole on an empty, as animated properties for the Graph Editor and for
+    drivers"""
 
     bl_idname = "softground.force_curves"
     bl_label = "Add Force Curves"
@@ -185,7 +186,7 @@ class SOFTGROUND_OT_force_curves(OnBake, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
-    """Write force and contact of every sole at every frame to a table (CSV)"""
+    """Write the force and contact of every sole at every frame to a table (CSV)"""
 
     bl_idname = "softground.export_forces"
     bl_label = "Export Forces"

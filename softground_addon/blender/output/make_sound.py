@@ -37,7 +37,7 @@ def _free_channel(strips: Any) -> int:
 
 
 class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
-    """Compute the sound of the footsteps from their forces, write it beside the file, and put it into the sequencer"""
+    """Compute the sound of the footsteps from their forces, save it beside the file, and add it to the sequencer"""
 
     bl_idname = "softground.make_sound"
     bl_label = "Make Sound"
@@ -46,12 +46,12 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
     samples: StringProperty(
         name="Own Sounds",
         description="Folder of WAV files of single steps to play instead, as loud as the forces say. "
-        "Those with the ground in their names, such as snow_1.wav, are for that ground",
+        "Files named after a ground, such as snow_1.wav, are used on that ground only",
         subtype="DIR_PATH",
     )
     stereo: BoolProperty(
         name="From the Camera",
-        description="Hear each step from where the camera sees it, softer the farther it is",
+        description="Hear each step from where the camera sees it, quieter the farther away it is",
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:

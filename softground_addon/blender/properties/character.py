@@ -54,17 +54,17 @@ class SoftGroundSole(bpy.types.PropertyGroup):
         description="How the bone prints",
         items=[
             ("FOOT", "Foot", "With a sole from heel to toes: feet, paws and hooves"),
-            ("LIMB", "Limb", "With whatever side of it faces down: hands, knees, elbows, backs"),
+            ("LIMB", "Limb", "With whichever side faces down: hands, knees, elbows, backs"),
         ],
         default="FOOT",
     )
     bone: StringProperty(name="Bone", description="Bone that carries the sole; of a foot, from heel to ball")
     parts: CollectionProperty(name="Parts", type=SoftGroundPart)
-    toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty where the foot has none")
+    toe_bone: StringProperty(name="Toes", description="Bone that carries the toes; leave empty if the foot has none")
     object: PointerProperty(
         name="Object",
-        description="Object that prints in place of a bone, with whatever side of its mesh faces down: a snowshoe, a "
-        "cane, a ball, a wheel",
+        description="Object that prints in place of a bone, with whichever side of its mesh faces "
+        "down: a snowshoe, a cane, a ball, a wheel",
         type=bpy.types.Object,
         poll=is_mesh,
     )
@@ -81,16 +81,20 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     )
     mass: FloatProperty(
         name="Mass (kg)",
-        description="Mass in kilograms; of a character, with clothes and load. The depth of the prints grows with it",
+        description="Mass in kilograms, with clothes and load. Heavier characters leave deeper prints",
         default=DEFAULT_MASS,
         min=0.0,
         soft_min=0.1,
         soft_max=500.0,
         precision=1,
     )
-    size: FloatProperty(name="Size", description="Of its rig, by which a wrong scale is seen", options={"HIDDEN"})
+    size: FloatProperty(
+        name="Size", description="Size of the rig, which shows whether its scale is wrong", options={"HIDDEN"}
+    )
     skin_mass: FloatProperty(
-        name="Mass of the Skin", description="What its skin weighs by volume, 0 where unknown", options={"HIDDEN"}
+        name="Mass of the Skin",
+        description="Mass estimated from the volume of the skin; 0 if unknown",
+        options={"HIDDEN"},
     )
     force_model: EnumProperty(
         name="Force Model",
@@ -107,8 +111,8 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     )
     response_strength: FloatProperty(
         name="Response",
-        description="How much of the baked response shows: 0 is the animation as it was made, 1 the response as baked. "
-        "Needs no new bake",
+        description="How much of the baked response shows: 0 is the original animation, 1 the "
+        "response as baked. Needs no new bake",
         default=1.0,
         min=0.0,
         max=2.0,
@@ -119,5 +123,5 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)
     active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})
     sole_length: FloatProperty(
-        name="Sole Length", description="Of its shortest sole [m], to which cells are fitted", options={"HIDDEN"}
+        name="Sole Length", description="Length of the shortest sole [m], which sets the cell size", options={"HIDDEN"}
     )

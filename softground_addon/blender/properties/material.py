@@ -19,17 +19,17 @@ def _limits(field: str) -> dict[str, float]:
 
 
 _STIFFNESS = (
-    "Stiffness of the loose layer: prints are half as deep at twice the value. An effective modulus for compaction, "
-    "far below the elastic one from textbooks"
+    "Stiffness of the loose layer: twice the value makes prints half as deep. An effective modulus "
+    "for compaction, far below the elastic modulus in textbooks"
 )
-_LAYER = "Thickness of the loose layer. No print is deeper"
+_LAYER = "Thickness of the loose layer. No print can be deeper"
 _RIM_REACH = "How far around the foot the displaced ground rises"
-_SMOOTHING = "Width of the blur that the shown ground gets. Forces and depths do not see it"
+_SMOOTHING = "How much the displayed ground is blurred. Forces and depths are not affected"
 _CRUST = (
-    "Pressure at which the crust on untouched ground breaks; what presses less leaves no print. A person stands with "
-    "about 20 kPa, walks with 40. 0 is no crust"
+    "Pressure that breaks the crust on untouched ground; less leaves no print. A person exerts about "
+    "20 kPa standing, 40 walking. 0 is no crust"
 )
-_FIRM_BELOW = "Depth of compression below which the ground is ten times stiffer. 0 is loose all through"
+_FIRM_BELOW = "Compressed further than this, the ground is ten times stiffer. 0 is loose all the way down"
 
 
 look_followers: list[Callable[[bpy.types.Scene], None]] = []
@@ -44,10 +44,10 @@ def _look_changed(material: bpy.types.PropertyGroup, _context: bpy.types.Context
 class SoftGroundMaterial(bpy.types.PropertyGroup):
     """The ground's physics; see `core.ground.material.GroundMaterial`."""
 
-    preset: StringProperty(name="Preset", description="Preset that was loaded last", default="Snow")
+    preset: StringProperty(name="Preset", description="Last preset loaded", default="Snow")
     surface: EnumProperty(
         name="Look",
-        description="Render material of the ground. It replaces what SoftGround made itself, never a material of yours",
+        description="Render material of the ground. It replaces SoftGround's own material, never yours",
         update=_look_changed,
         items=[(name, name.replace("_", " ").title(), "") for name in SURFACES],
         default="snow",
@@ -62,8 +62,8 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     poisson_ratio: FloatProperty(
         name="Rim Volume",
-        description="How much of the pressed-down volume rises around the foot: none at 0, all of it at 0.5 (sand). "
-        "Poisson's ratio",
+        description="How much of the displaced volume rises around the foot: none at 0, all of it at "
+        "0.5 (sand). Poisson's ratio",
         default=0.05,
         precision=3,
         **_limits("poisson_ratio"),
@@ -102,23 +102,24 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     rim_bias: FloatProperty(
         name="Forward Push",
-        description="How much more of the rim rises ahead of a moving foot than behind it: 0 none, 1 all of it",
+        description="How much more of the rim rises ahead of a moving foot than behind it: at 0 the "
+        "rim is even, at 1 nothing rises right behind",
         default=0.0,
         subtype="FACTOR",
         **_limits("rim_bias"),
     )
     repose_angle: FloatProperty(
         name="Angle of Repose",
-        description="Steepest slope that loose ground keeps: rims and walls slide down to it. 0 keeps them as pressed; "
-        "dry sand has 32°",
+        description="Steepest slope that loose ground can hold: steeper rims and walls slide down. 0 "
+        "leaves them as pressed; dry sand holds 32°",
         default=0.0,
         subtype="ANGLE",
         **_limits("repose_angle"),
     )
     shortest_time: FloatProperty(
         name="Shortest Time",
-        description="Under a fast landing the ground gives way within the time that the foot takes to stop, down to "
-        "this. 0 always takes the full time",
+        description="Lower limit of the settling time under a fast landing, where the ground gives "
+        "way as fast as the foot stops. 0 always uses the full Settling Time",
         default=0.0,
         precision=3,
         soft_max=0.2,
@@ -127,8 +128,8 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     )
     hardening: FloatProperty(
         name="Hardening",
-        description="How much stiffer trodden ground is under the next foot: at 10, a second step like the first adds "
-        "less than a third of it. 0 turns it off",
+        description="How much stiffer trodden ground is under the next foot: at 10, a second "
+        "identical step adds less than a third of the depth. 0 is off",
         default=0.0,
         precision=1,
         soft_max=50.0,
@@ -176,22 +177,22 @@ class SoftGroundPainted(bpy.types.PropertyGroup):
 
     stiffness: StringProperty(
         name="Stiffness",
-        description="Vertex group or float attribute of the ground by which its stiffness is multiplied: 1 is as the "
-        "material says, 0.5 half as stiff. Vertices outside the group are as the material says",
+        description="Vertex group or float attribute that multiplies the ground's stiffness: 1 leaves "
+        "it as set, 0.5 halves it. Vertices outside the group count as 1",
         default="softground_stiffness",
         search=_paintable,
     )
     layer_depth: StringProperty(
         name="Layer Depth",
-        description="Vertex group or float attribute of the ground by which the depth of its loose layer is "
-        "multiplied: 1 is as the material says, 0 takes no print",
+        description="Vertex group or float attribute that multiplies the depth of the loose layer: 1 "
+        "leaves it as set, 0 takes no print",
         default="softground_layer_depth",
         search=_paintable,
     )
     rim: StringProperty(
         name="Rim",
-        description="Vertex group or float attribute of the ground by which the volume of its rims is multiplied: 1 is "
-        "as the material says, 0 raises no rim",
+        description="Vertex group or float attribute that multiplies the volume of the rims: 1 leaves "
+        "it as set, 0 raises no rim",
         default="softground_rim_factor",
         search=_paintable,
     )

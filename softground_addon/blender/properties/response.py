@@ -13,13 +13,12 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
 
     use: BoolProperty(
         name="Tilt",
-        description="Let the body lean into slopes and sway over the ground that gives way, as a layer of keys above "
-        "the animation",
+        description="Let the body lean into slopes and sway over soft ground, as a layer of keys above the animation",
         default=False,
     )
     frequency: FloatProperty(
         name="Frequency (Hz)",
-        description="How fast the body swings back to balance, in swings per second",
+        description="How fast the body sways back to balance, in swings per second",
         default=0.6,
         min=0.02,
         max=5.0,
@@ -29,7 +28,7 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
     )
     damping: FloatProperty(
         name="Damping",
-        description="1 comes to rest without swinging past, less swings on, more is sluggish",
+        description="1 comes to rest without overshooting; less keeps swinging, more is sluggish",
         default=0.85,
         min=0.0,
         max=5.0,
@@ -38,9 +37,9 @@ class SoftGroundTilt(bpy.types.PropertyGroup):
         precision=2,
     )
     strength: share(
-        "Strength", "How much of a slope the body leans by: 1 by as much as the ground rises", default=0.5, most=2.0
+        "Strength", "How far the body leans into a slope: at 1, by the full angle of the ground", default=0.5, most=2.0
     )
-    lateral: share("Sideways", "How much of that it also leans on slopes across its way", default=1.0)
+    lateral: share("Sideways", "How much of that lean also applies to slopes across its path", default=1.0)
 
 
 class SoftGroundGrounding(bpy.types.PropertyGroup):
@@ -48,16 +47,16 @@ class SoftGroundGrounding(bpy.types.PropertyGroup):
 
     use: BoolProperty(
         name="Grounding",
-        description="Let the feet sink with the ground they press and stand on its slopes, with hips and knees to "
-        "match, as a layer of keys above the animation",
+        description="Let the feet sink into the ground they press and stand on its slopes; hips and "
+        "knees follow. A layer of keys above the animation",
         default=False,
     )
-    by_button: BoolProperty(name="By a Button", description="Sink Feet has switched it on", options={"HIDDEN"})
+    by_button: BoolProperty(name="By a Button", description="Switched on by Sink Feet", options={"HIDDEN"})
     align: share(
-        "Align Feet", "How much of the ground's slope the feet take on, within what an ankle can bend", default=1.0
+        "Align Feet", "How much of the ground's slope the feet follow, as far as an ankle can bend", default=1.0
     )
-    lock: share("Reduce Foot Sliding", "How much of the animation's sliding is taken out of feet that stand")
-    knee_lift: share("Lift Knees", "Lift swinging feet higher, at 1 by as much as they had sunk", most=2.0)
-    hold: share("Hold Feet", "Let feet stay longer in deep ground and catch up in their swing")
-    crouch: share("Bend Knees", "Bring the hips down in deep ground, at 1 by half the sinkage", most=2.0)
+    lock: share("Reduce Foot Sliding", "How much of the animation's foot sliding is removed from standing feet")
+    knee_lift: share("Lift Knees", "Lift swinging feet higher; at 1, by as much as they had sunk", most=2.0)
+    hold: share("Hold Feet", "Keep feet in deep ground longer, and let them catch up in the swing")
+    crouch: share("Bend Knees", "Lower the hips in deep ground; at 1, by half the sinkage", most=2.0)
     arms: share("Arms Out", "Raise the arms sideways for balance in deep ground")

@@ -26,11 +26,11 @@ DEFAULT_CELL_SIZE = 0.01
 
 
 _CELL_SIZE = (
-    "Size of the cells in which the ground is computed. Half the size takes four times the memory; the depth of the "
-    "prints does not depend on it"
+    "Size of the cells in which the ground is simulated. Half the size takes four times the memory; "
+    "print depth does not depend on it"
 )
 _TREAD = (
-    "Depth of the bars of shoe soles that the ground's render material shows in prints. 0 for bare feet, paws and props"
+    "Depth of the shoe tread that the ground's render material shows in the prints. 0 for bare feet, paws and props"
 )
 
 
@@ -73,7 +73,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     cells_along_sole: FloatProperty(
         name="Cells Along Sole",
-        description="Cells along the shortest sole, to which the cell size is fitted; 0 where the user has set it",
+        description="Cells along the shortest sole, which set the cell size; 0 if you set the size yourself",
         min=0.0,
         options={"HIDDEN"},
     )
@@ -82,8 +82,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     longest_bake: FloatProperty(
         name="Longest Bake (min)",
-        description="A bake that is estimated to take longer than this is refused before it starts, with the estimate. "
-        "Raise it for one that may take all night",
+        description="A bake estimated to take longer than this is refused before it starts. Raise it to bake overnight",
         default=20.0,
         min=1.0,
         max=10_000.0,
@@ -91,19 +90,19 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     shape_keys: BoolProperty(
         name="Keep Shape Keys",
-        description="Keep the raw and the smoothed heights as shape keys, to blend or sculpt. Left out on grounds of "
-        "more than 250,000 vertices, which play faster without: Blender evaluates them on the whole mesh at each frame",
+        description="Keep the raw and the smoothed heights as shape keys, to blend or sculpt. Left "
+        "out above 250,000 vertices, where they slow down playback",
         default=True,
     )
     dense_shape_keys: BoolProperty(
         name="On Dense Grounds Too",
-        description="Keep shape keys on grounds of more than 250,000 vertices too",
+        description="Keep shape keys on grounds of more than 250,000 vertices as well",
         default=False,
     )
     ground_margin: FloatProperty(
         name="Margin (m)",
-        description="How far a ground that SoftGround creates reaches beyond the walk, with an edge that fades out. "
-        "With a margin it also fills the camera's view; 0 ends close around the steps",
+        description="How far a ground made by SoftGround extends beyond the walk, with an edge that "
+        "fades out. It also fills the camera's view; at 0 it ends close around the steps",
         default=3.0,
         min=0.0,
         soft_max=20.0,
@@ -111,28 +110,28 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     detail: EnumProperty(
         name="Detail",
-        description="Whether a fine copy of the ground along the trail takes the prints, with the ground hidden",
+        description="Whether to hide the ground and let a copy that is fine along the trail take the prints",
         items=[
-            ("AUTO", "Automatic", "Where the ground is too coarse to show the prints"),
-            ("ALWAYS", "Always", "Fine along the trail even where the ground itself could show the prints"),
+            ("AUTO", "Automatic", "Use the copy if the ground is too coarse to show the prints"),
+            ("ALWAYS", "Always", "Use the copy even if the ground itself could show the prints"),
             ("NEVER", "Never", "Press the ground's own vertices"),
         ],
         default="AUTO",
     )
     output: EnumProperty(
         name="Bake",
-        description="What a bake makes",
+        description="What to bake",
         items=[
-            ("BOTH", "Prints and Response", "Footprints in the ground, and the characters' response where it is on"),
-            ("PRINTS", "Prints Only", "Footprints in the ground; the characters stay as they are animated"),
+            ("BOTH", "Prints and Response", "Footprints in the ground, and the characters' response if it is on"),
+            ("PRINTS", "Prints Only", "Footprints in the ground; the characters keep their animation"),
             ("RESPONSE", "Response Only", "The characters' response; the ground stays as it is"),
         ],
         default="BOTH",
     )
     depth_cm: FloatProperty(
         name="Depth (cm)",
-        description="Depth of the typical step: half of the main steps print deeper than this, half less deep. Type "
-        "another, and the stiffness of the ground follows",
+        description="Depth of the typical step: half of the main steps are deeper, half shallower. "
+        "Type another depth, and the stiffness of the ground follows",
         get=_shown_depth,
         set=_type_depth,
         min=0.0,
@@ -143,13 +142,13 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     painted: PointerProperty(name="Masks", type=SoftGroundPainted)
     pressure: EnumProperty(
         name="Pressure",
-        description="How the force on a foot spreads over its contact",
+        description="How the force on a foot spreads over its contact area",
         items=[
-            ("UNIFORM", "Flat", "The same pressure under all of the foot that touches"),
+            ("UNIFORM", "Flat", "The same pressure wherever the foot touches"),
             (
                 "CENTRE_OF_PRESSURE",
                 "Heel-to-Toe",
-                "Most pressure where the force acts, from the heel to the toes: steps have deep heels and toes",
+                "Pressure follows the force from the heel to the toes: prints have deep heels and toes",
             ),
         ],
         default="UNIFORM",
@@ -166,8 +165,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     tread_mm: in_unit("tread", 1e-3, "Tread (mm)", _TREAD, min=0.0, soft_max=5.0, precision=1)
     tread_pattern: EnumProperty(
         name="Tread Pattern",
-        description="What the soles of shoes press into the ground where its relief is fine enough to show it, with "
-        "Close-Up as a rule",
+        description="Pattern of the soles, pressed in where the relief is fine enough to show it, "
+        "usually with Close-Up",
         items=[
             ("HIKING", "Hiking", "Blocks around the edge, chevrons within, a plain waist"),
             ("TRAINER", "Trainer", "Waves across the sole, cut along its middle"),
@@ -177,30 +176,30 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     relief: EnumProperty(
         name="Relief",
-        description="Broken edges, crumbs, cracks and tread on the prints that are shown. What the ground does to "
-        "feet, and forces and depths, stay as they are",
+        description="Broken edges, crumbs, cracks and tread on the displayed prints. Forces, depths "
+        "and the response are not affected",
         items=[
             ("OFF", "Off", "Smooth prints, as they are computed"),
-            ("FINE", "Fine", "In the mesh as fine as the cells: for trails and whole figures"),
+            ("FINE", "Fine", "As fine as the cells: for trails and full figures"),
             (
                 "CLOSE_UP",
                 "Close-Up",
-                "With vertices 2.5 mm apart along the trail where the camera comes near, and the tread of shoes in the "
-                "mesh. Without a camera, along the whole trail",
+                "Vertices 2.5 mm apart along the trail where the camera comes near (everywhere "
+                "without a camera), and shoe tread in the mesh",
             ),
         ],
         default="OFF",
     )
     relief_vertices: IntProperty(
-        name="Most Vertices",
-        description="Vertices that Close-Up may spend along the trail; where it would take more, it is coarser",
+        name="Max Vertices",
+        description="Most vertices that Close-Up may use along the trail; it gets coarser to stay within them",
         default=2_000_000,
         min=10_000,
         soft_max=10_000_000,
     )
     relief_strength: FloatProperty(
         name="Relief Amount",
-        description="How rough prints are: 1 as the ground's look has it, 0 smooth",
+        description="How rough the prints are: 0 is smooth, 1 as designed for the ground",
         default=1.0,
         min=0.0,
         max=2.0,
@@ -211,18 +210,22 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
     animated_frames: IntVectorProperty(
-        name="Animated Frames", description="As Add Character has set Start and End", size=2, options={"HIDDEN"}
+        name="Animated Frames", description="Start and End as set by Add Character", size=2, options={"HIDDEN"}
     )
     own_time: IntVectorProperty(
-        name="Own Time Stretching", description="As the user had it before Slow Down", size=2, options={"HIDDEN"}
+        name="Own Time Stretching", description="Time stretching before Slow Down", size=2, options={"HIDDEN"}
     )
     slowed_time: IntVectorProperty(
-        name="Slowed Time Stretching", description="As Slow Down has set it; (0, 0) before", size=2, options={"HIDDEN"}
+        name="Slowed Time Stretching",
+        description="Time stretching set by Slow Down; (0, 0) before",
+        size=2,
+        options={"HIDDEN"},
     )
     sink_feet: BoolProperty(
         name="Sink Feet",
-        description="Let the feet down into their prints, hips and knees with them, as a layer of keys above the "
-        "animation. Where a rig cannot take the layer, the bake says so and goes on without",
+        description="Lower the feet into their prints, with hips and knees, as a layer of keys above "
+        "the animation. If a rig cannot take the layer, the bake says so and goes on "
+        "without it",
         default=False,
     )
     has_layers: BoolProperty(
@@ -230,8 +233,9 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     debris: BoolProperty(
         name="Throw Debris",
-        description="Let steps throw snow, sand, mud and soil, as far as their speed and force can: a run in powder a "
-        "plume, a walk on firm sand next to nothing. What flies is missing from the rims of the prints",
+        description="Let steps kick up snow, sand, mud and soil, according to their speed and force: "
+        "a plume for a run in powder, almost nothing for a walk on firm sand. What flies "
+        "is missing from the rims",
         default=False,
     )
     keep_forces: BoolProperty(
