@@ -128,6 +128,40 @@ def _conifer(chance: np.random.Generator, colour: tuple[float, float, float]) ->
     return mesh
 
 
+def add_grass(spots: Array, heights: Array, ground: terrain.Field, seed: int = 0) -> None:
+    """Tufts of bent blades on a ground, at places (N, 2), so high (N,) [m]."""
+    chance = np.random.default_rng(seed)
+    shapes = [_tuft(chance) for _ in range(5)]
+    for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
+        tuft = bpy.data.objects.new("Grass", shapes[number % len(shapes)])
+        tuft.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.01)
+        tuft.rotation_euler.z, tuft.scale = chance.uniform(0, 2 * pi), (height, height, height)
+        bpy.context.scene.collection.objects.link(tuft)
+
+
+def _tuft(chance: np.random.Generator) -> bpy.types.Mesh:
+    """Blades of length about 1, each of three quads and a tip, which lean out of a common root."""
+    blades = 60
+    turn, lean = chance.uniform(0, 2 * pi, (2, blades))
+    lean = 0.15 + 0.9 * (lean / (2 * pi)) ** 1.5
+    length, width = chance.uniform(0.45, 1.1, blades), chance.uniform(0.008, 0.016, blades)
+    ahead = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(blades)])
+    aside = np.column_stack([-np.sin(turn), np.cos(turn), np.zeros(blades)]) * width[:, None]
+    root = 0.12 * ahead * chance.uniform(0, 1, (blades, 1))
+    along = np.linspace(0.0, 1.0, 4)
+    out = length[:, None] * np.sin(lean[:, None] * along) * along
+    up = length[:, None] * np.cos(lean[:, None] * along) * along
+    spine = root[:, None] + ahead[:, None] * out[..., None] + np.array((0, 0, 1.0)) * up[..., None]
+    thin = (1.0 - along)[None, :, None]
+    vertices = np.stack([spine - aside[:, None] * thin, spine + aside[:, None] * thin], axis=2).reshape(-1, 3)
+    quad = np.array([(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(3)])
+    faces = (8 * np.arange(blades)[:, None, None] + quad).reshape(-1, 4)
+    mesh = bpy.data.meshes.new("Grass")
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    mesh.materials.append(stage.plain_material("SoftGround Sample grass", (0.055, 0.060, 0.018), 0.7))
+    return mesh
+
+
 _GLOW = 0.35
 """Of a flake: light goes through it, so that it is bright also where the sun stands behind [W/m²]."""
 
