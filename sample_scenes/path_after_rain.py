@@ -83,7 +83,7 @@ def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
         [sides * (0.75 + chance.gamma(1.3, 1.9, TUFTS)), 2.0 - chance.uniform(0.0, 1.0, TUFTS) ** 1.6 * 24]
     )
     open_air.add_grass(spots, 0.06 + chance.gamma(2.0, 0.05, TUFTS), HEIGHT)
-    scene.view_settings.exposure = 0.1
+    scene.view_settings.exposure, scene.render.image_settings.quality = 0.1, 80
     path = folder / "path_after_rain.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
