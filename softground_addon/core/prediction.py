@@ -32,6 +32,8 @@ FEW = 6
 """Contacts that are followed under all of their soles where an estimate will do, and poses of bodies."""
 TYPICAL = 24
 """Contacts that tell the depth of the typical one."""
+FINEST_CELL = 1 / 240
+"""Finer cells tell no more of the depth, in lengths of the shortest sole: 1.1 mm for an adult."""
 MATCH_TOLERANCE = 2e-3
 """Relative error of a matched depth."""
 FREE_TRIALS = 6
@@ -151,10 +153,12 @@ def contact_loads(
     terrain : Terrain
         The undisturbed ground.
     cell_size : float
-        Side of a cell [m]: the ground's height is looked up once per cell.
+        Side of a cell [m]: the ground's height is looked up once per cell, or `FINEST_CELL`.
     variation : Variation, optional
         How the ground varies from place to place.
     """
+    shortest = min((sole.sole.length for one in loads for sole in one.motion.soles), default=0.0)
+    cell_size = max(cell_size, FINEST_CELL * shortest)
     cells = UndisturbedCells(terrain, variation, cell_size)
     of_size = {cell_size: cells}
     soles: list[SoleContact] = []

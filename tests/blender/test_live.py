@@ -217,6 +217,22 @@ def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_s
     assert baked_heights(live_shot) == pytest.approx(shown, abs=1e-6)
 
 
+def test_cells_that_nobody_waits_for_are_refused_in_words_and_the_prints_stay(live_shot):
+    live_shot.frame_set(48)
+    shown, size = display_heights(live_shot), live_shot.softground.cell_size
+    live_shot.softground.cell_size = 1e-4
+    answered(live_shot)
+    assert live.is_on()
+    assert "set a cell size of at least" in live.refusal()
+    assert not live.is_answering()
+    assert (display_heights(live_shot) == shown).all()
+    live_shot.softground.cell_size = size
+    assert live.refusal() == ""
+    answered(live_shot)
+    assert live.is_on()
+    assert (display_heights(live_shot) == shown).all()
+
+
 def test_newest_steps_follow_a_slider_first_and_while_it_is_dragged(scene):
     """Each move of a drag shows at the feet; what lies further back follows when it rests."""
     walker(scene, frames=150)

@@ -142,3 +142,10 @@ def test_steps_on_the_edge_of_the_ground_are_predicted_like_those_beside_it(pres
     predicted = contact_loads([loads], terrain, CELL).deepest(SNOW, pressure)
     assert predicted == pytest.approx(baked, rel=0.03)
     assert predicted <= whole * 1.001
+
+
+def test_cells_of_a_hair_s_breadth_take_no_more_squares_than_a_sole_shows():
+    loads = walk(steps=2)
+    few, fine = (contact_loads([loads], FlatTerrain(), size) for size in (1e-3, 1e-5))
+    assert fine.typical(SNOW) == pytest.approx(few.typical(SNOW), rel=0.01)
+    assert sum(len(one.squares) for one in fine.soles) <= 1.1 * sum(len(one.squares) for one in few.soles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import bpy
@@ -310,6 +311,10 @@ def _apart_from_scene(scene: Any) -> str:
     return f"{whose} runs from {start} to {end}, the scene from {scene.frame_start} to {scene.frame_end}"
 
 
+_REFUSAL_WIDTH = 40
+"""Letters in a line of what live mode does not do."""
+
+
 def _live_buttons(layout: Any, state: Any) -> None:
     """One button to start live mode; two to end it, with and without the prints."""
     if not state.is_live:
@@ -320,6 +325,10 @@ def _live_buttons(layout: Any, state: Any) -> None:
     row.operator("softground.live", text="Discard", icon="X").keep = False
     row.alert = False
     row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
+    refusal = layout.column(align=True)
+    refusal.alert = True
+    for line in textwrap.wrap(live.refusal(), _REFUSAL_WIDTH):
+        refusal.label(text=line, translate=False)
 
 
 class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):

@@ -105,6 +105,12 @@ def is_answering() -> bool:
     return _mode is not None and scene is not None and _mode.has_more(scene)
 
 
+def refusal() -> str:
+    """Why live mode does not press with the settings of the moment; empty where it does."""
+    scene = _scene()
+    return _mode.refusal(settings.snapshot(scene)) if _mode is not None and scene is not None else ""
+
+
 def forget() -> None:
     """End live mode as it stands, because its scene or its ground went away."""
     global _mode  # noqa: PLW0603

@@ -69,6 +69,7 @@ class LiveMode:
         self.scene = scene.session_uid
         self.rendering = False
         self.answered_at = 0.0  # on the clock of `time.perf_counter`
+        self._refused: tuple[BakeSettings, str] | None = None
         self._answering: Generator[None] | None = None
         self._asked: BakeSettings | None = None
         self._can_start_over = True
@@ -121,7 +122,7 @@ class LiveMode:
         Raises
         ------
         InputError
-            If the shot cannot be read any more, or its cells would take too much memory or time.
+            If the shot cannot be read any more.
         """
         try:
             return self._answer(scene, time.perf_counter() + seconds)
@@ -152,10 +153,16 @@ class LiveMode:
         """Whether settings or animation are others than those that are being pressed, or were last."""
         if asked.ground is None or self._wanted.ground is None or asked.ground.uid != self._wanted.ground.uid:
             return False  # another ground wants another live mode
+        if self.refusal(asked):
+            return False
         if self._answering is None and analysis.known(scene, asked) is not self._analysis:
             return True
         last = self._wanted if self._answering is None else self._asked
         return last is None or (asked != last and _pressed_by(asked) != _pressed_by(last))
+
+    def refusal(self, asked: BakeSettings) -> str:
+        """Why some settings are not pressed; empty where they are, or were not tried."""
+        return self._refused[1] if self._refused is not None and self._refused[0] == asked else ""
 
     def _pressing_again(self, asked: BakeSettings) -> Generator[None]:
         """Press the shot up to the frame that is shown: the newest steps onto what lies there, then all of them."""
@@ -164,7 +171,11 @@ class LiveMode:
         known = yield from _in_steps(analysis.refreshing(scene))
         if known is None:
             raise InputError("The shot cannot be read any more.")
-        check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
+        try:
+            check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
+        except InputError as error:  # what was pressed before is shown on
+            self._refused = asked, str(error)
+            return
         whole = self._playhead
         if not self._presses_like(known, asked):
             if self._playhead.ground.cell_size == asked.cell_size_m:

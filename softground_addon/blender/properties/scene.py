@@ -83,7 +83,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     longest_bake: FloatProperty(
         name="Longest Bake (min)",
         description="A bake estimated to take longer than this is refused before it starts. Raise it to bake overnight",
-        default=20.0,
+        default=60.0,
         min=1.0,
         max=10_000.0,
         precision=0,
