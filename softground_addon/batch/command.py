@@ -219,7 +219,7 @@ def _duration(seconds: float) -> str:
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of processes from 1 to 1024")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of processes from 1 to 1024")
     return int(text)
 
 
@@ -229,5 +229,5 @@ def _seconds(text: str) -> float:
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds < 1e9:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
     return seconds

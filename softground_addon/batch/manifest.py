@@ -166,7 +166,7 @@ def parse(text: str, folder: Path, origin: str, *, is_json: bool = False) -> tup
     try:
         return _parsed(json.loads(text) if is_json else tomllib.loads(text), folder, origin)
     except (ValueError, OverflowError, RecursionError) as error:  # also of values that are too long or deep to be told
-        raise InputError(f"{origin} is no {'JSON' if is_json else 'TOML'} that can be read: {error}.") from None
+        raise InputError(f"{origin} is not readable as {'JSON' if is_json else 'TOML'}: {error}.") from None
 
 
 def _parsed(content: object, folder: Path, origin: str) -> tuple[BatchShot, ...]:
@@ -213,10 +213,10 @@ def frame_range(text: str) -> tuple[int, int]:
     """First and last frame from a text such as 1-250; ValueError for any other."""
     match = re.fullmatch(r"(-?\d+)-(-?\d+)", text.strip())
     if not match:
-        raise ValueError(f"'{text}' is no frame range like 1-250")
+        raise ValueError(f"'{text}' is not a frame range such as 1-250")
     first, last = int(match[1]), int(match[2])
     if max(abs(first), abs(last)) > FRAME_LIMIT:
-        raise ValueError(f"'{text}' is no frame range: frames go from {-FRAME_LIMIT:,} to {FRAME_LIMIT:,}")
+        raise ValueError(f"'{text}' is not a frame range: frames go from {-FRAME_LIMIT:,} to {FRAME_LIMIT:,}")
     return first, last
 
 
@@ -408,7 +408,7 @@ def _text(value: object, where: str) -> str:
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise InputError(f"{where} is {value!r}, which is no Unicode text: rename the file.") from None
+        raise InputError(f"{where} is {value!r}, which is not Unicode text: rename the file.") from None
     return value
 
 

@@ -28,7 +28,7 @@ def command_line(words: Sequence[str], *, windows: bool) -> str:
     Raises
     ------
     InputError
-        If a word cannot be typed: it is no Unicode text, or holds a line break on Windows.
+        If a word cannot be typed: it is not Unicode text, or holds a line break on Windows.
 
     References
     ----------
@@ -43,7 +43,7 @@ def command_line(words: Sequence[str], *, windows: bool) -> str:
     """
     for word in words:
         if any("\ud800" <= letter <= "\udfff" for letter in word):
-            raise InputError(f"{word!r} is no Unicode text: rename the file.")
+            raise InputError(f"{word!r} is not Unicode text: rename the file.")
         if windows and re.search(r"[\r\n]", word):
             raise InputError(f"{word!r} holds a line break, which the Command Prompt does not take: rename it.")
     return " ".join(map(_for_command_prompt, words)) if windows else shlex.join(words)

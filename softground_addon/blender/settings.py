@@ -363,7 +363,9 @@ def _parse(path: str) -> list[str | int]:
     while position < len(path):
         match = _STEP.match(path, position)
         if not match or (match[0].startswith(".") and not steps):
-            raise InputError(f"'{path}' is no path to a setting, like material.youngs_modulus or characters[0].mass.")
+            raise InputError(
+                f"'{path}' is not a path to a setting, like material.youngs_modulus or characters[0].mass."
+            )
         name, index, *quoted = match.groups()
         steps.append(int(index) if index else name or next(text for text in quoted if text is not None))
         position = match.end()

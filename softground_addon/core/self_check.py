@@ -168,7 +168,7 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             "unit_scale",
             "error",
             f"'{motion.name}' is {tall} tall: its file is in {units}.",
-            f"Press Scale by {scale} in the Character panel, or leave it if it is meant so.",
+            f"Press Scale by {scale} in the Character panel, or leave it if the size is intended.",
         )
         return  # with its size, the mass that suits it changes
     likely, by = motion.skin.mass if motion.skin else 0.0, "what has the volume of its skin"
@@ -222,7 +222,7 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
             "slow_motion",
             "note",
             f"'{motion.name}' walks about {factor:.1f} times slower than legs of its length do",
-            "set the frame rate of the scene to that of the animation, or leave it if slow motion is meant.",
+            "set the frame rate of the scene to that of the animation, or leave it if slow motion is intended.",
         )
 
 

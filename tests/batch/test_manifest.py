@@ -92,7 +92,7 @@ def test_a_pattern_is_a_shot_for_each_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("shots = ", "is no TOML"),
+        ("shots = ", "is not readable as TOML"),
         ("", "has no shots"),
         ("shots = []", "has no shots"),
         ("shots = [3]", "shot 1: must be a table"),
@@ -166,7 +166,7 @@ def test_a_manifest_that_is_a_pipe_or_never_ends_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "huge.toml").touch()
     os.truncate(tmp_path / "huge.toml", 2**40)
-    for path, says in ((tmp_path / "pipe.toml", "no regular"), (Path("/dev/zero"), "no regular"),
+    for path, says in ((tmp_path / "pipe.toml", "not a regular"), (Path("/dev/zero"), "not a regular"),
                        (tmp_path / "huge.toml", "larger than")):  # fmt: skip
         with pytest.raises(InputError, match=f"cannot be read.*{says}"):
             manifest.load(path)

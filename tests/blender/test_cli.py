@@ -117,7 +117,7 @@ def test_a_dry_run_saves_nothing(shot, tmp_path):
         (("--dry-run", "--scene", "Gone"), "no scene 'Gone'.*'Scene'"),
         (("--dry-run", "--preset", "lava"), "no preset 'lava'"),
         (("--dry-run", "--preset", "gone.json"), "gone.json"),
-        (("--dry-run", "--frames", "all"), "no frame range"),
+        (("--dry-run", "--frames", "all"), "not a frame range"),
         (("--dry-run", "--frames", "9-3"), "empty"),
         (("--dry-run", "--cell-size", "0"), "from 0.0001"),
         (("--dry-run", "--cell-size", "nan"), "from 0.0001"),
@@ -237,8 +237,8 @@ def test_progress_comes_in_the_asked_style(shot, capfd, style):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--frames=1-99999999999999"], "no frame range"),
-        (["--frames", "-1048575-3"], "no frame range"),
+        (["--frames=1-99999999999999"], "not a frame range"),
+        (["--frames", "-1048575-3"], "not a frame range"),
         (
             ["--frames=-1048574-1048574", "--dry-run"],
             "2,097,149 frames from -1048574 to 1048574",

@@ -132,4 +132,4 @@ def test_edits_that_never_end_are_refused(shot, tmp_path, capsys, kind):
     assert (
         cli.run_standalone(["bake", str(folder / "shot.blend"), f"--edits={path}", "--dry-run"]) == cli.EXIT_BAD_INPUT
     )
-    assert "edits.json' cannot be read: it is no regular file" in capsys.readouterr().err
+    assert "edits.json' cannot be read: it is not a regular file" in capsys.readouterr().err

@@ -76,7 +76,7 @@ def test_the_rig_takes_prints_like_any_other(scene, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("walk.c3d", b"nothing", "no C3D file"),
+        ("walk.c3d", b"nothing", "not a C3D file"),
         ("walk.fbx", b"nothing", "no motion capture that SoftGround reads"),
         ("legless.trc", trc_file({"Head": np.zeros((30, 3))}), "no markers for"),
     ],

@@ -165,7 +165,7 @@ def test_a_walk_that_travels_is_refused(scene):
     shots.walker(scene, frames=48)
     bpy.ops.softground.add_character()
     before = fingerprints.of_file()
-    with pytest.raises(RuntimeError, match="Nobody here walks on the spot"):
+    with pytest.raises(RuntimeError, match="No character here walks on the spot"):
         bpy.ops.softground.root_motion()
     assert fingerprints.of_file() == before
 

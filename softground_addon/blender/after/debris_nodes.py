@@ -144,16 +144,16 @@ class _Graph(NodeGraph):
         interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
         interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
         wind = interface.new_socket("Wind", in_out="INPUT", socket_type="NodeSocketVector")
-        wind.description = "Speed of the air in metres per second: it takes along what flies"
+        wind.description = "Wind in metres per second, which carries the flying pieces along"
         amount = interface.new_socket("Amount", in_out="INPUT", socket_type="NodeSocketFloat")
         amount.default_value, amount.min_value, amount.max_value = 1.0, 0.0, 1.0
-        amount.description = "Share of the pieces that is shown"
+        amount.description = "Share of the pieces that are shown"
         shaped = interface.new_socket("Shaped", in_out="INPUT", socket_type="NodeSocketInt")
         shaped.default_value, shaped.min_value = SHAPED, 0
-        shaped.description = "How many of the largest pieces have a shape: all others are round, and play much faster"
+        shaped.description = "How many of the largest pieces have a shape; all others are round, and play much faster"
         collection = interface.new_socket("Shapes", in_out="INPUT", socket_type="NodeSocketCollection")
         collection.default_value = shapes
-        collection.description = "What large pieces look like: objects of radius 1, one of which is picked for each"
+        collection.description = "Objects of radius 1 for the large pieces, one picked for each"
         group = self.node("NodeGroupInput")
         return [group.outputs[name] for name in ("Geometry", "Wind", "Amount", "Shaped", "Shapes")]
 

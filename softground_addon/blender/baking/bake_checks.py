@@ -120,7 +120,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
                 "coarse_ground",
                 "warning",
                 f"Prints lie where ground '{ground.name}' is too coarse to show them",
-                "set Detail to Automatic under Advanced, or create the ground anew.",
+                "set Detail to Automatic under Advanced, or create the ground again.",
             )
         ]
     return [
@@ -128,7 +128,7 @@ def coverage_findings(ground: bpy.types.Object, cover: Coverage, detail: str, ce
             "finer_copy",
             "note",
             f"Prints lie where ground '{ground.name}' is coarse: a finer copy, '{ground.name} Trail', takes them.",
-            f"To have them on '{ground.name}' itself, clear the bake and create the ground anew.",
+            f"To have them on '{ground.name}' itself, clear the bake and create the ground again.",
         )
     ]
 

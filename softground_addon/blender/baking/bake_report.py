@@ -43,7 +43,7 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
             "warning",
             f"Ground '{ground.name}' changes its shape over time by its modifier '{modifier}': it was taken as it is "
             f"at frame {frame}, where the bake starts.",
-            "Apply the modifier at the frame that is wanted, or switch it off.",
+            "Apply the modifier at the frame you want, or switch it off.",
         )
     ]
 
@@ -54,7 +54,7 @@ def edit_findings(left: BakeRecord) -> list[Finding]:
         Finding(
             "edit_without_step",
             "warning",
-            f"The edit of step '{name}' has no step any more: nothing of that character, with that foot, touches the "
+            f"Step '{name}', which you edited, no longer exists: that foot of that character does not touch the "
             "ground at its frame.",
             "It is kept for when the step comes back; reset it to drop it.",
         )

@@ -90,7 +90,7 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
         travel, curves = _layer(scene, one, motion, wanted, velocity)
         layers.append((one.armature, travel, curves))
     if not layers:
-        raise InputError("Nobody here walks on the spot: the feet rest on the ground as they are.")
+        raise InputError("No character here walks on the spot: the feet already stand still on the ground.")
     start, end = (frame * wanted.time_stretch for frame in wanted.frames)
     for name, travel, curves in layers:
         armature = settings.found(name)

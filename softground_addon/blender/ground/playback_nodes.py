@@ -155,10 +155,10 @@ class _Graph(NodeGraph):
         interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
         shading = interface.new_socket("Shading", in_out="INPUT", socket_type="NodeSocketBool")
         shading.default_value = True
-        shading.description = "Let compression, rim, age and pressure follow the time, for materials that read them"
+        shading.description = "Update compression, rim, age and pressure over time, for materials that read them"
         direction = interface.new_socket("Up", in_out="INPUT", socket_type="NodeSocketVector")
         direction.default_value = tuple(up)
-        direction.description = "World up in the space of the ground, of the length of one metre"
+        direction.description = "World up in the ground's space, one metre long"
         group = self.node("NodeGroupInput")
         self.with_shading, self.up = group.outputs["Shading"], group.outputs["Up"]
         return group.outputs["Geometry"], self.node("GeometryNodeInputSceneTime").outputs["Frame"]

@@ -45,32 +45,44 @@ NEVER_FULL = 1e9
 """Of a sixth knot of the levels, which is none."""
 
 INPUTS = (
-    ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds what it drapes over"),
+    ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
     (
         "Temperature",
         0.0,
         -60.0,
         40.0,
-        "Of the air in °C. Above 0, new snow melts, then the ground's, trodden snow last",
+        "Air temperature in °C. Above 0, new snow melts first, then the ground's, trodden snow last",
     ),
-    ("Wind", 0.0, 0.0, 60.0, "In metres per second, at 10 m. From about 5 on it blows sand into prints, from 6 snow"),
-    ("Rain", 0.0, 0.0, 500.0, "In millimetres per hour. It rounds edges, and what does not soak in stands in prints"),
+    (
+        "Wind",
+        0.0,
+        0.0,
+        60.0,
+        "Wind speed in metres per second, at 10 m. It blows sand into prints from about 5 on, snow from 6",
+    ),
+    ("Rain", 0.0, 0.0, 500.0, "Rain in millimetres per hour. It rounds edges; what does not soak in stands in prints"),
     (
         "Drying",
         0.0,
         0.0,
         50.0,
-        "What the air takes up, in millimetres of water per hour: 0.2 mild, 0.5 in sun and wind",
+        "Water that the air takes up, in millimetres per hour: 0.2 is mild, 0.5 sunny and windy",
     ),
     (
         "Water Table",
         100.0,
         0.0,
         100.0,
-        "In centimetres below the brim of each print: water seeps in from below, up to it",
+        "Water level in centimetres below the brim of each print, to which water seeps in",
     ),
-    ("Halo", 0.0, 0.0, 1.0, "How pale wet sand turns around a loaded foot; it is wet again after seconds"),
-    ("Time Scale", 1.0, 0.0, 1e7, "How many times faster than the animation: 2880 shows 8 hours in 10 seconds"),
+    ("Halo", 0.0, 0.0, 1.0, "How pale wet sand turns around a loaded foot; it is wet again seconds later"),
+    (
+        "Time Scale",
+        1.0,
+        0.0,
+        1e7,
+        "How many times faster than the animation the weather runs: 2880 shows 8 hours in 10 seconds",
+    ),
 )
 """Name, value, least, most and description of each of the group's inputs."""
 

@@ -80,7 +80,7 @@ class SOFTGROUND_OT_load_preset(bpy.types.Operator):
     bl_label = "Load Ground Preset"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: StringProperty(name="Name", description="Name of a preset that comes with SoftGround")
+    name: StringProperty(name="Name", description="Name of a preset")
     filepath: StringProperty(name="File", description="Preset file, instead of a name", subtype="FILE_PATH")
 
     @classmethod

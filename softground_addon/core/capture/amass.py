@@ -79,13 +79,13 @@ def read(content: bytes) -> CapturedBody:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(member.file_size for member in archive.infolist()) > _LARGEST:
-                raise InputError("the archive unpacks to more than 2 GB: it is no AMASS file")
+                raise InputError("the archive unpacks to more than 2 GB: it is not an AMASS file")
         with np.load(io.BytesIO(content), allow_pickle=False) as held:
             poses, way, rate = _poses(held), np.asarray(held["trans"], float), _rate(held)
     except InputError:
         raise
     except Exception as error:  # NumPy and zlib raise of every kind at damaged archives
-        raise InputError(f"this is no AMASS file ({error}): it needs poses, trans and mocap_framerate") from error
+        raise InputError(f"this is not an AMASS file ({error}): it needs poses, trans and mocap_framerate") from error
     if way.shape != (len(poses), 3) or not (np.isfinite(way).all() and np.isfinite(poses).all()):
         raise InputError("the AMASS file contradicts itself: poses and trans differ in length, or hold no numbers")
     return CapturedBody(_joints(poses, way), rate)

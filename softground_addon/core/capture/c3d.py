@@ -124,7 +124,7 @@ def _read(content: bytes) -> Capture:
 def _parameters(content: bytes) -> tuple[Parameters, _Numbers]:
     """The parameter section, and how numbers are written in the file."""
     if len(content) < 2 * _BLOCK or content[1] != _KEY:
-        raise InputError("this is no C3D file: it lacks the mark of one in its second byte")
+        raise InputError("this is not a C3D file: it lacks the mark of one in its second byte")
     start = (content[0] - 1) * _BLOCK
     if start < 0 or start + 4 > len(content):
         raise InputError("the C3D file is cut short before its parameters: copy or export it again")

@@ -43,7 +43,7 @@ def regular_blocks(path: Path, largest: int = LARGEST) -> Iterator[bytes]:
     """
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
-        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        raise OSError(errno.EINVAL, "it is not a regular file", str(path))
     if about.st_size > largest:
         raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
     left = about.st_size
@@ -96,7 +96,7 @@ def check_place(path: Path) -> None:
     try:
         str(path).encode()
     except UnicodeEncodeError:
-        raise InputError(f"{str(path)!r} is no Unicode text: choose another name, or rename the folder.") from None
+        raise InputError(f"{str(path)!r} is not Unicode text: choose another name, or rename the folder.") from None
     if not path.parent.is_dir():
         raise InputError(f"The folder of '{path}' does not exist: create it first.")
     partial = _partial(path)

@@ -106,9 +106,9 @@ def parse(text: str, origin: str) -> Preset:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin}: this is no JSON ({error}). Save the preset again, or delete the file.") from None
+        raise InputError(f"{origin}: this is not JSON ({error}). Save the preset again, or delete the file.") from None
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
-        raise InputError(f"{origin}: this is no SoftGround preset of schema_version {SCHEMA_VERSION}.")
+        raise InputError(f"{origin}: this is not a SoftGround preset of schema_version {SCHEMA_VERSION}.")
     name, source, surface = (
         content.get(key, default) for key, default in (("name", ""), ("source", ""), ("surface", "soil"))
     )
@@ -146,7 +146,7 @@ def load(path: Path) -> Preset:
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode) or about.st_size > LARGEST:
-            raise OSError(f"it is no regular file of up to {LARGEST} bytes")
+            raise OSError(f"it is not a regular file of up to {LARGEST} bytes")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"Preset '{path}' cannot be read: {error}") from None

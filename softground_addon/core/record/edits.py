@@ -213,7 +213,7 @@ def _edit(name: str, change: object, origin: str) -> StepEdit:
     try:
         _parts(name)
     except ValueError:
-        raise InputError(f"{where}: this is no step's id. The bake's report names them: steps, id.") from None
+        raise InputError(f"{where}: this is not the id of a step. The bake's report names them: steps, id.") from None
     if not isinstance(change, dict):
         raise InputError(f'{where} must be a table such as {{"mute": true}}.')
     _check_fields(change, _FIELDS, where)

@@ -128,9 +128,9 @@ def parse(text: str, origin: str) -> Amounts:
     try:
         table = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin}: this is no JSON ({error}).") from None
+        raise InputError(f"{origin}: this is not JSON ({error}).") from None
     if not isinstance(table, dict):
-        raise InputError(f"{origin}: this is no table of amounts.")
+        raise InputError(f"{origin}: this is not a table of amounts.")
     layers = [
         _made(kind, values, f"{origin}, {name}")
         for name, kind in LAYERS.items()

@@ -55,13 +55,13 @@ def test_a_knee_bends_by_its_turn():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"no archive", "no AMASS file"),
-        (archive(trans=np.zeros((3, 3))), "no AMASS file"),
+        (b"no archive", "not an AMASS file"),
+        (archive(trans=np.zeros((3, 3))), "not an AMASS file"),
         (archive(poses=poses(), trans=np.zeros((3, 3))), "frame rate"),
         (archive(poses=poses(), trans=np.zeros((2, 3)), mocap_framerate=60), "contradicts"),
         (archive(poses=poses()[:, :30], trans=np.zeros((3, 3)), mocap_framerate=60), "66 or more"),
-        (archive(poses=np.array([{}], object), trans=np.zeros((3, 3)), mocap_framerate=60), "no AMASS file"),
-        (archive(poses=poses(), trans=np.zeros((3, 3)), mocap_framerate=60)[:-300], "no AMASS file"),
+        (archive(poses=np.array([{}], object), trans=np.zeros((3, 3)), mocap_framerate=60), "not an AMASS file"),
+        (archive(poses=poses(), trans=np.zeros((3, 3)), mocap_framerate=60)[:-300], "not an AMASS file"),
     ],
     ids=["text", "no poses", "no rate", "lengths", "few joints", "objects", "cut short"],
 )

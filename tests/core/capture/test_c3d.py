@@ -84,8 +84,8 @@ def test_a_plate_that_sends_its_centre_of_pressure_has_it():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "no C3D file"),
-        (b"BVH" * 500, "no C3D file"),
+        (b"", "not a C3D file"),
+        (b"BVH" * 500, "not a C3D file"),
         (c3d_file(points(), 100.0)[:-600], "cut short"),
         (c3d_file(points(), 100.0).replace(b"mm", b"ft"), "unit of length"),
         (c3d_file(points(), 0.0), "frame rate"),

@@ -204,7 +204,7 @@ def test_what_blenders_own_saving_leaves_is_removed(tmp_path: Path):
 def test_pipes_devices_and_endless_files_are_not_read(tmp_path: Path):
     os.mkfifo(tmp_path / "pipe")
     for place in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
-        with pytest.raises(OSError, match="no regular file"):
+        with pytest.raises(OSError, match="not a regular file"):
             read_regular(place, 1000)
     path = tmp_path / "a.json"
     path.write_text("content")
@@ -271,5 +271,5 @@ def test_what_is_done_stays_done_after_a_power_cut(tmp_path: Path, monkeypatch: 
 
 
 def test_a_name_that_is_no_text_is_refused_beforehand(tmp_path: Path):
-    with pytest.raises(InputError, match="no Unicode text"):
+    with pytest.raises(InputError, match="not Unicode text"):
         check_place(tmp_path / "a\udcff.json")

@@ -162,5 +162,5 @@ def test_a_preset_that_never_ends_is_refused(tmp_path):
     (tmp_path / "huge.json").touch()
     os.truncate(tmp_path / "huge.json", 2**40)
     for path in (tmp_path / "pipe.json", tmp_path / "huge.json", Path("/dev/zero")):
-        with pytest.raises(InputError, match=r"cannot be read.*no regular file"):
+        with pytest.raises(InputError, match=r"cannot be read.*not a regular file"):
             presets.load(path)

@@ -184,8 +184,8 @@ def test_an_edit_that_cannot_be_meant_is_named(step, said):
         ({"steps": {}}, "version None"),
         ({"schema_version": 2, "steps": {}}, "version 2"),
         ({"schema_version": 1, "steps": {}, "more": 1}, "unknown field 'more'"),
-        ({"schema_version": 1, "steps": {"Walker": {}}}, "no step's id"),
-        ({"schema_version": 1, "steps": {"Walker/foot.L@nan": {}}}, "no step's id"),
+        ({"schema_version": 1, "steps": {"Walker": {}}}, "not the id of a step"),
+        ({"schema_version": 1, "steps": {"Walker/foot.L@nan": {}}}, "not the id of a step"),
     ],
 )
 def test_edits_that_are_none_are_refused(content, said):

@@ -143,8 +143,8 @@ def test_tables_name_what_is_wrong():
     from softground_addon.core.errors import InputError
 
     for text, message in (
-        ("{", "no JSON"),
-        ("[]", "no table"),
+        ("{", "not JSON"),
+        ("[]", "not a table"),
         ('{"depth": 5, "edges": {}}', "must be a table of"),
         ('{"depth": 5, "floor": {"size": 3}}', "lacks amount"),
         ('{"depth": 5, "floor": {"size": "a", "amount": 1}}', "must be a number"),
