@@ -207,4 +207,4 @@ def test_a_modifier_that_only_renders_show_is_told_of_where_a_copy_lacks_it(shor
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
     (warning,) = ground_mesh.warnings_of(baked_ground.display_mesh_of(ground))
-    assert "'Field' lacks what only renders show of 'Bumps': show it" in warning
+    assert "'Field' lacks what 'Bumps' shows in renders only: show it" in warning

@@ -331,7 +331,7 @@ def turned_into_the_ground(scene, thing):
         (growing, "'Ball' changes its size"),
         (squashed, "'Ball' has a scale of zero"),
         (without_faces, "'Ball' has no faces"),
-        (with_a_vertex_nowhere, "mesh of 'Ball' holds vertices that are nowhere"),
+        (with_a_vertex_nowhere, "mesh of 'Ball' has vertices without a valid position"),
         (weightless, "mass of 'Ball'"),
         (unlinked, "object 'Ball' is gone"),
         (removed, "object of 'Ball' is gone"),
@@ -354,7 +354,7 @@ def test_what_is_no_thing_is_not_added(scene):
         add_props(scene, [thing])
     scene.softground.ground = None
     add_props(scene, [thing])
-    with pytest.raises(InputError, match="prints already"):
+    with pytest.raises(InputError, match="already prints"):
         add_props(scene, [thing])
     light = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     with pytest.raises(InputError, match=r"'Lamp'.*of type Light"):

@@ -95,7 +95,7 @@ def test_feet_that_cannot_be_let_down_leave_the_settings_as_they_were(baked):
 def test_things_without_feet_are_refused_and_the_settings_stay(scene):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.25, location=(0, 0, 0.25))
     bpy.ops.softground.add_character()
-    with pytest.raises(RuntimeError, match="feet to let down"):
+    with pytest.raises(RuntimeError, match="feet to lower"):
         bpy.ops.softground.sink_feet()
     assert not scene.softground.grounding.use
 

@@ -144,7 +144,7 @@ def copy_findings(ground: bpy.types.Object) -> list[Finding]:
         Finding(
             "render_modifiers",
             "warning",
-            f"The finer copy of ground '{ground.name}' lacks what only renders show of {' and '.join(names)}",
+            f"The finer copy of ground '{ground.name}' lacks what {' and '.join(names)} shows in renders only",
             "show it in the viewport too (the modifier's screen icon), and bake again.",
         )
     ]

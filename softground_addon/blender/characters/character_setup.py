@@ -140,7 +140,7 @@ def add_props(scene: bpy.types.Scene, props: Iterable[bpy.types.Object]) -> list
         for character in scene.softground.characters:
             if character.armature and character.armature in ancestors(obj):
                 raise InputError(
-                    f"'{obj.name}' hangs on '{character.armature.name}', a character: add it to its soles with Add "
+                    f"'{obj.name}' is attached to the character '{character.armature.name}': let it print with Add "
                     "Contact."
                 )
     groups: dict[bpy.types.Object, list[bpy.types.Object]] = {}
@@ -176,7 +176,7 @@ def _check_printable(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
         raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or select another object.")
     for character in scene.softground.characters:
         if any(sole.object == obj for sole in character.soles):
-            raise InputError(f"'{obj.name}' prints already, as a sole of '{title_of(character)}'.")
+            raise InputError(f"'{obj.name}' already prints, as a sole of '{title_of(character)}'.")
 
 
 def _root(obj: bpy.types.Object) -> bpy.types.Object:

@@ -72,7 +72,9 @@ def surface_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Array, ND
     if not len(triangles):
         raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or choose another object.")
     if not np.isfinite(vertices).all():
-        raise InputError(f"The mesh of '{obj.name}' holds vertices that are nowhere (NaN or infinite): delete them.")
+        raise InputError(
+            f"The mesh of '{obj.name}' has vertices without a valid position (NaN or infinite): delete them."
+        )
     return vertices.astype(float), triangles
 
 

@@ -26,7 +26,7 @@ def check_playable(display_mesh: bpy.types.Object) -> None:
     """Raise InputError, naming the modifier, if no playback could come before this object's modifiers."""
     if barrier := playback.barrier_on(display_mesh):
         raise InputError(
-            f"The modifier '{barrier.name}' of '{display_mesh.name}' lets nothing play before it: apply or remove it."
+            f"The modifier '{barrier.name}' of '{display_mesh.name}' keeps prints from playing: apply or remove it."
         )
 
 
@@ -57,7 +57,7 @@ def check_usable(ground: bpy.types.Object) -> None:
             "(Object Data > Attributes, Vertex Groups or Custom Properties), or choose a copy without it."
         )
     if abs(ground.matrix_world.to_3x3().determinant()) < 1e-12:
-        raise InputError(f"Ground '{name}' is scaled to nothing: give it a scale other than 0 (Alt-S).")
+        raise InputError(f"Ground '{name}' is scaled to zero: give it a scale other than 0 (Alt-S).")
     mover = still_ground.mover_of(ground)
     if mover:
         raise InputError(

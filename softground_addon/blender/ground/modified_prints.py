@@ -53,7 +53,7 @@ def are_undone(
     if barrier := playback.barrier_on(ground):
         if detail == "NEVER":
             raise InputError(
-                f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: set Detail to "
+                f"The modifier '{barrier.name}' of ground '{ground.name}' keeps prints from playing: set Detail to "
                 "Automatic under Advanced, or apply it."
             )
         return True
@@ -84,7 +84,7 @@ def undone_prints(ground: bpy.types.Object) -> Finding:
         return Finding(
             "blocking_modifier",
             "note",
-            f"The modifier '{barrier.name}' of ground '{ground.name}' lets nothing play before it: a copy without it, "
+            f"The modifier '{barrier.name}' of ground '{ground.name}' keeps prints from playing: a copy without it, "
             f"'{ground.name} Trail', takes the prints.",
             f"To have them on '{ground.name}' itself, clear the bake and apply it.",
         )

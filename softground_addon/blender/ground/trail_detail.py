@@ -75,8 +75,8 @@ def draft(ground: bpy.types.Object, surface: Surface, refinement: Refinement) ->
     """
     if not may_hide(ground):
         raise InputError(
-            f"Ground '{ground.name}' is hidden and shown by keys or drivers, and would come to light beside the finer "
-            "copy that takes the prints: take them off, or Subdivide the ground so that it needs no copy."
+            f"Ground '{ground.name}' is hidden and shown by keys or drivers, and would show up beside the finer "
+            "copy that takes the prints: remove them, or Subdivide the ground so that it needs no copy."
         )
     with ground_mesh.undisturbed_copy(ground) as source:
         groups = [group.name for group in ground.vertex_groups]

@@ -38,7 +38,7 @@ def read_body(path: Path, up: str | None = None) -> CapturedBody:
     suffix = path.suffix.lower()
     if suffix not in (*MARKERS, ".npz"):
         raise InputError(
-            f'"{path.name}" is no motion capture that SoftGround reads: choose a .c3d, .trc or AMASS .npz file'
+            f'"{path.name}" is not motion capture that SoftGround can read: choose a .c3d, .trc or AMASS .npz file'
         )
     try:
         content = files.read_regular(path, LARGEST)

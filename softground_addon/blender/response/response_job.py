@@ -108,7 +108,7 @@ def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeS
     if not why:
         return wanted, []
     said = Finding(
-        "feet_not_sunk", "note", f"Feet were not let down into their prints. {why}", "Or leave Sink Feet off."
+        "feet_not_sunk", "note", f"Feet were not lowered into their prints. {why}", "Or leave Sink Feet off."
     )
     return replace(wanted, response=None), [said]
 
@@ -369,8 +369,8 @@ def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             "step_out_of_reach",
             "warning",
             f"The leg of '{character.motion.name}' cannot follow step '{short.step}' to where it was moved: the foot "
-            f"goes {short.part:.0%} of the way, and its print lies apart from it.",
-            "Move the step less, or move the hips nearer by keys.",
+            f"goes {short.part:.0%} of the way, so it does not stand in its print.",
+            "Move the step less, or key the hips closer to it.",
         )
         for character in responses
         for short in character.out_of_reach
