@@ -130,11 +130,33 @@ def test_the_panel_says_why_the_bake_and_the_scene_differ(scene, walker):
     assert not _apart_from_scene(scene)
 
 
-def test_a_pose_of_one_frame_is_held_and_prints_both_feet(scene, walker):
+def posed(walker, frame):
     walker.animation_data_clear()
     for bone in walker.pose.bones:
         bone.matrix_basis.identity()
-        bone.keyframe_insert("location", frame=1)
+        bone.keyframe_insert("location", frame=frame)
+
+
+def as_strip(_scene, walker):
+    data = walker.animation_data
+    data.nla_tracks.new().strips.new("Pose", 1, data.action)
+    data.action = None
+
+
+def slowed_down(scene, _walker):
+    scene.render.frame_map_old, scene.render.frame_map_new = 50, 100
+
+
+@pytest.mark.parametrize("change", [as_strip, slowed_down])
+def test_a_pose_of_one_frame_is_held_as_a_strip_and_between_frames(scene, walker, change):
+    posed(walker, 11)
+    change(scene, walker)
+    bpy.ops.softground.add_character()
+    assert scene.softground.frame_end - scene.softground.frame_start >= scene.render.fps
+
+
+def test_a_pose_of_one_frame_is_held_and_prints_both_feet(scene, walker):
+    posed(walker, 1)
     scene.frame_start = scene.frame_end = 1
     assert frames(scene, walker) == (1, 1)
     bpy.ops.softground.add_character()

@@ -306,6 +306,17 @@ def test_the_final_mesh_stands_under_the_weather_of_the_last_frame(opened):
     assert contents(plain) == contents(without)
 
 
+def test_the_final_mesh_of_a_slowed_down_scene_stands_under_the_weather_of_its_last_frame(opened):
+    scene = opened()
+    bpy.ops.softground.clear_bake()
+    scene.render.frame_map_old, scene.render.frame_map_new, scene.frame_end = 100, 200, 100
+    bpy.ops.softground.bake()
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    wanted = positions(scene, 100)
+    still = exports.final_mesh(scene, scene.softground.ground).data
+    assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
+
+
 def test_alembic_carries_the_weather(opened, tmp_path):
     scene = opened()
     bpy.ops.softground.add_weather(preset="SNOWFALL")

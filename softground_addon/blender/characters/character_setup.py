@@ -98,12 +98,17 @@ def _shortest_sole(scene: bpy.types.Scene, armature: bpy.types.Object, recognise
 
 
 def _frames_of_scene(scene: bpy.types.Scene, frames: tuple[int, int] | None) -> tuple[int, int]:
-    """The scene's frames at which an animation plays; all of them without one. A pose of one frame is held."""
+    """The scene's frames at which an animation plays; all of them without one.
+
+    A pose of one frame is held: its own, or that of an NLA strip, which lasts a frame at least.
+    """
     if not frames:
         return scene.frame_start, scene.frame_end
     stretch = time_stretch_of(scene)
     first, last = floor(frames[0] / stretch), ceil(frames[1] / stretch)
-    return first, last if last > first else first + ceil(POSE_TIME * scene.render.fps / scene.render.fps_base)
+    if frames[1] - frames[0] <= 1:
+        last = first + ceil(POSE_TIME * scene.render.fps / scene.render.fps_base)
+    return first, last
 
 
 POSE_TIME = 1.0

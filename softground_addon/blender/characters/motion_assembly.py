@@ -157,7 +157,7 @@ def _limb_motions(
 
 
 def _at_its_skin(motion: SoleMotion, low: Array | None) -> SoleMotion:
-    """A limb as high as its lowest skin (F,) [m] while that bears: skin bends where limbs join, and this does not."""
+    """A limb raised to its lowest skin (F,) [m] while that bears: skin bends where limbs join, rigid limbs do not."""
     bears = motion.bears
     if low is None or bears is None or not bears.any():
         return motion

@@ -63,7 +63,7 @@ class CourseNodes:
         keyed, none = self._value(KEYED, 0.0), graph.number(0.0)
         self.acts = {name: said[name].at_least(0.0) + keyed for name in SUMMED}
         self.acts["Wind"] = self.acts["Wind"] if matter.blown else none
-        self.acts["Water Table"] = 100.0 * NO_WATER - said["Water Table"] if matter.soaking else none
+        self.acts["Water Table"] = (100.0 * NO_WATER - said["Water Table"]).at_least(0.0) if matter.soaking else none
         self.acts["Halo"] = said["Halo"] if matter.pales else none
         falling = [self.acts[name] for name in SUMMED if name != "Time Scale"]
         self.is_any = sum(falling[1:], falling[0]) * self.acts["Time Scale"]

@@ -34,7 +34,9 @@ def follow(display_mesh: bpy.types.Object) -> None:
     nodes = tree.nodes
     first = nodes[FIRST].outputs[0].default_value
     span = span_of(first, max([tree[LAST], *(curve.range()[1] for curve in keyed.values())]))
-    changed = _put(nodes[STEP].outputs[0], span.step) | _put(nodes[KEYED].outputs[0], len(keyed))
+    changed = _put(nodes[STEP].outputs[0], span.step)
+    if KEYED in nodes:  # weather of an earlier build always works all of it out
+        changed |= _put(nodes[KEYED].outputs[0], len(keyed))
     for name in SUMMED:
         curve = keyed.get(name)
         changed |= _put(nodes[switch_of(name)].inputs["Switch"], curve is not None)

@@ -51,13 +51,13 @@ def pressed_area(loads: Sequence[CharacterLoads]) -> float:
     return area
 
 
-def bake_time(loads: Sequence[CharacterLoads], cell_size: float) -> float:
+def bake_time(loads: Sequence[CharacterLoads], cell_size: float, *, writes: bool = True) -> float:
     """What a bake with cells of that size [m] takes [s], within a factor of two on a machine of 2026."""
     held = 0.0
     for character in loads:
         areas = [sole.sole.area for sole in character.motion.soles]
         held += float(character.contacts.touching.sum(axis=0) @ areas) * character.motion.time_step
-    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2
+    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2 if writes else 0.0
     return (pressed_area(loads) * writing + held * SECONDS_PER_CELL_HELD) / cell_size**2
 
 
@@ -67,7 +67,12 @@ def bake_memory(loads: Sequence[CharacterLoads], cell_size: float) -> float:
 
 
 def check_cell_size(
-    loads: Sequence[CharacterLoads], cell_size: float, longest: float, available: float | None = None
+    loads: Sequence[CharacterLoads],
+    cell_size: float,
+    longest: float,
+    available: float | None = None,
+    *,
+    writes: bool = True,
 ) -> None:
     """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
@@ -80,6 +85,8 @@ def check_cell_size(
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
+    writes : bool
+        Whether a playback is written, and not the ground alone pressed.
     """
     for character in loads:
         length = max(sole.sole.length for sole in character.motion.soles)
@@ -90,18 +97,27 @@ def check_cell_size(
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
-    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size)
+    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size, writes=writes)
     too_much = _too_much(needed, time, longest, available)
     if not too_much:
         return
-    names, fits = ", ".join(f"'{character.motion.name}'" for character in loads), cell_size
-    while _too_much(bake_memory(loads, fits), bake_time(loads, fits), longest, available):
-        fits *= 1.05
-    fits *= 1.05  # it is rounded
+    sizes = cell_size * 1.05 ** np.arange(300)
+    fits = [
+        size
+        for size in sizes[sizes < _shortest_of_largest(loads)]
+        if not _too_much(bake_memory(loads, size), bake_time(loads, size, writes=writes), longest, available)
+    ]
+    remedy = f"set a cell size of at least {1.05 * fits[0] * 1e3:.2g} mm, or " if fits else ""  # it is rounded
+    names = ", ".join(f"'{character.motion.name}'" for character in loads)
     raise InputError(
         f"Cells of {cell_size * 1e3:g} mm would take about {_amount(needed, time)} for the steps of {names}, and "
-        f"{too_much}: set a cell size of at least {fits * 1e3:.2g} mm, or bake fewer frames."
+        f"{too_much}: {remedy}bake fewer frames."
     )
+
+
+def _shortest_of_largest(loads: Sequence[CharacterLoads]) -> float:
+    """Length of the longest sole of the smallest character: cells are to be smaller [m]."""
+    return min(max(sole.sole.length for sole in character.motion.soles) for character in loads)
 
 
 def check_frames(first: int, last: int, characters: int, longest: float, available: float | None = None) -> None:

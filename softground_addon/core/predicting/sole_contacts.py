@@ -38,8 +38,8 @@ KNOTS = 128
 """Number of those sinkages: up to more than the length of the sole."""
 MOST_STEPS = 320
 """Steps that a longer contact is followed in: 2.7 s, at the usual 120 a second."""
-STEPS_AT_ONCE = 32
-"""Steps at which it is looked at together what a sole covers."""
+SQUARES_AT_ONCE = 24_000
+"""Squares, summed over steps, for which it is looked at together what a sole covers."""
 COARSE = 1 / 20
 """Side of the parts of a sole that the pressure is fitted to, in sole lengths."""
 SQUARES_IN_ALL = 16_000_000
@@ -107,8 +107,8 @@ class SoleContact:
 def square_sizes(loads: Sequence[CharacterLoads], cell_size: float) -> list[float]:
     """Side of the squares in which the ground under each character is looked at [m].
 
-    They are the cells of a bake, or the parts that it divides them in to resolve a sole; a few cells each where they
-    would be too many, as long as a sole is resolved.
+    They are the cells of a bake, or the parts that it divides them in to resolve a sole, of which then cells are made
+    up; a few cells each where they would be too many, as long as a sole is resolved.
     """
     sizes, counts = [], []
     for character in loads:
@@ -182,8 +182,9 @@ def _sole_contact(
     softness = factors.softness[window.cells_under(*places(points, poses), cells.cell_size)] if factors else None
     yield
     surface = squares.surface(contact_window(points, poses, squares.cell_size))
+    parts = max(1, round(cells.cell_size / squares.cell_size))
     numbers, centres, clearance, covered = yield from _over_squares(
-        sole.sole, poses, surface, contact.lowest, points.tolerance
+        sole.sole, poses, surface, contact.lowest, points.tolerance, parts
     )
     under = window.cells_under(centres[:, 0], centres[:, 1], cells.cell_size)
     landing = sole.transforms[max(0, steps.start - 2) : steps.start + 1]
@@ -261,16 +262,17 @@ def _area_by_sinkage(clearance: Array, area: Array) -> Single:
 
 
 def _over_squares(
-    sole: Sole, poses: Array, ground: Surface, lowest: Array, tolerance: float
+    sole: Sole, poses: Array, ground: Surface, lowest: Array, tolerance: float, parts: int
 ) -> Slices[tuple[NDArray[np.int64], Array, Single, Single]]:
-    """See `squares`, `centres`, `clearance` and `covered` of `SoleContact`.
+    """See `squares`, `centres`, `clearance` and `covered` of `SoleContact`, of so many cells of a surface along a side.
 
     Where patches overlap, that counts of which more is covered and which is the closer.
     """
     stretches = []
     used = np.zeros(ground.window.cells, bool)
-    for first in range(0, len(poses), STEPS_AT_ONCE):
-        steps = slice(first, first + STEPS_AT_ONCE)
+    at_once = max(1, SQUARES_AT_ONCE // ground.window.cells)
+    for first in range(0, len(poses), at_once):
+        steps = slice(first, first + at_once)
         for near, clearance, covered in patches_over_cells(
             sole, poses[steps], ground, lowest=lowest[steps], tolerance=tolerance
         ):
@@ -287,6 +289,23 @@ def _over_squares(
         closer = covered * (1.0 + np.maximum(further, 0.0)) > before * (1.0 + np.maximum(clearance, 0.0))
         over[at], share[at] = np.where(closer, clearance, further), np.where(closer, covered, before)
     row, column = np.divmod(np.flatnonzero(used), ground.window.columns)
-    row, column = row + ground.window.row, column + ground.window.column
-    centres = (np.stack([column, row], axis=1) + 0.5) * ground.cell_size
+    row, column = (row + ground.window.row) // parts, (column + ground.window.column) // parts
+    if parts > 1:
+        row, column, over, share = _of_whole_cells(row, column, over, share, parts)
+    centres = (np.stack([column, row], axis=1) + 0.5) * ground.cell_size * parts
     return (row + ACROSS // 2) * ACROSS + column + ACROSS // 2, centres, over, share
+
+
+def _of_whole_cells(
+    row: NDArray[np.intp], column: NDArray[np.intp], clearance: Single, covered: Single, parts: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Single, Single]:
+    """Mean clearance (N, C) and covered fraction of cells from those of their parts; (C,) their rows and columns."""
+    order = np.lexsort([column, row])
+    begins = np.diff(row[order], prepend=np.inf).astype(bool) | np.diff(column[order], prepend=np.inf).astype(bool)
+    first = np.flatnonzero(begins)
+    if not len(first):
+        return row, column, clearance, covered
+    covered, height = covered[:, order], clearance[:, order]
+    share = np.add.reduceat(covered, first, axis=1)
+    height = np.add.reduceat(covered * height, first, axis=1) / np.maximum(share, np.float32(1e-9))
+    return row[order][first], column[order][first], height, share / np.float32(parts**2)
