@@ -77,14 +77,14 @@ def test_the_rig_takes_prints_like_any_other(scene, tmp_path):
     ("name", "content", "words"),
     [
         ("walk.c3d", b"nothing", "not a C3D file"),
-        ("walk.fbx", b"nothing", "no motion capture that SoftGround reads"),
+        ("walk.fbx", b"nothing", "is not motion capture that SoftGround can read"),
         ("legless.trc", trc_file({"Head": np.zeros((30, 3))}), "no markers for"),
     ],
 )
 def test_what_cannot_be_read_changes_nothing(scene, tmp_path, name, content, words):
     (tmp_path / name).write_bytes(content)
     for path in (tmp_path / name, tmp_path / f"missing_{name}"):
-        with pytest.raises(RuntimeError, match=words if path.exists() else "cannot be read|no motion capture"):
+        with pytest.raises(RuntimeError, match=words if path.exists() else "cannot be read|is not motion capture"):
             bpy.ops.softground.import_capture(filepath=str(path))
     assert not bpy.data.objects
     assert not bpy.data.actions
