@@ -58,7 +58,7 @@ class LiveMode:
     def __init__(self, scene: bpy.types.Scene) -> None:
         wanted = settings_of(scene)
         known = analysis.read(scene)
-        check_cell_size(known.loads, wanted.cell_size_m, wanted.longest_bake_s, writes=False)
+        check_cell_size(known.loads, wanted.cell_size_m, wanted.longest_bake_s)
         if wanted.ground is None:
             assert known.shot.plan is not None
             with analysis.own_changes(scene):
@@ -172,7 +172,7 @@ class LiveMode:
         if known is None:
             raise InputError("The shot cannot be read any more.")
         try:
-            check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s, writes=False)
+            check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
         except InputError as error:  # what was pressed before is shown on
             self._refused = asked, str(error)
             return

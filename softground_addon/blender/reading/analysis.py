@@ -222,7 +222,7 @@ def match_depth(scene: bpy.types.Scene, depth: float) -> float:
         If there is none, or the shot cannot be read.
     """
     analysis, wanted = read(scene), settings.snapshot(scene)
-    check_cell_size(analysis.loads, wanted.cell_size_m, wanted.longest_bake_s, writes=False)
+    check_cell_size(analysis.loads, wanted.cell_size_m, wanted.longest_bake_s)
     aim = depth
     for _ in range(TRIALS):
         modulus = matching_modulus(analysis.contacts, wanted.material, aim, wanted.pressure)

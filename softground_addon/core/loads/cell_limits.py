@@ -51,13 +51,13 @@ def pressed_area(loads: Sequence[CharacterLoads]) -> float:
     return area
 
 
-def bake_time(loads: Sequence[CharacterLoads], cell_size: float, *, writes: bool = True) -> float:
+def bake_time(loads: Sequence[CharacterLoads], cell_size: float) -> float:
     """What a bake with cells of that size [m] takes [s], within a factor of two on a machine of 2026."""
     held = 0.0
     for character in loads:
         areas = [sole.sole.area for sole in character.motion.soles]
         held += float(character.contacts.touching.sum(axis=0) @ areas) * character.motion.time_step
-    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2 if writes else 0.0
+    writing = SECONDS_PER_CELL + SECONDS_OF_FINE_CELLS / cell_size**2
     return (pressed_area(loads) * writing + held * SECONDS_PER_CELL_HELD) / cell_size**2
 
 
@@ -67,12 +67,7 @@ def bake_memory(loads: Sequence[CharacterLoads], cell_size: float) -> float:
 
 
 def check_cell_size(
-    loads: Sequence[CharacterLoads],
-    cell_size: float,
-    longest: float,
-    available: float | None = None,
-    *,
-    writes: bool = True,
+    loads: Sequence[CharacterLoads], cell_size: float, longest: float, available: float | None = None
 ) -> None:
     """Raise InputError if the bake would not fit into memory or time, or a sole into a cell; names a size that works.
 
@@ -85,8 +80,6 @@ def check_cell_size(
         What the bake may take [s].
     available : float, optional
         Memory [bytes]; that of the machine by default, where the system tells it.
-    writes : bool
-        Whether a playback is written, and not the ground alone pressed.
     """
     for character in loads:
         length = max(sole.sole.length for sole in character.motion.soles)
@@ -97,7 +90,7 @@ def check_cell_size(
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
-    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size, writes=writes)
+    needed, time = bake_memory(loads, cell_size), bake_time(loads, cell_size)
     too_much = _too_much(needed, time, longest, available)
     if not too_much:
         return
@@ -105,7 +98,7 @@ def check_cell_size(
     fits = [
         size
         for size in sizes[sizes < _shortest_of_largest(loads)]
-        if not _too_much(bake_memory(loads, size), bake_time(loads, size, writes=writes), longest, available)
+        if not _too_much(bake_memory(loads, size), bake_time(loads, size), longest, available)
     ]
     remedy = f"set a cell size of at least {1.05 * fits[0] * 1e3:.2g} mm, or " if fits else ""  # it is rounded
     names = ", ".join(f"'{character.motion.name}'" for character in loads)

@@ -70,14 +70,6 @@ def test_cells_that_take_too_long_are_refused_with_a_size_that_does_not(availabl
     check_cell_size([LOADS], 3e-4, took, available)
 
 
-def test_pressing_alone_takes_less_time_than_a_bake():
-    took, pressed = bake_time([LOADS], 1e-3), bake_time([LOADS], 1e-3, writes=False)
-    assert 0 < pressed < took
-    check_cell_size([LOADS], 1e-3, (pressed + took) / 2, 1e15, writes=False)
-    with pytest.raises(InputError):
-        check_cell_size([LOADS], 1e-3, (pressed + took) / 2, 1e15)
-
-
 def test_no_size_is_named_where_none_helps():
     with pytest.raises(InputError, match=r"are allowed .*: bake fewer frames\.$"):
         check_cell_size([LOADS], 1e-3, 1e-9, 1e15)
