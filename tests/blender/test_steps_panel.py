@@ -1,17 +1,22 @@
 """Single steps of a bake on the ground: chosen, muted, changed and reset by operators, and listed in the panel."""
 
+import inspect
+import itertools
+import time
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from softground_addon.blender import session
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
-from softground_addon.blender.interface import baked_steps, steps_panel
+from softground_addon.blender.interface import baked_steps, step_dragging, steps_panel
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import fingerprints, shots
@@ -124,6 +129,45 @@ def test_several_steps_are_chosen_and_changed_together_in_what_was_changed(baked
     assert stored(baked) == before
 
 
+def choose(*steps):
+    """Select steps one after the other, as clicks in the list with Shift held do."""
+    session.choose_steps("")
+    for step in steps:
+        assert bpy.ops.softground.choose_step(step=step.name, extend=True) == {"FINISHED"}
+
+
+@pytest.mark.parametrize("copy_is_last", [True, False])
+def test_a_copy_that_is_deleted_leaves_the_others_selected(baked, copy_is_last):
+    step = baked_steps.of(baked)[2]
+    bpy.ops.softground.duplicate_step(step=step.name)
+    copy = baked_steps.active(baked)
+    choose(*((step, copy) if copy_is_last else (copy, step)))
+    bpy.ops.softground.reset_step()
+    assert [one.name for one in baked_steps.chosen(baked)] == [baked_steps.active(baked).name] == [step.name]
+    bpy.ops.softground.mute_step()
+    assert baked_ground.edits_of(baked.softground.ground) == {step.name: StepEdit(mute=True)}
+
+
+def test_nothing_selected_is_said_plainly(baked):
+    session.choose_steps("")
+    for operator in ("mute_step", "reset_step", "duplicate_step", "add_step"):
+        with pytest.raises(RuntimeError, match="Select a step first"):
+            getattr(bpy.ops.softground, operator)()
+
+
+def test_the_timeline_stays_while_a_step_is_taken_out_of_the_selection(baked):
+    one, two = baked_steps.of(baked)[:2]
+    choose(one, two)
+    baked.frame_set(22)
+    for step, left in ((two, [one.name]), (one, [])):
+        assert bpy.ops.softground.choose_step(step=step.name, extend=True) == {"FINISHED"}
+        assert ([step.name for step in baked_steps.chosen(baked)], baked.frame_current) == (left, 22)
+    choose(one)
+    assert baked.frame_current == one.frames[0]
+    assert bpy.ops.softground.choose_step(step="gone", extend=True) == {"CANCELLED"}
+    assert session.chosen_steps() == (one.name,)
+
+
 def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
     step = baked_steps.of(baked)[1]
     bpy.ops.softground.change_step(step=step.name, strength=1.3, move=(0.05, 0.07), turn=0.2)
@@ -166,6 +210,106 @@ def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
     assert len(rows) == min(len(steps), steps_panel.SHOWN)
     assert "muted" in rows[-1].kwargs["text"]
     assert f"{steps[-1].baked.peak_force_n:,.0f} N" in rows[-1].kwargs["text"]
+
+
+def reset_button(scene):
+    """Whether the panel's button that resets the selected steps is enabled, and its icon."""
+    rows, layout = [], MagicMock()
+    layout.row.side_effect = lambda **_: rows.append(MagicMock()) or rows[-1]
+    steps_panel.SOFTGROUND_PT_steps.draw(MagicMock(fields=lambda: layout), SimpleNamespace(scene=scene))
+    part = rows[1].row()  # below Earlier and Later
+    return part.enabled, part.operator.call_args.kwargs["icon"]
+
+
+def test_reset_is_enabled_while_any_selected_step_is_edited(baked):
+    one, two = baked_steps.of(baked)[:2]
+    choose(one, two)
+    assert not reset_button(baked)[0]
+    bpy.ops.softground.mute_step(step=one.name)
+    assert reset_button(baked) == (True, "LOOP_BACK")
+    bpy.ops.softground.duplicate_step(step=two.name)
+    copy = baked_steps.active(baked)
+    choose(copy, two)
+    assert reset_button(baked) == (True, "TRASH")
+
+
+class Drag:
+    """Drag in Viewport, but for what Blender makes of it, in a view from above where a pixel is a centimetre."""
+
+    HALF = 1000
+    """Half of the viewport's width and height [px]."""
+    vars().update(filter(lambda item: inspect.isfunction(item[1]), vars(step_dragging.SOFTGROUND_OT_drag_step).items()))
+
+    def __init__(self, scene):
+        self._drag, self.report, side = None, MagicMock(), 2 * self.HALF
+        step_dragging._shown.picking = True
+        view = SimpleNamespace(
+            is_perspective=False,
+            view_perspective="ORTHO",
+            perspective_matrix=Matrix.Diagonal((100.0 / self.HALF, 100.0 / self.HALF, -0.1, 1.0)),
+            view_matrix=Matrix.Translation((0.0, 0.0, -5.0)),
+        )
+        regions = [
+            SimpleNamespace(type=kind, x=x, y=0, width=width, height=side)
+            for kind, x, width in (("WINDOW", 0, side), ("UI", side - 200, 200))
+        ]
+        area = SimpleNamespace(regions=regions, spaces=SimpleNamespace(active=SimpleNamespace(region_3d=view)))
+        self.context = SimpleNamespace(scene=scene, area=area, workspace=MagicMock())
+
+    def mouse(self, place, kind="MOUSEMOVE", value="NOTHING", shift=False):
+        """The mouse at a place on the ground, (2,) [m]."""
+        x, y = (np.asarray(place)[:2] * 100 + self.HALF).astype(int).tolist()
+        return self.modal(self.context, SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=y, shift=shift))
+
+    def press(self, place, **keys):
+        self.mouse(place, "LEFTMOUSE", "PRESS", **keys)
+
+    def release(self, place, **keys):
+        return self.mouse(place, "LEFTMOUSE", "RELEASE", **keys)
+
+
+@pytest.fixture
+def drag(baked):
+    yield (hand := Drag(baked))
+    hand._leave(hand.context, set())
+    assert not hand.report.called
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(0.01, 5), (1.0, 1)])
+@pytest.mark.parametrize("count", [1, 3])
+def test_many_steps_are_pressed_again_when_they_are_dropped(baked, drag, monkeypatch, seconds, shown, count):
+    monkeypatch.setattr(time, "thread_time", itertools.count(0.0, seconds).__next__)
+    presses, show = [], StepPreview.show
+    monkeypatch.setattr(StepPreview, "show", lambda *arguments: presses.append(show(*arguments)))
+    steps = baked_steps.of(baked)[:count]
+    choose(*steps)
+    place = steps[0].outline().mean(axis=0)
+    drag.press(place)
+    for along in (1, 2, 3, 4, 5):
+        drag.mouse(place + np.array([0.1 * along, 0.0, 0.0]))
+    outlined = dict(step_dragging._shown.edits)
+    assert [edit.move_m for edit in outlined.values()] == [pytest.approx((0.5, 0.0), abs=1e-6)] * count
+    assert len(presses) == (shown if count > 1 else 5)
+    assert drag.release(place) == {"FINISHED"}
+    assert baked_ground.edits_of(baked.softground.ground) == outlined
+
+
+def test_a_box_may_end_over_the_sidebar(baked, drag):
+    steps = baked_steps.of(baked)
+    choose(steps[0])
+    drag.press((-9.0, -9.0))
+    for place in ((0.0, 0.0), (9.5, 9.9)):
+        drag.mouse(place)
+    drag.release((9.5, 9.9))
+    assert set(session.chosen_steps()) == {step.name for step in steps}
+
+
+def test_a_box_ends_at_the_edge_of_the_viewport(baked, drag):
+    drag.press((-9.0, -9.0))
+    drag.mouse((30.0, -30.0))
+    assert [tuple(corner) for corner in step_dragging._shown.box] == [(100, 100), (2 * Drag.HALF, 0)]
+    drag.release((30.0, -30.0))
+    assert not session.chosen_steps()
 
 
 def test_a_step_that_is_none_is_named(baked):

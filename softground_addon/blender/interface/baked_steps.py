@@ -133,8 +133,7 @@ def of(scene: bpy.types.Scene) -> Sequence[BakedStep]:
 
 def active(scene: bpy.types.Scene) -> BakedStep | None:
     """The step that is chosen; of several, the one that the panel shows."""
-    chosen = session.current().step
-    return next((step for step in of(scene) if step.name == chosen), None)
+    return next(iter(chosen(scene)), None)
 
 
 def chosen(scene: bpy.types.Scene) -> list[BakedStep]:

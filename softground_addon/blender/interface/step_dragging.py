@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,13 +32,15 @@ _HINT = (
     "Drag a print   ·   Shift Click: choose more   ·   Drag beside them: choose by a box   ·   Wheel: turn it   ·   "
     "Shift: move it finely   ·   Esc: leave it"
 )
+SLOW = 0.1
+"""Of several steps only the outlines follow the mouse, until they are dropped, once pressing them took longer [s]."""
 FINE = 0.1
 """How much slower a print follows the mouse while Shift is held."""
 
 
 @dataclass
 class _Drag:
-    """A step that is being dragged: those that go with it, the bake, what shows it, and where it is."""
+    """A step that is being dragged: those that go with it, the bake, what shows it, where it is, if that takes long."""
 
     step: BakedStep
     steps: Sequence[BakedStep]
@@ -45,6 +48,7 @@ class _Drag:
     preview: StepPreview
     mouse: Array
     edit: StepEdit
+    is_slow: bool = False
 
     def edits(self, edit: StepEdit) -> dict[str, StepEdit]:
         """Those of all steps that are dragged, where the one under the mouse has this, by their ids."""
@@ -109,7 +113,7 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
     def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type in ("ESC", "RIGHTMOUSE"):
             return self._leave(context, {"CANCELLED"})
-        region, view = _viewport(context, event)
+        region, view = _viewport(context, None if _shown.box else event)
         if self._drag is None:
             return self._pick(context, event, region, view)
         if event.type == "MOUSEMOVE" and region is not None:
@@ -124,9 +128,9 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
     def _pick(self, context: bpy.types.Context, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
         """Outline the print under the mouse, and take hold of it at a click."""
         scene = settings.scene_of(context)
-        step = _under(baked_steps.of(scene), region, view, event) if region is not None else None
         if _shown.box:
             return self._box(scene, event, region, view)
+        step = _under(baked_steps.of(scene), region, view, event) if region is not None else None
         if event.type == "MOUSEMOVE":
             name = step.name if step else ""
             if name != _shown.under:
@@ -153,10 +157,10 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
 
     def _box(self, scene: bpy.types.Scene, event: bpy.types.Event, region: Any, view: Any) -> set[str]:
         """Follow the mouse with a box, and choose the steps whose middles are in it as the button is let go."""
-        if region is not None:
-            _shown.box = [_shown.box[0], (event.mouse_x - region.x, event.mouse_y - region.y)]
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        _shown.box = [_shown.box[0], (min(max(x, 0), region.width), min(max(y, 0), region.height))]
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            inside = _within(_shown.box, baked_steps.of(scene), region, view) if region is not None else []
+            inside = _within(_shown.box, baked_steps.of(scene), region, view)
             names = [*(session.chosen_steps() if event.shift else ()), *inside]
             session.choose_steps(names[0] if names else "", names)
             _shown.box = ()
@@ -175,9 +179,11 @@ class SOFTGROUND_OT_drag_step(OnSteps, bpy.types.Operator):
     def _change(self, context: bpy.types.Context, edit: StepEdit) -> None:
         drag, scene = self._drag, settings.scene_of(context)
         if drag is not None and edit != drag.edit:
-            edits = drag.edits(edit)
-            drag.preview.show(changed(scene, [(step, edits[step.name]) for step in drag.steps]))
-            drag.edit, _shown.edits = edit, edits
+            drag.edit, _shown.edits = edit, (edits := drag.edits(edit))
+            if not drag.is_slow:
+                start = time.thread_time()  # whatever else the machine does
+                drag.preview.show(changed(scene, [(step, edits[step.name]) for step in drag.steps]))
+                drag.is_slow = len(drag.steps) > 1 and time.thread_time() - start > SLOW
             _redraw()
 
     def _drop(self, context: bpy.types.Context) -> set[str]:
@@ -205,10 +211,10 @@ def _redraw() -> None:
     session.redraw(region_type="WINDOW")
 
 
-def _viewport(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Any, Any]:
-    """The viewport's region under the mouse, and how it looks at the scene; None beside it."""
+def _viewport(context: bpy.types.Context, event: bpy.types.Event | None) -> tuple[Any, Any]:
+    """The viewport's region, and how it looks at the scene; None where the mouse of an event is over another region."""
     area: Any = context.area
-    for region in area.regions if area else ():
+    for region in area.regions if area and event else ():
         inside = 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
         if region.type != "WINDOW" and inside:
             return None, None

@@ -45,7 +45,9 @@ class OnStep(OnSteps):
     def chosen(self, scene: bpy.types.Scene) -> list[BakedStep]:
         """The steps that are meant, first the one that the panel shows."""
         if not self.step:
-            self.step = "\n".join(session.chosen_steps())
+            self.step = "\n".join(step.name for step in baked_steps.chosen(scene))
+        if not self.step:
+            raise InputError("Select a step first, in the list of steps.")
         steps = {step.name: step for step in baked_steps.of(scene)}
         for name in self.step.split("\n"):
             if name not in steps:
@@ -103,14 +105,16 @@ class SOFTGROUND_OT_choose_step(OnBake, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = settings.scene_of(context)
-        if self.extend:
-            toggle(self.step)
-        else:
-            session.choose_steps(self.step)
-        step = baked_steps.active(scene)
+        step = next((one for one in baked_steps.of(scene) if one.name == self.step), None)
         if step is None:
             return {"CANCELLED"}
-        scene.frame_set(step.frames[0])
+        if self.extend:
+            toggle(step.name)
+        else:
+            session.choose_steps(step.name)
+        if step.name in session.chosen_steps():
+            scene.frame_set(step.frames[0])
+        session.redraw()
         session.redraw(region_type="WINDOW")
         return {"FINISHED"}
 

@@ -34,25 +34,24 @@ class SOFTGROUND_PT_steps(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         layout.use_property_split = False
         scene = settings.scene_of(context)
-        steps, chosen = baked_steps.of(scene), baked_steps.active(scene)
-        several = baked_steps.chosen(scene)
-        _list(layout, steps, chosen, several)
-        if len(several) > 1:
-            layout.label(text=f"{len(several)} steps selected", translate=False)
+        steps, chosen = baked_steps.of(scene), baked_steps.chosen(scene)
+        _list(layout, steps, chosen)
+        if len(chosen) > 1:
+            layout.label(text=f"{len(chosen)} steps selected", translate=False)
         layout.operator("softground.drag_step", icon="VIEW_PAN")
-        if chosen is not None:
+        if chosen:
             _buttons(layout, chosen)
         if any(step.is_edited for step in steps):
             layout.operator("softground.reset_steps", icon="LOOP_BACK")
 
 
-def _list(layout: Any, steps: Any, chosen: BakedStep | None, several: list[BakedStep]) -> None:
-    """Some of the steps, those around the chosen one; with a way to those before and after."""
-    at = chosen.number - 1 if chosen else 0
+def _list(layout: Any, steps: Any, chosen: list[BakedStep]) -> None:
+    """Some of the steps, those around the first chosen one; with a way to those before and after."""
+    at = chosen[0].number - 1 if chosen else 0
     first = max(0, min(at - SHOWN // 2, len(steps) - SHOWN))
     box = layout.box().column(align=True)
     for step in steps[first : first + SHOWN]:
-        _row(box, step, is_chosen=step in several)
+        _row(box, step, is_chosen=step in chosen)
     row = layout.row(align=True)
     for text, icon, other in (("Earlier", "TRIA_LEFT", at - 1), ("Later", "TRIA_RIGHT", at + 1)):
         part = row.row(align=True)
@@ -75,15 +74,16 @@ def _row(layout: Any, step: BakedStep, *, is_chosen: bool) -> None:
     ).step = step.name
 
 
-def _buttons(layout: Any, chosen: BakedStep) -> None:
-    """What can be done to a step."""
+def _buttons(layout: Any, chosen: list[BakedStep]) -> None:
+    """What can be done to the chosen steps."""
     row = layout.row(align=True)
-    is_muted = chosen.edit.mute
+    is_muted = chosen[0].edit.mute
     row.operator("softground.mute_step", depress=is_muted, icon="HIDE_ON" if is_muted else "HIDE_OFF").step = ""
     row.operator("softground.change_step", text="Change...", icon="MODIFIER").step = ""
     part = row.row(align=True)
-    part.enabled = chosen.is_edited
-    part.operator("softground.reset_step", text="", icon="TRASH" if chosen.is_copy else "LOOP_BACK").step = ""
+    part.enabled = any(step.is_edited for step in chosen)
+    icon = "TRASH" if any(step.is_copy for step in chosen) else "LOOP_BACK"
+    part.operator("softground.reset_step", text="", icon=icon).step = ""
     row = layout.row(align=True)
     row.operator("softground.duplicate_step", icon="DUPLICATE").step = ""
     row.operator("softground.add_step", icon="CURSOR").step = ""
