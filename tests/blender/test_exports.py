@@ -14,6 +14,7 @@ from softground_addon.core.playback.ramps import TOLERANCE
 from softground_addon.core.record.pressed_ground import PressedGround
 from tests.blender import point_caches, shots
 from tests.blender.grounds import plane
+from tests.blender.images import read_image
 
 FRAMES = (10, 40)
 
@@ -217,15 +218,6 @@ def test_the_final_mesh_leaves_no_shape_keys_behind(scene, ground, tmp_path):
     exports.export_final(scene, ground, tmp_path / "ground.obj")
     exports.final_mesh(scene, ground)
     assert len(bpy.data.shape_keys) == keys
-
-
-def read_image(path):
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    values = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
-    image.pixels.foreach_get(values)
-    assert image.is_float
-    return values.reshape(image.size[1], image.size[0], 4)
 
 
 def test_images_hold_heights_and_masks_in_uv_space(scene, ground, tmp_path):

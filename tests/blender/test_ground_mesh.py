@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Euler
 
+from softground_addon.blender import compat
 from softground_addon.blender.ground import created_ground, display_key, ground_checks, ground_mesh, still_ground
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from softground_addon.core.errors import InputError
@@ -205,3 +206,24 @@ def test_dense_grounds_keep_shape_keys_only_where_that_is_asked_for(scene, monke
     monkeypatch.setattr(display_key, "MOST_VERTICES", 10 if dense else 10**9)
     bpy.ops.softground.bake()
     assert (options.ground.data.shape_keys is not None) == (wanted and (too or not dense))
+
+
+@pytest.mark.parametrize("stretch", [50, 100, 200])
+def test_a_modifier_that_changes_is_read_at_the_first_frame_of_the_scenes_own_time(scene, stretch):
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, stretch
+    scene.softground.frame_start = 11
+    ground = grid(scene, spacing=0.5)
+    lift = ground.modifiers.new("Lift", "DISPLACE")
+    lift.direction, lift.mid_level = "Z", 0.0
+    for frame in (0, 100):
+        lift.strength = frame / 10
+        ground.keyframe_insert('modifiers["Lift"].strength', frame=frame)
+    for curve in compat.action_curves(ground.animation_data.action):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    scene.frame_set(11)
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices[0].co.z
+    assert shown == pytest.approx(1.1 * 100 / stretch, rel=1e-5)
+    scene.frame_set(40)
+    surface = ground_mesh.undisturbed_surface(ground, 1.0)
+    assert surface.vertices[:, 2] == pytest.approx(shown, rel=1e-5)

@@ -206,16 +206,21 @@ def placed_by_parents(obj: bpy.types.Object) -> Matrix | None:
 
 @contextmanager
 def stand_in(
-    ground: bpy.types.Object, mesh: bpy.types.Mesh | None = None, *, weather_at: int | None = None
+    ground: bpy.types.Object,
+    mesh: bpy.types.Mesh | None = None,
+    *,
+    weather_at: int | None = None,
+    with_users: bool = True,
 ) -> Iterator[bpy.types.Object]:
     """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
 
     Modifiers that change over time are evaluated at the first frame of the bake, or at one at which the copy is to be
-    under weather.
+    under weather. Those of the user may be left out.
     """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     for shown_in in ground.users_scene[:1]:
-        scene.frame_current = shown_in.softground.frame_start
+        scene.frame_current, there = shown_in.softground.frame_start, shown_in.render
+        scene.render.frame_map_old, scene.render.frame_map_new = there.frame_map_old, there.frame_map_new
     if weather_at is not None:
         scene.frame_current = weather_at
     copy = ground.copy()
@@ -226,9 +231,10 @@ def stand_in(
         else:
             copy.data = mesh
             weather = weather_modifier.modifier_of(copy) if weather_at is None else None
-            for own in (playback.modifier_of(copy), weather):
-                if own:
-                    copy.modifiers.remove(own)
+            users = [] if with_users else users_modifiers(copy)
+            for unwanted in (playback.modifier_of(copy), weather, *users):
+                if unwanted:
+                    copy.modifiers.remove(unwanted)
         scene.collection.objects.link(copy)
         layer = scene.view_layers[0]
         layer.update()

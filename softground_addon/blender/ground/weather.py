@@ -100,33 +100,39 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     footprints, about = baked_ground.load(ground)
     try:
         inputs = about["inputs"]
-        material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
-        stretch, rate = float(inputs["time_stretch"]), float(inputs["frame_rate"])
+        known = of_bake(inputs)
+        stretch, rate = known["time_stretch"], float(inputs["frame_rate"])
         first, last = (float(frame) * stretch for frame in inputs["frames"])
-        surface = str(inputs["surface"])
-        cell_size, unit_scale = float(inputs["cell_size_m"]), float(inputs["unit_scale_m"])
+        surface, unit_scale = str(inputs["surface"]), float(inputs["unit_scale_m"])
     except (KeyError, TypeError, ValueError, IndexError):
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
     up = ground_mesh.up_of(display_mesh, unit_scale)
-    places = _write(display_mesh, footprints, up, stretch, cell_size=cell_size, unit_scale=unit_scale, **material)
-    matter = matter_of(surface, material["layer_depth"], section_of(footprints))
+    places = _places(display_mesh, footprints, up, unit_scale, known)
+    mesh = ground_mesh.mesh_of(display_mesh)
+    store(mesh, places)
+    matter = matter_of(surface, known["layer_depth"], section_of(footprints))
     if matter.soaking is None:  # no water stands there
-        own_data.remove(ground_mesh.mesh_of(display_mesh), nodes.OF_HOLLOWS)
+        own_data.remove(mesh, nodes.OF_HOLLOWS)
     since = places.times[:, 1]
     span = weather_keys.span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
     nodes.build(tree, matter=matter, up=up.tolist(), span=span, soaking=soaking_shares(places))
     tree[weather_keys.LAST] = span.last
 
 
-def _write(
+def of_bake(inputs: Mapping[str, Any]) -> dict[str, float]:
+    """What `weather_places` takes of a bake's inputs."""
+    material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
+    return {"cell_size": float(inputs["cell_size_m"]), "time_stretch": float(inputs["time_stretch"]), **material}
+
+
+def _places(
     display_mesh: bpy.types.Object,
     footprints: list[Footprint],
     up: Array,
-    time_stretch: float,
-    *,
     unit_scale: float,
-    **of_bake: float,
+    known: Mapping[str, float],
 ) -> WeatherPlaces:
+    """What weather needs to know of the vertices."""
     mesh = ground_mesh.mesh_of(display_mesh)
     position = ground_mesh.undisturbed_surface(display_mesh, unit_scale).vertices
     rest = ground_mesh.rest_positions(mesh).astype(np.float64)
@@ -134,16 +140,17 @@ def _write(
     start, end, last = (_values(mesh, name) for name in (played.START, played.END, played.LAST_CONTACT))
     last[last >= NO_CONTACT] = -NO_CONTACT
     start[start <= -NO_CONTACT] = NO_CONTACT
-    places = weather_places(
-        footprints, position, relief, start, np.maximum(end, last), time_stretch=time_stretch, **of_bake
-    )
+    return weather_places(footprints, position, relief, start, np.maximum(end, last), **known)
+
+
+def store(mesh: bpy.types.Mesh, places: WeatherPlaces) -> None:
+    """Give a mesh what the node group reads, of its vertices."""
     halves = np.split(places.levels, 2, axis=1)
     vectors = (places.blur, places.trodden, places.times, places.pool, *halves)
     for name, values in zip(nodes.OF_WEATHER, vectors, strict=True):
         attribute = own_data.attribute(mesh, name, "FLOAT_VECTOR")
         attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
     mesh.update()
-    return places
 
 
 def _values(mesh: bpy.types.Mesh, name: str) -> Array:

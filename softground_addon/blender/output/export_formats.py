@@ -262,7 +262,7 @@ class SOFTGROUND_OT_export(OnBake, bpy.types.Operator):
             column.prop_search(self, "uv_map", settings.scene_of(context).softground.ground.data, "uv_layers")
             column = layout.column(align=True)
             column.active = False
-            for kind in (image_exports.DISPLACEMENT, image_exports.MASK):
+            for kind in image_exports.kinds_of(settings.scene_of(context).softground.ground):
                 column.label(text=f"…_{kind}_{self.frame_start:04d}.exr", translate=False)
         layout.prop(self, "outdated")
 

@@ -162,9 +162,8 @@ def final_mesh(scene: bpy.types.Scene, ground: bpy.types.Object) -> bpy.types.Ob
 
 
 def _last_frame(scene: bpy.types.Scene, ground: bpy.types.Object) -> int:
-    """Of the scene, or of the bake if that is later: of the animation, as a scene of its own shows it."""
-    inputs = baked_ground.load(ground)[1]["inputs"]
-    return math.ceil(max(scene.frame_end, inputs["frames"][1]) * inputs["time_stretch"])
+    """Of the scene, or of the bake if that is later."""
+    return math.ceil(max(scene.frame_end, baked_ground.load(ground)[1]["inputs"]["frames"][1]))
 
 
 def export_final(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path) -> None:

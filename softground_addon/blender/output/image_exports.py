@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,18 @@ from ...core.meshing.uv_raster import Pixels, rasterise
 from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint
+from ...core.relief.steps import water_at
 from ...core.relief_plan import relief_at
 from .. import settings
-from ..ground import baked_ground, ground_mesh, refined_mesh
+from ..ground import baked_ground, ground_mesh, refined_mesh, weathered_points
 from .exports import baked_display_mesh, written_by_blender
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-DISPLACEMENT, MASK = "displacement", "mask"
-"""Change of height [m] in all channels; and compression [m], rim [m], age [s] in red, green, blue."""
+DISPLACEMENT, MASK, WEATHER = "displacement", "mask", "weather"
+"""Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,
+wetness and fresh snow, 0 to 1, and depth of standing water [m]."""
 
 STRAY = 0.02
 """Pixels farther than this from any footprint's cells are left out of the look-up [m]."""
@@ -46,7 +48,9 @@ def export_images(
     uv_map: str = "",
     name: str = "",
 ) -> list[Path]:
-    """Write displacement and mask as OpenEXR sequences of 32-bit floats in the ground's UV space.
+    """Write displacement and masks as OpenEXR sequences of 32-bit floats in the ground's UV space.
+
+    Under weather that is shown, they are those of the weathered ground at each frame.
 
     Parameters
     ----------
@@ -54,7 +58,8 @@ def export_images(
     ground : bpy.types.Object
         Its own UV map is used, also where the detail along the trail carries the bake.
     folder : Path
-        Gets `<name>_displacement_<frame>.exr` and `<name>_mask_<frame>.exr`.
+        Gets `<name>_displacement_<frame>.exr` and `<name>_mask_<frame>.exr`, and under weather
+        `<name>_weather_<frame>.exr`.
     start, end : int
         First and last frame.
     resolution : int
@@ -69,30 +74,48 @@ def export_images(
     InputError
         If there is no bake, no such UV map, prints lie outside of its image, or the files cannot be written.
     """
-    baked_display_mesh(ground)
+    weathered = weathered_points.has_weather(baked_display_mesh(ground))
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
-    pixels = _pixels(scene, ground, footprints, STRAY + 4 * sigma, resolution, uv_map)
-    x, y = pixels.position.T
+    reach = STRAY + 4 * (float(np.hypot(sigma, weathered_points.BLUR)) if weathered else sigma)
+    pixels = _pixels(scene, ground, footprints, reach, resolution, uv_map)
+    # Last comes a place that no footprint reaches: as it is, so is all the ground around.
+    far = max(((one.window.column + one.window.columns) * one.cell_size for one in footprints), default=0.0)
+    position = np.append(pixels.position, [(far + 2 * reach, 0.0, 0.0)], axis=0)
+    x, y, _ = position.T
     relief = relief_at(footprints, x, y, about["inputs"], blur_sigma=sigma)
     over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
     if not folder.is_dir():
         raise InputError(f"There is no folder '{folder}': create it first, or choose another.")
     stem = name or bpy.path.clean_name(ground.name)
     paths = []
-    with _image(resolution) as image:
+    with ExitStack() as open_:
+        image, at = open_.enter_context(_image(resolution)), None
+        if weathered:
+            water = water_at(relief, len(x))
+            points = weathered_points.weathered_points(
+                ground, position, over_time, water, scene.unit_settings.scale_length
+            )
+            at = open_.enter_context(points)
         for frame in range(start, end + 1):
-            height, compression = over_time.movement.at(frame, len(pixels.index)).T
-            age = _age(over_time, frame, len(pixels.index), scene)
-            mask = np.stack([compression, np.maximum(height + compression, 0.0), age], axis=-1)
-            for kind, channels, empty in (
-                (DISPLACEMENT, np.repeat(height[:, None], 3, axis=1), (0.0, 0.0, 0.0)),
-                (MASK, mask, (0.0, 0.0, NEVER)),
-            ):
+            height, compression = over_time.movement.at(frame, len(x)).T
+            rim, age = np.maximum(height + compression, 0.0), _age(over_time, frame, len(x), scene)
+            kinds: dict[str, tuple[Array, ...]] = {}
+            if at is not None:
+                now = at(frame, height, compression, rim)
+                height, compression, rim = now.height, now.compression, now.rim
+                kinds = {WEATHER: (now.wetness, now.fresh, now.water)}
+            for kind, channels in {DISPLACEMENT: (height,) * 3, MASK: (compression, rim, age), **kinds}.items():
                 path = folder / f"{stem}_{kind}_{frame:04d}.exr"
-                _save(image, resolution, pixels.index, channels, empty, path)
+                _save(image, resolution, pixels.index, np.stack(channels, axis=-1), path)
                 paths.append(path)
     return paths
+
+
+def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:
+    """The kinds of images that are written of a ground."""
+    weathered = weathered_points.has_weather(baked_ground.display_mesh_of(ground))
+    return (DISPLACEMENT, MASK, WEATHER) if weathered else (DISPLACEMENT, MASK)
 
 
 def _age(over_time: VertexHistories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
@@ -121,7 +144,8 @@ def _pixels(
         surface = refined_mesh.surface_of(mesh, ground_mesh.to_world_of(ground, scene.unit_settings.scale_length))
         name, uv = layer.name, np.empty(len(mesh.loops) * 2, dtype=np.float32)
         layer.uv.foreach_get("vector", uv)
-    place = surface.vertices[surface.corner_vertex[surface.triangle_corners], :2]
+    corner = surface.vertices[surface.corner_vertex[surface.triangle_corners]]
+    place = corner[..., :2]
     near = _near_footprints(footprints, reach, place)
     corners = uv.reshape(-1, 2).astype(np.float64)[surface.triangle_corners[near]]
     if _leaves_image(footprints, corners, place[near], 0.5 / resolution):
@@ -129,7 +153,7 @@ def _pixels(
             f"Prints on ground '{ground.name}' would be missing, as UV map '{name}' has them outside of the image "
             "(0 to 1): choose a UV map that holds all of them, or unwrap another one."
         )
-    return rasterise(corners, place[near], resolution, resolution)
+    return rasterise(corners, corner[near], resolution, resolution)
 
 
 def _leaves_image(footprints: Sequence[Footprint], uv: Array, place: Array, slack: float) -> bool:
@@ -178,12 +202,11 @@ def _image(resolution: int) -> Iterator[Any]:
         bpy.data.images.remove(image)
 
 
-def _save(
-    image: Any, resolution: int, index: Indices, channels: Array, empty: tuple[float, float, float], path: Path
-) -> None:
+def _save(image: Any, resolution: int, index: Indices, channels: Array, path: Path) -> None:
+    """Write channels (N + 1, 3) of pixels (N,), the last for all others."""
     pixels = np.empty((resolution**2, 4), dtype=np.float32)
-    pixels[:, :3], pixels[:, 3] = empty, 1.0
-    pixels[index, :3] = channels
+    pixels[:, :3], pixels[:, 3] = channels[-1], 1.0
+    pixels[index, :3] = channels[:-1]
     image.pixels.foreach_set(pixels.ravel())
     with replacing(path) as partial:
         image.filepath_raw = str(partial)

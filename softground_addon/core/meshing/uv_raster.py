@@ -24,8 +24,8 @@ class Pixels:
     ----------
     index : (N,) int array
         row·width + column, rows from v = 0 up.
-    position : (N, 2) float array
-        World x and y of the pixels' centres [m].
+    position : (N, D) float array
+        World positions of the pixels' centres [m].
     """
 
     index: Indices
@@ -39,8 +39,8 @@ def rasterise(uv: Array, place: Array, width: int, height: int) -> Pixels:
     ----------
     uv : (T, 3, 2) float array
         UV coordinates of the triangles' corners; the image spans 0 to 1.
-    place : (T, 3, 2) float array
-        World x and y of the same corners [m].
+    place : (T, 3, D) float array
+        World positions of the same corners [m].
     width, height : int
         Size of the image.
     """
@@ -51,7 +51,7 @@ def rasterise(uv: Array, place: Array, width: int, height: int) -> Pixels:
     span = np.maximum(high - low, 0)
     counts = span.prod(axis=1)
     some = np.flatnonzero(counts)
-    index, position = [np.zeros(0, dtype=np.intp)], [np.zeros((0, 2))]
+    index, position = [np.zeros(0, dtype=np.intp)], [np.zeros((0, place.shape[-1]))]
     batch = np.cumsum(counts[some]) // PAIRS_AT_ONCE
     for number in np.unique(batch):
         chosen = some[batch == number]
