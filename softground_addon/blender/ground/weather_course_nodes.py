@@ -8,10 +8,11 @@ slider's value is that of the group's input, or of a curve if it is keyed, for e
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import sqrt
 from typing import Any
 
 from ...core.after import weather as w
-from ...core.after.weather import GAUSS, NO_WATER, PARTS, Span
+from ...core.after.weather import NO_WATER, PARTS, Span
 from ...core.after.weather_places import LEAST_RANGE
 from ..node_graph import NodeGraph, Number
 
@@ -23,6 +24,8 @@ FIRST, STEP = "First Frame", "Frames in a Part"
 """Nodes with the span."""
 KEYED = "Keyed Sliders"
 """Node with how many sliders are keyed: 0 is none."""
+GAUSS = ((0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18))
+"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a part."""
 ENDLESS = 1e9
 LOWEST = "lowest"
 

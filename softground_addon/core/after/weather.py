@@ -68,8 +68,6 @@ PARTS = 256
 """Of the time from the first frame of the weather to the last frame at which anything begins or changes."""
 NO_WATER = 1.0
 """Depth of a water table that no print reaches [m]."""
-GAUSS = ((0.5 - np.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + np.sqrt(0.15), 5 / 18))
-"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a part."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.intervals import close_short, hysteresis, runs
 from ..numerics.smoothing_spline import smooth_path
+from ..skin import bearing
 
 if TYPE_CHECKING:
     from ..ground.heightfield import Terrain
@@ -69,9 +70,6 @@ BESIDE = 0.33
 later it then may, in sqrt(leg length/gravity) (0.1 s)."""
 SWING = 2.0
 """Time in which a swinging foot has been at its fastest, in the same unit (0.6 s)."""
-HIGHEST_SEEN = 0.018
-"""A sole higher than this over the level on which its skin rests hangs in the air, in body heights
-(`skin.bearing.LEAVE`)."""
 SLOPE_PROBE = 0.02
 """Half the distance over which the ground's slope is read, in leg lengths."""
 
@@ -173,7 +171,7 @@ def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track
         return None
     normal = np.stack([track.normal for track in tracks], axis=1)
     clearance -= offset
-    aloft = clearance > HIGHEST_SEEN * motion.skin.height if motion.skin else None
+    aloft = clearance > bearing.LEAVE * motion.skin.height if motion.skin else None
     return Contacts(touching, np.full(len(tracks), offset), normal, clearance, aloft)
 
 

@@ -20,6 +20,7 @@ from ..numerics.packed import PackedArray
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief.steps import NOTHING, StepRelief
+from .blocks import ChangesInBlocks
 from .keyframe_tables import NO_CONTACT, KeyframeTables, keyframe_tables
 from .ramps import TOLERANCE
 from .vertex_histories import VertexHistories, vertex_histories
@@ -137,6 +138,7 @@ def playback_curves_at(
     }
     position, contact = PackedArray(nothing.reshape(0, 3)), PackedArray(nothing)
     parts = _parts(footprints, x, y)
+    in_blocks: dict[int, ChangesInBlocks] = {}
     for places, reliefs in zip(parts, _relief_of_parts(relief, parts, len(x)), strict=True):
         over_time = yield from vertex_histories.slices(
             footprints,
@@ -145,6 +147,7 @@ def playback_curves_at(
             blur_sigma=blur_sigma,
             tolerance=tolerance,
             relief=reliefs,
+            in_blocks=in_blocks,
         )
         yield
         spans, lines = curves(over_time.stretched(time_stretch), frame_rate * time_stretch)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..numerics.key_reduction import bend_lines
 
-Spans = TypeVar("Spans", bound=Any)
+Intervals = TypeVar("Intervals", bound=Any)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -32,7 +32,7 @@ REST = 12
 
 @dataclass(frozen=True)
 class Ramps:
-    """VertexHistories of points: value(t) = Σ change · clip((t - start) / (end - start), 0, 1).
+    """Histories of points: value(t) = Σ change · clip((t - start) / (end - start), 0, 1).
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Ramps:
         return values
 
 
-def joined(parts: Sequence[Spans]) -> Spans:
+def joined(parts: Sequence[Intervals]) -> Intervals:
     """What points have between a `start` and an `end`, of several sets of at least one, by point and time."""
     whole = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(parts[0])}
     order = np.lexsort((whole["start"], whole["point"]))
@@ -85,8 +85,8 @@ class Fit:
     error: Array
 
 
-def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
-    """Stand a few ramps in for vertex_histories that change now and then.
+def fit(frames: Array, histories: Array, tolerance: Array) -> Fit:
+    """Stand a few ramps in for histories that change now and then.
 
     Each movement begins as one straight line through its ends; where the values are farther from it than the tolerance,
     it is bent to them where they are farthest, and so on (`key_reduction`). All values of a point bend at the same
@@ -96,7 +96,7 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     ----------
     frames : (T,) float array
         Frame numbers, ascending.
-    vertex_histories : (T, K, C) float array
+    histories : (T, K, C) float array
         Values of K points, 0 at the first frame.
     tolerance : (C,) or (K, C) float array
         Largest error of each value while it moves.
@@ -113,8 +113,8 @@ def fit(frames: Array, vertex_histories: Array, tolerance: Array) -> Fit:
     >>> pressed.ramps.start, pressed.ramps.end, pressed.ramps.change
     (array([2.]), array([4.]), array([[-0.015625]]))
     """
-    count, points, channels = vertex_histories.shape
-    values = np.round(vertex_histories / QUANTUM) * QUANTUM
+    count, points, channels = histories.shape
+    values = np.round(histories / QUANTUM) * QUANTUM
     knot = _ends_of_movements(values)
     margin = np.broadcast_to(np.maximum(tolerance - QUANTUM, QUANTUM / 2), (points, channels))
     error = bend_lines(frames, values, knot, margin)

@@ -17,8 +17,9 @@ from ..ground.heightfield import Window
 from ..ground.places import Places, inside
 from ..numerics import bilinear
 from ..numerics.slices import Slices, sliced
-from ..record.footprints import QUANTUM, Footprint
+from ..record.footprints import Footprint
 from ..relief.steps import NOTHING, StepRelief
+from .blocks import BLOCK, ChangesInBlocks
 from .ramps import TOLERANCE, Ramps, fit, grown, joined
 
 Array = NDArray[np.float64]
@@ -26,9 +27,6 @@ Indices = NDArray[np.intp]
 
 SHADING_TOLERANCE = 1e-3
 """Largest error of the compression that materials read, while it grows [m]."""
-
-BLOCK = 64
-"""Cells along the sides of what is worked on at once: most footprints fit into one block."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +86,7 @@ def vertex_histories(
     blur_sigma: float,
     tolerance: float = TOLERANCE,
     relief: Sequence[StepRelief] = (),
+    in_blocks: dict[int, ChangesInBlocks] | None = None,
 ) -> Slices[VertexHistories]:
     """The record as it is seen from given places.
 
@@ -103,10 +102,17 @@ def vertex_histories(
         time, they share it.
     relief : sequence of StepRelief
         Of each footprint at these places, if there is relief: it grows with the movement that its step makes.
+    in_blocks : dict, optional
+        What one call keeps of the footprints near its places, by their numbers, for the next one at places beside them.
     """
+    in_blocks = {} if in_blocks is None else in_blocks
     places = Places(x, y)
     kernels = {size: gaussian_kernel(blur_sigma / size) for size in {footprint.cell_size for footprint in footprints}}
     near = _near(footprints, places, kernels)
+    for number in in_blocks.keys() - set(near):
+        del in_blocks[number]
+    for number in near:
+        in_blocks.setdefault(number, ChangesInBlocks(footprints[number]))
     footprints = [footprints[number] for number in near]
     reliefs = [relief[number] if relief else NOTHING for number in near]
     spans = np.array([_span(footprint) for footprint in footprints]).reshape(-1, 2)
@@ -117,7 +123,7 @@ def vertex_histories(
     for number, (footprint, its_relief) in enumerate(zip(footprints, reliefs, strict=True)):
         own: list[Ramps] = []
         together = np.flatnonzero((spans[:, 0] < spans[number, 1]) & (spans[number, 0] < spans[:, 1]))
-        for points, frames, moved in _movements(footprint, places, kernels[footprint.cell_size]):
+        for points, frames, moved in _movements(in_blocks[near[number]], places, kernels[footprint.cell_size]):
             shared = np.zeros(len(points))
             for other in together:
                 shared += inside(reach[other], footprints[other].cell_size, x[points], y[points])
@@ -166,7 +172,7 @@ def _span(footprint: Footprint) -> tuple[float, float]:
     return float(frames.min()) - footprint.frame_step, float(frames.max())
 
 
-def _movements(footprint: Footprint, places: Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
+def _movements(in_blocks: ChangesInBlocks, places: Places, kernel: Array) -> Iterator[tuple[Indices, Array, Array]]:
     """Displayed height and compression of the places that a footprint moves, block by block.
 
     Yields
@@ -177,12 +183,13 @@ def _movements(footprint: Footprint, places: Places, kernel: Array) -> Iterator[
     moved : (T, N, 2) float array
         Change of height, and compression, by this footprint alone [m]; 0 at the first frame.
     """
+    footprint = in_blocks.footprint
     for part in _blocks(footprint.window.expanded(_margin(kernel))):
         points = places.within(part, footprint.cell_size)
         if not len(points):
             continue
         block = places.window(points, footprint.cell_size)
-        frames, changes = _changes(footprint, block.expanded(_margin(kernel)))
+        frames, changes = in_blocks.within(block.expanded(_margin(kernel)))
         if not len(frames):
             continue
         blurred = blurred_inside(changes, kernel)
@@ -202,29 +209,6 @@ def _blocks(window: Window) -> Iterator[Window]:
                 min(BLOCK, window.columns - column),
                 min(BLOCK, window.rows - row),
             )
-
-
-def _changes(footprint: Footprint, window: Window) -> tuple[Array, Array]:
-    """Changes of compression and rim within a window, (T, 2, rows, columns) [m], at frames (T,) without gaps."""
-    own = footprint.window
-    when, where, amounts = [], [], []
-    for channel, changes in enumerate((footprint.compression, footprint.rim)):
-        row, column = np.divmod(changes.cells, own.columns)
-        row, column = row + own.row - window.row, column + own.column - window.column
-        within = (row >= 0) & (row < window.rows) & (column >= 0) & (column < window.columns)
-        when.append(np.repeat(changes.frames, np.diff(changes.first))[within])
-        where.append(((channel * window.rows + row) * window.columns + column)[within])
-        amounts.append(changes.amounts[within])
-    frame = np.concatenate(when)
-    if not len(frame):
-        return np.zeros(0), np.zeros((0, 2, window.rows, window.columns))
-    number = np.rint((frame - frame.min()) / footprint.frame_step).astype(np.intp)
-    count = int(number.max()) + 1
-    cell = number * (2 * window.cells) + np.concatenate(where)
-    heights = np.zeros(count * 2 * window.cells)
-    heights += np.bincount(cell, weights=np.concatenate(amounts) * QUANTUM, minlength=len(heights))
-    frames = frame.min() + np.arange(count) * footprint.frame_step
-    return frames, heights.reshape(count, 2, window.rows, window.columns)
 
 
 def _look_up(values: Array, window: Window, cell_size: float, places: Places, points: Indices) -> Array:

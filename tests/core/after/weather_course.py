@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softground_addon.core.after import weather as w
-from softground_addon.core.after.weather import GAUSS, NO_WATER, PARTS, Span
+from softground_addon.core.after.weather import NO_WATER, PARTS, Span
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,10 @@ def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -
     left = np.diff(lowest) * w.WATER_DENSITY
     settling = w.settling_rate(temperature) * time
     since = _to_now(settling)[1:]
-    depth = sum(weight * left / w.settled_density(since + (1.0 - at) * settling, density) for at, weight in GAUSS)
+    depth = sum(
+        weight / 2 * left / w.settled_density(since + (1.0 - at) / 2 * settling, density)
+        for at, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True)
+    )
     cover = _to_now(np.asarray(depth))
     thawed = (reserve - lowest) * w.WATER_DENSITY / w.SNOW.bulk_density
 
