@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from functools import partial
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from softground_addon.blender import compat
 from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_keys, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
+from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import matter_of
 from softground_addon.core.after.weather_places import WeatherPlaces, section_of
@@ -403,6 +405,15 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
         bpy.ops.softground.add_weather()
     assert weather_modifier.modifier_of(carrier(scene)) is None
     assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
+
+
+def test_the_panel_says_that_steps_do_not_feel_the_weather_where_there_is_some(opened):
+    opened()
+    panel = MagicMock()
+    for there in (False, True):
+        weather_panel.SOFTGROUND_PT_weather.draw(panel, bpy.context)
+        assert ("Steps do not feel the weather" in str(panel.mock_calls)) == there
+        bpy.ops.softground.add_weather()
 
 
 def test_it_plays_without_the_add_on(opened, tmp_path):
