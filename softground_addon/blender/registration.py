@@ -35,6 +35,7 @@ from .live import live
 from .output import add_weather, event_points, export_formats, force_curves, make_sound
 from .properties.material import look_followers
 from .properties.scene import depth_field
+from .reading import analysis
 
 _SETTINGS: tuple[tuple[Any, type], ...] = (
     (bpy.types.Scene, properties.SoftGroundSettings),
@@ -85,7 +86,7 @@ def register() -> None:
         for part in (handlers, overlay, step_dragging, menus, import_capture):
             part.register()
             undo.callback(part.unregister)
-        look_followers.append(look.follow)
+        look_followers.append(_follow_look)
         undo.callback(look_followers.clear)
         depth_field.update(get=prediction.shown_cm, set=prediction.type_cm)
         undo.callback(depth_field.clear)
@@ -95,6 +96,12 @@ def register() -> None:
         command = bpy.utils.register_cli_command("softground", cli.run_in_blender)
         undo.callback(bpy.utils.unregister_cli_command, command)
         _registered.enter_context(undo.pop_all())
+
+
+def _follow_look(scene: bpy.types.Scene) -> None:
+    """Show another look on a scene's ground: what was read of its shot still holds."""
+    with analysis.own_changes(scene):
+        look.follow(scene)
 
 
 def unregister() -> None:

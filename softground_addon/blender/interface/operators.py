@@ -217,9 +217,11 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
-        options = settings.scene_of(context).softground
+        scene = settings.scene_of(context)
+        options = scene.softground
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
-        mixed = look.apply(options.ground, options.material.surface)
+        with analysis.own_changes(scene):
+            mixed = look.apply(options.ground, options.material.surface)
         theirs = f" over {mixed} of your materials" if mixed else ""
         self.report(
             {"INFO"}, f"'{options.ground.name}' looks like {options.material.surface.replace('_', ' ')}{theirs}"
