@@ -123,9 +123,9 @@ def test_a_looped_walk_prints_to_the_end_of_the_scene(scene, walker):
 def test_the_panel_says_why_the_bake_and_the_scene_differ(scene, walker):
     assert not _apart_from_scene(scene)
     bpy.ops.softground.add_character()
-    assert _apart_from_scene(scene) == "The animation runs from 1 to 48, the scene from 0 to 200"
+    assert _apart_from_scene(scene) == "Animation 1-48, scene 0-200"
     scene.softground.frame_end = 100
-    assert _apart_from_scene(scene) == "The bake runs from 1 to 100, the scene from 0 to 200"
+    assert _apart_from_scene(scene) == "Bake 1-100, scene 0-200"
     scene.softground.frame_start, scene.softground.frame_end = 0, 200
     assert not _apart_from_scene(scene)
 

@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 from unittest.mock import MagicMock
 
+import blf
 import bpy
 import pytest
 
@@ -50,6 +51,21 @@ def test_everything_has_a_tooltip_and_search_finds_it(addon):
             nameless = setting.identifier in ("rna_type", "name") or setting.is_hidden
             if not nameless and setting.type not in ("POINTER", "COLLECTION"):
                 assert setting.description, f"{group.__name__}.{setting.identifier}"
+
+
+LABEL, CHECKBOX = 88, 112
+"""Widest names that are whole beside a field and beside a checkbox, in a sidebar as wide as Blender makes it [px]."""
+
+
+def test_names_are_whole_in_a_sidebar_of_blender_s_own_width(addon):
+    blf.size(0, 11.0)
+    for group in (cls for cls in registration.CLASSES if issubclass(cls, bpy.types.PropertyGroup)):
+        shown = {key: setting for key, setting in group.bl_rna.properties.items() if not setting.is_hidden}
+        for key, setting in shown.items():
+            in_field_units = any(other.startswith(f"{key}_") for other in shown)
+            if not in_field_units and key != "youngs_modulus":
+                room = CHECKBOX if setting.type == "BOOLEAN" else LABEL
+                assert blf.dimensions(0, setting.name)[0] <= room, setting.name
 
 
 def test_panels_come_in_the_order_of_work(addon):
@@ -153,6 +169,18 @@ def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding
         bpy.context.view_layer.update()
         assert analysis.known(shot).contacts is known.contacts
         assert analysis.expected_depth(shot) == expected
+
+
+def test_the_depth_to_expect_holds_on_through_another_look_of_a_baked_ground(shot):
+    bpy.ops.softground.predict_depth()
+    bpy.ops.softground.bake()
+    known, in_snow = analysis.known(shot), analysis.expected_depth(shot)
+    assert shot.softground.ground.data.shape_keys  # which Blender takes for edited with the mesh that has them
+    for change in (lambda: bpy.ops.softground.load_preset(name="Mud"), bpy.ops.softground.apply_look):
+        change()
+        bpy.context.view_layer.update()
+        assert analysis.known(shot).contacts is known.contacts
+    assert analysis.expected_depth(shot) < in_snow
 
 
 def test_the_depth_to_expect_holds_on_through_live_mode(shot):
@@ -295,6 +323,24 @@ def labels(draw, *arguments):
     layout = MagicMock()
     draw(layout, *arguments)
     return [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith("label")]
+
+
+def test_who_has_selected_nobody_is_offered_a_figure(scene):
+    def offered():
+        panel = MagicMock(layout=MagicMock())
+        panel.fields.return_value = panel.layout
+        panels.SOFTGROUND_PT_character.draw(panel, bpy.context)
+        buttons = [call.args[0] for call in panel.layout.mock_calls if call[0].endswith("operator")]
+        return "softground.add_sample_scene" in buttons
+
+    assert offered()
+    for add in (bpy.ops.object.camera_add, bpy.ops.mesh.primitive_cube_add):  # as in the file that Blender starts with
+        add()
+        assert offered()
+    bpy.context.object.keyframe_insert("location")
+    assert not offered()
+    bpy.ops.object.armature_add()
+    assert not offered()
 
 
 def test_a_ground_that_changes_over_time_is_told_of_before_any_bake(shot):

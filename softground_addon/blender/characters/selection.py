@@ -47,6 +47,16 @@ def chosen(
     return [], props
 
 
+def shows_nobody(selected: Sequence[bpy.types.Object]) -> bool:
+    """Whether what is selected says of no character whom to add: nothing, a camera, or Blender's first cube alone."""
+    if len(selected) != 1:
+        return not selected
+    obj = selected[0]
+    return obj.type not in ("ARMATURE", "EMPTY") and not (
+        obj.type == "MESH" and (obj.parent or obj.find_armature() or moves(obj))
+    )
+
+
 def moves(obj: bpy.types.Object) -> bool:
     """Whether keys, drivers, constraints, a parent or a simulation could move a mesh object."""
     return is_animated(obj) or is_simulated(obj)

@@ -9,6 +9,7 @@ import bpy
 
 from ...core.motion.motion import JOINTS
 from .. import session, settings
+from ..characters import selection
 from ..characters.import_fixes import scale_to_metres
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
@@ -16,6 +17,9 @@ from ..settings import is_prop, is_set_up
 from . import bake_result, outdated, prediction, preset_menu
 from .character_editing import active_character, active_sole, suggested_mass
 from .panel_base import ADVANCED, SidebarPanel
+
+_LARGE = 1.4
+"""Height of the buttons of the two clicks, and of the progress in the place of the second, in rows."""
 
 
 class SOFTGROUND_UL_characters(bpy.types.UIList):
@@ -64,12 +68,13 @@ class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
         layout = self.fields()
         options = settings.scene_of(context).softground
         if not options.characters:
-            if not context.selected_objects:
+            nobody = selection.shows_nobody(context.selected_objects)
+            if nobody:
                 layout.label(text="Select an animated character", icon="INFO")
             column = layout.column()
-            column.scale_y = 1.4
+            column.scale_y = _LARGE
             column.operator("softground.add_character", icon="ARMATURE_DATA")
-            if not context.selected_objects:
+            if nobody:
                 layout.operator("softground.add_sample_scene", icon="OUTLINER_OB_ARMATURE")
             return
         row = layout.row()
@@ -210,8 +215,8 @@ class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
             end.prop(joint, "end", text="")
 
 
-_END_WIDTH = 3.1
-"""Width of a bone's end, of which a few letters are enough, in units of the interface: the bone has the rest."""
+_END_WIDTH = 4.8
+"""Width of a bone's end, in units of the interface: the bone has the rest."""
 
 
 def _joint_label(joint: str) -> str:
@@ -234,7 +239,8 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
         row.operator("softground.create_ground", icon="MESH_GRID").use_selected = False
         row.operator("softground.use_as_ground", text="Use Selected", icon="EYEDROPPER")
         row = layout.row(align=True)
-        row.menu("SOFTGROUND_MT_presets", text=preset_menu.title_of_ground(scene) or "Presets", translate=False)
+        title, picture = preset_menu.title_of_ground(scene) or "Presets", preset_menu.picture_of_ground(scene)
+        row.menu("SOFTGROUND_MT_presets", text=title, icon_value=picture, translate=False)
         row.operator("softground.save_preset", text="", icon="ADD")
         row.operator("softground.remove_preset", text="", icon="REMOVE")
         predicted = prediction.of(scene)
@@ -248,6 +254,10 @@ class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
             row.operator("softground.predict_depth", text="", icon="FILE_REFRESH")
         if options.ground is not None:
             _changing_ground(layout, options)
+
+
+_REFUSAL_WIDTH = 40
+"""Letters in a line of what live mode does not do."""
 
 
 class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
@@ -265,7 +275,9 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
             outdated.watch(settings.scene_of(context))
         if state.is_baking:
             layout.enabled = True
-            layout.progress(factor=state.progress, text=state.status)
+            row = layout.row()
+            row.scale_y = _LARGE
+            row.progress(factor=state.progress, text=state.status)
             layout.operator("softground.cancel_bake", text="Cancel", icon="CANCEL")
         else:
             _bake_buttons(layout, options, state, is_outdated=bool(summary and state.stale))
@@ -274,11 +286,16 @@ class SOFTGROUND_PT_bake(SidebarPanel, bpy.types.Panel):
         row.enabled = not state.is_baking
         row.prop(options, "frame_start")
         row.prop(options, "frame_end")
-        if state.is_baking:
-            return
         row = layout.row(align=True)
+        row.enabled = not state.is_baking
         row.operator("softground.go_to_last_step", text="Last Step", icon="NEXT_KEYFRAME")
         row.operator("softground.clear_bake", icon="TRASH")
+        if state.is_baking:
+            return
+        for line in textwrap.wrap(live.refusal(), _REFUSAL_WIDTH):
+            row = layout.row()
+            row.alert = True
+            row.label(text=line, translate=False)
         if summary:
             bake_result.draw(layout, options, summary, active_character(settings.scene_of(context)))
             for reason in state.stale.splitlines():
@@ -293,7 +310,7 @@ def _bake_buttons(layout: Any, options: Any, state: Any, *, is_outdated: bool) -
     """The large button, with the feet beside it, and live mode below."""
     row = layout.split(factor=0.66, align=True)
     row.use_property_split = False
-    row.scale_y = 1.4
+    row.scale_y = _LARGE
     button = row.row(align=True)
     button.alert = is_outdated
     button.operator(f"softground.bake{'_again' if is_outdated else ''}", icon="MOD_DYNAMICPAINT")
@@ -307,12 +324,8 @@ def _apart_from_scene(scene: Any) -> str:
     start, end = options.frame_start, options.frame_end
     if not options.characters or (scene.frame_start >= start and end == scene.frame_end):
         return ""
-    whose = "The animation" if (start, end) == tuple(options.animated_frames) else "The bake"
-    return f"{whose} runs from {start} to {end}, the scene from {scene.frame_start} to {scene.frame_end}"
-
-
-_REFUSAL_WIDTH = 40
-"""Letters in a line of what live mode does not do."""
+    whose = "Animation" if (start, end) == tuple(options.animated_frames) else "Bake"
+    return f"{whose} {start}-{end}, scene {scene.frame_start}-{scene.frame_end}"
 
 
 def _live_buttons(layout: Any, state: Any) -> None:
@@ -325,10 +338,6 @@ def _live_buttons(layout: Any, state: Any) -> None:
     row.operator("softground.live", text="Discard", icon="X").keep = False
     row.alert = False
     row.operator("softground.live", text="Keep", icon="CHECKMARK").keep = True
-    refusal = layout.column(align=True)
-    refusal.alert = True
-    for line in textwrap.wrap(live.refusal(), _REFUSAL_WIDTH):
-        refusal.label(text=line, translate=False)
 
 
 class SOFTGROUND_PT_overlay(SidebarPanel, bpy.types.Panel):

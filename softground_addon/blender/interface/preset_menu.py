@@ -42,9 +42,19 @@ def title_of_ground(scene: bpy.types.Scene) -> str:
     return f"{name} (modified)" if preset and not settings.holds(scene, preset) else name
 
 
+def picture_of_ground(scene: bpy.types.Scene) -> int:
+    """The number of the picture of the preset that was loaded last; 0 where it has none."""
+    return next(filter(None, map(preset_icons.of, _files_of(scene.softground.material.preset))), 0)
+
+
+def _files_of(name: str) -> tuple[Path, Path]:
+    """Where a preset of that name is, if it comes with the add-on, and if it is the user's."""
+    return presets.FOLDER / _file_name(name), _file_for(name)
+
+
 def _last_read(name: str) -> presets.Preset | None:
     """The preset of that name; None where there is none any more."""
-    for path in (presets.FOLDER / _file_name(name), _file_for(name)):
+    for path in _files_of(name):
         with suppress(OSError, InputError):
             written = path.stat().st_mtime_ns
             if path not in _read or _read[path][0] != written:

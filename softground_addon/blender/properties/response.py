@@ -55,7 +55,7 @@ class SoftGroundGrounding(bpy.types.PropertyGroup):
     align: share(
         "Align Feet", "How much of the ground's slope the feet follow, as far as an ankle can bend", default=1.0
     )
-    lock: share("Reduce Foot Sliding", "How much of the animation's foot sliding is removed from standing feet")
+    lock: share("Reduce Sliding", "How much of the animation's foot sliding is removed from standing feet")
     knee_lift: share("Lift Knees", "Lift swinging feet higher; at 1, by as much as they had sunk", most=2.0)
     hold: share("Hold Feet", "Keep feet in deep ground longer, and let them catch up in the swing")
     crouch: share("Bend Knees", "Lower the hips in deep ground; at 1, by half the sinkage", most=2.0)

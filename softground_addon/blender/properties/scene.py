@@ -81,7 +81,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "cell_size", 0.01, "Cell Size (cm)", _CELL_SIZE, min=0.01, max=100.0, soft_min=0.2, soft_max=5.0, precision=2
     )
     longest_bake: FloatProperty(
-        name="Longest Bake (min)",
+        name="Time Limit (min)",
         description="A bake estimated to take longer than this is refused before it starts. Raise it to bake overnight",
         default=60.0,
         min=1.0,
@@ -95,7 +95,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         default=True,
     )
     dense_shape_keys: BoolProperty(
-        name="On Dense Grounds Too",
+        name="Dense Grounds Too",
         description="Keep shape keys on grounds of more than 250,000 vertices as well",
         default=False,
     )

@@ -141,7 +141,7 @@ def _too_much(needed: float, time: float, longest: float, available: float | Non
     if available is not None and needed > USABLE * available:
         return f"this machine has {available / 1e9:,.0f} GB"
     if time > longest:
-        return f"{_duration(longest)} are allowed (Longest Bake in Advanced > Mesh and Look, or --set longest_bake=N)"
+        return f"{_duration(longest)} are allowed (Time Limit in Advanced > Mesh and Look, or --set longest_bake=N)"
     return ""
 
 
