@@ -31,8 +31,9 @@ WORKER = os.environ.get("PYTEST_XDIST_WORKER", "alone")
 STORY_SECONDS = 1200
 """Longest story on a machine that does other things too; a quiet one takes a minute or two."""
 
-WINDOWS = {"pauses": (640, 480)}
-"""Width and height of the window of stories that do not want all of the screen [px]: a small one is drawn sooner."""
+WINDOWS = {"pauses": (640, 480), "first_minutes": (1100, 760)}
+"""Width and height of the window of stories that do not want all of the screen [px]: a small one is drawn sooner; that
+of the first minutes leaves 600 px to the sidebar."""
 
 PREFERENCES = """
 import bpy

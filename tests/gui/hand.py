@@ -87,8 +87,8 @@ class Hand:
         crop = []
         if of:
             region = self.region(of)
-            top = self.window.height - region.y - region.height
-            crop = ["-crop", f"{region.width}x{region.height}+{region.x}+{top}", "+repage"]
+            place = f"{region.width}x{region.height}+{region.x}+{region.y}"
+            crop = ["-gravity", "SouthWest", "-crop", place, "+repage"]
         folder = self.pictures / "docs" if in_docs else self.pictures
         folder.mkdir(exist_ok=True)
         subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=True)

@@ -29,7 +29,7 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.move(*hand.middle())  # the panels move to their places as events come
     hand.region().tag_redraw()
     yield 0.7
-    yield from hand.picture("panel_character", of="UI")
+    yield from hand.picture("panel_character", of="UI", in_docs=False)
 
     button = yield from hand.find_button("softground.bake")
     before = fingerprints.of_file()
@@ -53,8 +53,10 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield 0.5
     facts["prints"] = summary()
     facts["deepest vertex"] = deepest()
-    yield from hand.frame_all()
-    yield from hand.picture("panel_baked", in_docs=False)
+    yield from hand.move(*hand.middle())
+    yield from hand.look_at_walk()
+    yield 1.5  # panels glide to their places
+    yield from hand.picture("two_clicks")
 
     baked = fingerprints.of_file()
     yield from hand.move(*hand.middle())

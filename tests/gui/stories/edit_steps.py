@@ -108,11 +108,13 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["dragged together"] = [after[step.name][2] - before.get(step.name, [0, 0, 0])[2] for step in wanted]
 
 
-def show_alone(panel: type) -> None:
-    """Show a panel once more, open and beside the others: what a region has closed stays closed."""
-    kept = {name: getattr(panel, name) for name in ("bl_label", "bl_space_type", "bl_region_type", "bl_category")}
-    shown = {"bl_idname": "TEST_PT_alone", "bl_options": set(), "bl_parent_id": "", "draw": panel.draw}
-    bpy.utils.register_class(type("TEST_PT_alone", panel.__bases__, shown | kept))
+def show_alone(panel: type, tab: str = "") -> None:
+    """Show a panel once more, open and beside the others or in a tab: what a region has closed stays closed."""
+    parts = ("bl_label", "bl_space_type", "bl_region_type", "bl_category", "draw", "draw_header")
+    kept = {name: getattr(panel, name) for name in parts if hasattr(panel, name)}
+    shown = {"bl_idname": f"TEST_PT_alone_{tab.replace(' ', '_')}", "bl_options": set(), "bl_parent_id": ""}
+    shown |= kept | ({"bl_category": tab} if tab else {})
+    bpy.utils.register_class(type(shown["bl_idname"], panel.__bases__, shown))
 
 
 def module(name: str) -> Any:

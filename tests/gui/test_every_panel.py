@@ -1,0 +1,18 @@
+"""Pictures of the panels below Advanced, for the docs."""
+
+import pytest
+
+pytestmark = [pytest.mark.gui, pytest.mark.timeout(900)]
+
+
+@pytest.fixture
+def facts(tell):
+    return tell("every_panel")
+
+
+def test_each_panel_has_its_picture(facts):
+    assert len(facts["panels"]) == 11
+
+
+def test_nothing_goes_wrong_on_the_console(facts):
+    assert "softground_addon" not in facts["printed"]  # as in the lines of a traceback
