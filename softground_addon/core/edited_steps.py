@@ -13,12 +13,11 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from .edited_contacts import edited_contact
 from .errors import InputError
-from .ground.heightfield import HeightField, Terrain, Window
+from .ground.heightfield import HeightField, Window
 from .ground.soft_ground import SoftGround
-from .motion.motion import SolePatch
 from .numerics.cell_keys import ROW, Keys, among
-from .numerics.rigid import rotation, turn_between, unit
 from .pressing.contact_layout import ContactLayout
 from .pressing.ground_cells import Imprints, Timing, UndisturbedCells
 from .pressing.open_contact import OpenContact
@@ -27,7 +26,7 @@ from .pressing.sole_layout import SoleLayout
 from .pressing.sole_points import SolePoints, sole_points
 from .pressing.solver import GroundSolver
 from .record.contact_steps import PressingSole, Steps
-from .record.edits import UNCHANGED, StepEdit, edits_by_number
+from .record.edits import UNCHANGED, StepEdit, edits_by_number, feet
 from .record.footprints import QUANTUM, Footprint
 from .record.record import BakeRecord
 
@@ -83,7 +82,8 @@ class EditedSteps:
         undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
         self._solver = GroundSolver(ground, HeightField(cell_size), undisturbed)
         self._points: dict[int, SolePoints] = {}
-        self._soles: dict[tuple[int, float], PressingSole] = {}
+        self._feet = feet(footprints)
+        self._scaled: dict[tuple[int, float], PressingSole] = {}
         self._layouts: dict[Change, _Layout] = {}
         """Of the group that was pressed last: they take memory."""
         self._known: dict[frozenset[Change], _Group] = {}
@@ -279,10 +279,11 @@ class EditedSteps:
                 "baked by an earlier SoftGround, or by a mesh of too many vertices, and can only be muted: bake again, "
                 "or give the mesh fewer vertices."
             )
-        pressing = self._scaled(kept.pressing, edit.scale)
         steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
-        steps = scaled_steps(steps, edit.scale, footprint.position)
-        steps = placed(steps, edit, footprint.position, self._ground.terrain, _length(pressing))
+        other = kept.pressing if kept.pressing.sole.prop else self._feet.get(edit.sole, kept.pressing)
+        pressing, steps = edited_contact(kept.pressing, steps, other, edit, footprint.position, self._ground.terrain)
+        if pressing is not other:  # scaled, of which there is one
+            pressing = self._scaled.setdefault((id(other), edit.scale), pressing)
         sole, strength = pressing.sole, edit.strength
         layout: ContactLayout
         if sole.prop is not None:
@@ -295,14 +296,6 @@ class EditedSteps:
                 f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
             )
         return layout
-
-    def _scaled(self, pressing: PressingSole, scale: float) -> PressingSole:
-        if scale == 1.0:
-            return pressing
-        known = self._soles.get((id(pressing), scale))
-        if known is None:
-            known = self._soles[id(pressing), scale] = scaled_sole(pressing, scale)
-        return known
 
     def _points_of(self, pressing: PressingSole) -> SolePoints:
         if id(pressing) not in self._points:
@@ -326,90 +319,6 @@ class _Group:
     prints: dict[int, Footprint | None]
     changed: dict[int, Keys]
     window: Window
-
-
-def scaled_sole(pressing: PressingSole, scale: float) -> PressingSole:
-    """A sole so many times as large."""
-    sole, flat = pressing.sole, pressing.flat.copy()
-    flat[:, :3, 3] *= scale
-    patches = tuple(
-        SolePatch(one.heights * scale, one.signed_distance * scale, one.origin * scale, one.spacing * scale)
-        for one in sole.patches
-    )
-    prop = replace(sole.prop, vertices=sole.prop.vertices * scale) if sole.prop else None
-    larger = replace(sole, patches=patches, landmarks=sole.landmarks * scale, outline=sole.outline * scale, prop=prop)
-    return PressingSole(larger, flat)
-
-
-def scaled_steps(steps: Steps, scale: float, pivot: Array) -> Steps:
-    """The steps of a sole so many times as large about a place (3,), with the force that gives it the same pressure."""
-    if scale == 1.0:
-        return steps
-
-    def grown(poses: Array) -> Array:
-        poses = poses.copy()
-        poses[..., :3, 3] = pivot + scale * (poses[..., :3, 3] - pivot)
-        return poses
-
-    return replace(
-        steps,
-        poses=grown(steps.poses),
-        approach=grown(steps.approach),
-        forces=steps.forces * scale**2,
-        centres=pivot + scale * (steps.centres - pivot),
-    )
-
-
-def placed(steps: Steps, edit: StepEdit, pivot: Array, terrain: Terrain, length: float) -> Steps:
-    """The steps of a contact that was moved and turned, following the ground's height and slope.
-
-    Parameters
-    ----------
-    steps : Steps
-    edit : StepEdit
-    pivot : (3,) float array
-        Middle of the print on the undisturbed ground [m].
-    terrain : Terrain
-    length : float
-        Of the sole [m]: the ground's slope is that of a plane as long.
-    """
-    if edit.move_m == (0.0, 0.0) and edit.turn_deg == 0.0:
-        return steps
-    target = pivot + np.array([*edit.move_m, 0.0])
-    turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))
-    if edit.move_m != (0.0, 0.0):
-        (here, upright_here), (there, upright_there) = (_plane(terrain, place, length) for place in (pivot, target))
-        target[2] = pivot[2] + there - here
-        if (upright_here != upright_there).any():
-            turn = rotation(turn_between(upright_here, upright_there)) @ turn
-    shift = target - turn @ pivot
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = turn, shift
-    return replace(
-        steps,
-        poses=motion @ steps.poses,
-        approach=motion @ steps.approach,
-        forces=steps.forces @ turn.T,
-        normals=steps.normals @ turn.T,
-        centres=steps.centres @ turn.T + shift,
-    )
-
-
-def _plane(terrain: Terrain, place: Array, length: float) -> tuple[float, Array]:
-    """Height and unit normal of the ground around a place; level where there is none."""
-    half = length / 2
-    x = place[0] + np.array([0.0, half, -half, 0.0, 0.0])
-    y = place[1] + np.array([0.0, 0.0, 0.0, half, -half])
-    heights = terrain.heights(x, y)
-    if not np.isfinite(heights).all():
-        height = float(heights[0])
-        return (height if np.isfinite(height) else float(place[2])), np.array([0.0, 0.0, 1.0])
-    slope = np.array([heights[1] - heights[2], heights[3] - heights[4]]) / length
-    return float(heights[0]), unit(np.array([-slope[0], -slope[1], 1.0]))
-
-
-def _length(pressing: PressingSole) -> float:
-    return float(np.ptp(pressing.sole.outline, axis=0).max())
 
 
 @dataclass(frozen=True)

@@ -97,12 +97,23 @@ def test_an_edit_without_a_step_is_kept_and_named(shot):
     assert ground_mesh.is_baked(ground)
 
 
+def test_an_edit_whose_sole_is_not_in_the_bake_is_named(shot):
+    folder, plain = shot
+    name = plain["steps"][2]["id"]
+    assert bake(folder, {name: {"sole": "Fox/paw.L"}}) == 0
+    report = json.loads((folder / "report.json").read_text())
+    (finding,) = [finding for finding in report["self_check"] if finding["code"] == "edit_without_sole"]
+    assert f"'{name}'" in finding["message"]
+    assert "'Fox/paw.L'" in finding["message"]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("{", "are not valid JSON"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"depth": 1}}}', "unknown field 'depth'"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"strength": NaN}}}', "'strength' is nan"),
+        ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"sole": "paw"}}}', "'sole' is 'paw'"),
         ('{"schema_version": 9, "steps": {}}', "version 9"),
         ("[" * 100_000, "are not valid JSON"),
     ],

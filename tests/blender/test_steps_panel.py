@@ -197,6 +197,22 @@ def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     np.testing.assert_allclose(heights(ground, DISPLAY_KEY), shown, atol=1e-5)
 
 
+def test_a_step_takes_the_sole_of_another_foot(baked):
+    step = baked_steps.of(baked)[2]
+    ours = step.name.partition("@")[0]
+    other = ours[:-1] + "LR"[step.side == "L"]
+    before = step.outline()
+    with pytest.raises(RuntimeError, match=f"no sole 'Fox/paw.L': choose one of .*{ours}"):
+        bpy.ops.softground.change_step(step=step.name, sole="Fox/paw.L")
+    bpy.ops.softground.change_step(step=step.name, sole=other)
+    changed = baked_steps.of(baked)[2]
+    assert baked_ground.edits_of(baked.softground.ground) == {step.name: StepEdit(sole=other)}
+    np.testing.assert_allclose(changed.outline().mean(axis=0), before.mean(axis=0), atol=0.02)
+    assert np.abs(changed.outline()[:, None] - before).sum(axis=-1).min(axis=1).max() > 2e-3
+    bpy.ops.softground.reset_step(step=step.name)
+    np.testing.assert_array_equal(baked_steps.of(baked)[2].outline(), before)
+
+
 def test_the_panel_lists_the_steps_around_the_chosen_one(baked):
     steps = baked_steps.of(baked)
     assert [step.number for step in steps] == list(range(1, len(steps) + 1))

@@ -15,10 +15,10 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record import record
-from softground_addon.core.record.edits import StepEdit, step_id
+from softground_addon.core.record.edits import StepEdit, step_id, without_sole
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
-from tests.core.walkers import box_sole, pose, pressed, standing, walk
+from tests.core.walkers import FOOT_LENGTH, box_sole, foot_sole, pose, pressed, standing, walk
 
 SOIL = GroundMaterial(0.3e6, 0.35, 0.15)
 MATERIALS = {
@@ -164,6 +164,51 @@ def test_a_larger_step_covers_more_at_the_same_pressure(scale):
     np.testing.assert_allclose(after.position, before.position, atol=2e-3)
 
 
+def test_a_step_in_another_sole_is_pressed_as_a_simulation_of_that_sole():
+    place, heading, plate = np.array([0.5, 0.2, 0.0]), 0.4, box_sole(0.4, 0.15)
+    foot = standing(foot_sole("foot.L", "L"), place, 600.0, heading=heading)
+    other = standing(plate, (3.0, 0.0, 0.0), 600.0, name="giant")
+    left = BakeRecord(tuple(pressed([foot, other], SOIL, CELL)[1]), {})
+    middles = [(one.outline.min(axis=0) + one.outline.max(axis=0)) / 2 for one in (foot.motion.soles[0].sole, plate)]
+    there = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
+    _, (expected,) = pressed(standing(plate, there, 600.0, heading=heading), SOIL, CELL)
+    after = edited(left, {0: StepEdit(sole=f"giant/{plate.name}")}).pressed_again[0]
+    assert difference(recompose([expected]), recompose([after])) < 1e-6
+    assert after.area_m2 > 1.5 * left.footprints[0].area_m2
+
+
+def test_a_foot_of_the_same_shape_leaves_the_same_print():
+    twin = walk(steps=3, origin=(0.0, 2.0, 0.0), heading=0.7, name="twin")
+    one = walk(steps=3, origin=(0.0037, 0.0021, 0.0))  # nothing lies on the border of a cell
+    left = BakeRecord(tuple(pressed([one, twin], SOIL, CELL)[1]), {})
+    number = next(n for n, step in enumerate(left.footprints) if (step.character, step.sole) == ("walker", "foot.R"))
+    after = edited(left, {number: StepEdit(sole="twin/foot.R")}).pressed_again[number]
+    assert difference(recompose([after]), recompose([left.footprints[number]])) < 1e-5
+
+
+@pytest.mark.parametrize(("whole", "size"), [(True, 1.2), (False, 0.8)])
+def test_a_sole_in_one_piece_and_one_in_two_take_each_others_steps(whole, size):
+    plate = box_sole(size * FOOT_LENGTH, 0.08)
+    one, other = walk(steps=2), standing(plate, (0.0, 3.0, 0.0), 600.0, name="plate")
+    left = BakeRecord(tuple(pressed([one, other], SOIL, CELL)[1]), {})
+    number = next(n for n, step in enumerate(left.footprints) if (step.character == "walker") == whole)
+    before = left.footprints[number]
+    after = edited(left, {number: StepEdit(sole=f"plate/{plate.name}" if whole else "walker/foot.L")}).pressed_again[
+        number
+    ]
+    np.testing.assert_allclose(after.position[:2], before.position[:2], atol=0.03)
+    assert after.max_depth_m == pytest.approx(before.max_depth_m, rel=0.6)
+    assert after.area_m2 / before.area_m2 == pytest.approx(size**2 if whole else 1 / size**2, rel=0.5)
+
+
+def test_a_sole_that_is_not_in_the_bake_is_named_and_the_own_one_presses():
+    _, left = baked()
+    plain, away = (edited(left, {1: StepEdit(turn_deg=20.0, sole=sole)}) for sole in ("", "fox/paw.L"))
+    assert difference(recompose(away.edited), recompose(plain.edited)) == 0.0
+    assert without_sole(left.footprints, away.edits) == list(away.edits)
+    assert without_sole(left.footprints, plain.edits) == []
+
+
 def test_a_moved_step_follows_the_ground():
     terrain = Hill()
     loads = walk(steps=2)
@@ -197,6 +242,7 @@ CHANGES = st.builds(
     turn_deg=st.floats(-180.0, 180.0),
     scale=st.floats(0.5, 1.5),
     shift_frames=st.integers(-30, 30),
+    sole=st.sampled_from(["", "walker/foot.L", "walker/foot.R", "fox/paw.L"]),
 )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.findings import Finding
 from ...core.loads.estimate import CharacterLoads
-from ...core.record.edits import without_step
+from ...core.record.edits import without_sole, without_step
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.record.typical_depth import typical_of
@@ -50,7 +50,7 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
 
 def edit_findings(left: BakeRecord) -> list[Finding]:
     """Which of the artist's edits have lost their step."""
-    return [
+    steps = [
         Finding(
             "edit_without_step",
             "warning",
@@ -60,6 +60,17 @@ def edit_findings(left: BakeRecord) -> list[Finding]:
         )
         for name in without_step(left.footprints, left.edits)
     ]
+    soles = [
+        Finding(
+            "edit_without_sole",
+            "warning",
+            f"Step '{name}' is to be pressed by the sole '{left.edits[name].sole}', which no foot in this bake has: "
+            "its own sole pressed it.",
+            "It is kept for when that foot makes a step; choose another sole, or reset the step.",
+        )
+        for name in without_sole(left.footprints, left.edits)
+    ]
+    return steps + soles
 
 
 def summary(result: dict[str, Any]) -> dict[str, float]:

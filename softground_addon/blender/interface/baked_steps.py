@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.edited_contacts import swapped
 from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record
-from ...core.record.edits import UNCHANGED, StepEdit
+from ...core.record.contact_steps import PressingSole, Steps
+from ...core.record.edits import UNCHANGED, StepEdit, feet
 from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
@@ -32,9 +34,12 @@ class BakedStep(record.EditableStep):
     ----------
     number : int
         In the order of the bake, from 1; copies follow.
+    feet : mapping of str to PressingSole
+        Soles of the bake that may press it.
     """
 
     number: int
+    feet: Mapping[str, PressingSole]
 
     @property
     def is_edited(self) -> bool:
@@ -68,7 +73,7 @@ class BakedStep(record.EditableStep):
         edit = edit or self.edit
         turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))[:2, :2]
         middle = self.baked.position[:2]
-        outline = edit.scale * (self._baked_outline - middle) @ turn.T + middle + edit.move_m
+        outline = edit.scale * (self._outline_of(edit.sole) - middle) @ turn.T + middle + edit.move_m
         return np.column_stack([outline, np.full(len(outline), self.height)])
 
     def ahead(self) -> tuple[float, float]:
@@ -78,14 +83,34 @@ class BakedStep(record.EditableStep):
         x, y = np.array(self.edit.move_m) + APART * length * along
         return float(x), float(y)
 
+    @property
+    def has_foot(self) -> bool:
+        """Whether a foot made it, and neither a ball nor a wheel."""
+        made_by = self.baked.pressed_by
+        return made_by is not None and made_by.pressing.sole.prop is None
+
+    def _outline_of(self, sole: str) -> Array:
+        """Seen from above, in the place of the bake, (N, 2) [m]: of a foot a sole, of a prop what it touched."""
+        return self._sole_outline(sole) if self.has_foot else self._touched
+
+    def _sole_outline(self, sole: str) -> Array:
+        steps, own = self._at_peak
+        other = self.feet.get(sole, own)
+        pose = swapped(steps, own, other).poses[0, 0]
+        return np.asarray(other.sole.outline @ pose[:2, :2].T + pose[:2, 3])
+
     @cached_property
-    def _baked_outline(self) -> Array:
-        """Seen from above, as it was baked, (N, 2) [m]: of a foot its sole, of a prop what it touched."""
+    def _at_peak(self) -> tuple[Steps, PressingSole]:
+        """What its sole did where its force was largest."""
         made_by, step = self.baked.pressed_by, self.baked
-        if made_by is not None and made_by.pressing.sole.prop is None:
-            steps = made_by.steps(step.load_frames)
-            pose = steps.poses[int(step.load_n.argmax()), 0]
-            return np.asarray(made_by.pressing.sole.outline @ pose[:2, :2].T + pose[:2, 3])
+        assert made_by is not None
+        steps, peak = made_by.steps(step.load_frames), int(step.load_n.argmax())
+        at = slice(peak, peak + 1)
+        return replace(steps, poses=steps.poses[at], centres=steps.centres[at]), made_by.pressing
+
+    @cached_property
+    def _touched(self) -> Array:
+        step = self.baked
         row, column = np.divmod(step.contact_cells, step.window.columns)
         low = np.array([column.min(), row.min()]) + step.window[:2]
         high = np.array([column.max(), row.max()]) + step.window[:2] + 1
@@ -117,7 +142,10 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
         key = (baked_ground.display_mesh_of(ground).data.session_uid, bytes(stored[-record.TAIL :]))
         if key not in _known:
             left = record.load(bytes(stored))
-            steps = [BakedStep(**vars(step), number=number) for number, step in enumerate(left.steps, start=1)]
+            soles = feet(left.footprints)
+            steps = [
+                BakedStep(**vars(one), number=number, feet=soles) for number, one in enumerate(left.steps, start=1)
+            ]
             shown = ShownBake(steps, left.edited, baked_ground.baked_with(dict(left.about), "rim_reach"))
             _known.clear()
             _known[key] = shown

@@ -135,8 +135,14 @@ class SOFTGROUND_OT_mute_step(OnStep, bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _feet(_: object, context: bpy.types.Context, text: str) -> list[str]:
+    """Names of soles in the bake, as far as they contain a text."""
+    steps = baked_steps.of(settings.scene_of(context))
+    return sorted(name for name in (steps[0].feet if steps else ()) if text.lower() in name.lower())
+
+
 class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
-    """Make the print of this step deeper or shallower, move, turn or scale it, or press it earlier or later"""
+    """Change depth, place, angle, size, sole and time of this step"""
 
     bl_idname = "softground.change_step"
     bl_label = "Change Step"
@@ -168,6 +174,12 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
         min=SMALLEST,
         max=LARGEST,
     )
+    sole: StringProperty(
+        name="Sole",
+        description="Contact of this bake whose sole presses the step, such as a foot of another character; its own "
+        "where empty",
+        search=_feet,
+    )
     shift: IntProperty(
         name="Later", description="Number of frames by which the step is later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
     )
@@ -179,7 +191,7 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.strength, self.move, self.turn = edit.strength, edit.move_m, radians(edit.turn_deg)
-        self.scale, self.shift = edit.scale, edit.shift_frames
+        self.scale, self.shift, self.sole = edit.scale, edit.shift_frames, edit.sole
         return context.window_manager.invoke_props_dialog(self)
 
     @reports_errors
@@ -192,11 +204,23 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
             "turn_deg": settings.typed(degrees(self.turn)),
             "scale": settings.typed(self.scale),
             "shift_frames": self.shift,
+            "sole": self.sole,
         }
         # of several steps, only what was changed of the first
         new = {key: value for key, value in wanted.items() if value != getattr(steps[0].edit, key)}
+        if new.get("sole"):
+            _check_sole(steps, self.sole)
         show(scene, changed(scene, [(step, replace(step.edit, **new)) for step in steps]))
         return {"FINISHED"}
+
+
+def _check_sole(steps: Sequence[BakedStep], sole: str) -> None:
+    """Raise InputError where a sole cannot press some steps."""
+    if sole not in steps[0].feet:
+        raise InputError(f"The bake has no sole '{sole}': choose one of {', '.join(sorted(steps[0].feet)) or 'none'}.")
+    for step in steps:
+        if not step.has_foot:
+            raise InputError(f"No foot made step '{step.name}': change the sole of steps that feet made.")
 
 
 class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):

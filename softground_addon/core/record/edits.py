@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ..errors import InputError
+from .contact_steps import PressingSole
 from .footprints import Footprint
 
 SCHEMA_VERSION = 1
@@ -23,6 +24,8 @@ SMALLEST, LARGEST = 0.2, 5.0
 """Between what `StepEdit.scale` is."""
 LONGEST_SHIFT = 1000
 """Most frames of `StepEdit.shift_frames`, either way."""
+LONGEST_NAME = 200
+"""Most letters of `StepEdit.sole`."""
 MOST_COPIES = 999
 """Most copies of one step."""
 
@@ -45,6 +48,8 @@ class StepEdit:
         Size of its sole over that of the bake, at the same pressure.
     shift_frames : int
         How many frames later it presses.
+    sole : str
+        Character and contact whose sole presses it, such as `Fox/paw.L`; its own where empty, or not in the bake.
     """
 
     mute: bool = False
@@ -53,6 +58,7 @@ class StepEdit:
     turn_deg: float = 0.0
     scale: float = 1.0
     shift_frames: int = 0
+    sole: str = ""
 
 
 UNCHANGED = StepEdit()
@@ -67,7 +73,7 @@ def step_id(footprint: Footprint, copy: int = 0) -> str:
     or the range of frames change, and when keys move the ends of a contact by less than half of its length. A copy that
     the artist made of it goes with it, and its number follows: `Walker/foot.L@36.5+1`.
     """
-    return f"{_who(footprint)}@{_middle(footprint):.1f}" + (f"+{copy}" if copy else "")
+    return f"{sole_id(footprint)}@{_middle(footprint):.1f}" + (f"+{copy}" if copy else "")
 
 
 def with_edit(
@@ -121,6 +127,18 @@ def without_step(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit])
     return [name for name in edits if name not in used]
 
 
+def without_sole(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> list[str]:
+    """Ids of edits whose sole is that of no foot in the bake."""
+    known = {"", *feet(footprints)}
+    return [name for name, edit in edits.items() if edit.sole not in known]
+
+
+def feet(footprints: Sequence[Footprint]) -> dict[str, PressingSole]:
+    """Soles that may press the steps of other feet, by the names that `StepEdit.sole` calls them."""
+    made_by = {sole_id(footprint): footprint.pressed_by for footprint in footprints}
+    return {name: one.pressing for name, one in made_by.items() if one is not None and one.pressing.sole.prop is None}
+
+
 def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> dict[int, str]:
     """Ids of the edits that belong to steps, by number; of several for one step, the one nearest to its middle."""
     of_soles: dict[str, dict[int, dict[float, str]]] = {}
@@ -130,7 +148,7 @@ def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> di
     names = {}
     for number, footprint in enumerate(footprints) if edits else ():
         middle = _middle(footprint)
-        for copy, frames in of_soles.get(_who(footprint), {}).items():
+        for copy, frames in of_soles.get(sole_id(footprint), {}).items():
             meant = [f for f in frames if footprint.start_frame <= f <= footprint.end_frame or f == middle]
             if meant:
                 nearest = min(meant, key=lambda frame: abs(frame - middle))
@@ -141,7 +159,7 @@ def _names(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> di
 def _is_of(parts: tuple[str, float, int], footprint: Footprint, copy: int) -> bool:
     who, frame, number = parts
     during = footprint.start_frame <= frame <= footprint.end_frame or frame == _middle(footprint)
-    return (who, number) == (_who(footprint), copy) and during
+    return (who, number) == (sole_id(footprint), copy) and during
 
 
 def _parts(name: str) -> tuple[str, float, int]:
@@ -239,6 +257,10 @@ _VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
     "move_m": (_is_move, f"two numbers up to {FARTHEST:g} m, along x and y"),
     "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360"),
     "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}"),
+    "sole": (
+        lambda value: isinstance(value, str) and len(value) <= LONGEST_NAME and (value == "" or "/" in value),
+        "the character and contact of a step, such as 'Fox/paw.L'",
+    ),
     "shift_frames": (
         lambda value: _is_number(value, -LONGEST_SHIFT, LONGEST_SHIFT) and value == int(value),
         f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
@@ -252,10 +274,12 @@ _KINDS: dict[str, Callable[[Any], Any]] = {
     "turn_deg": float,
     "scale": float,
     "shift_frames": int,
+    "sole": str,
 }
 
 
-def _who(footprint: Footprint) -> str:
+def sole_id(footprint: Footprint) -> str:
+    """Character and contact that made a print, such as `Walker/foot.L`."""
     return f"{footprint.character}/{footprint.sole}"
 
 
