@@ -164,6 +164,7 @@ def result_of(path, report, status):
     return json.loads(report.read_text())
 
 
+@pytest.mark.slow
 def test_a_changed_library_bakes_the_shot_again(night, capfd):
     manifest = night(1)
 

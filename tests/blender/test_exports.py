@@ -15,6 +15,7 @@ from softground_addon.core.record.pressed_ground import PressedGround
 from tests.blender import point_caches, shots
 from tests.blender.grounds import plane
 from tests.blender.images import read_image
+from tests.tiers import slow_but_one
 
 FRAMES = (10, 40)
 
@@ -138,7 +139,7 @@ def write_and_read(kind, scene, ground, folder, start, end):
     return import_and_select(importer, folder / f"ground.{kind}", **options)
 
 
-@pytest.mark.parametrize("kind", ["abc", "usdc"])
+@pytest.mark.parametrize("kind", slow_but_one(["abc", "usdc"]))
 def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, ground, tmp_path, kind):
     display_mesh = baked_ground.display_mesh_of(ground)
     finer = display_mesh.modifiers.new("Finer", "SUBSURF")

@@ -19,6 +19,7 @@ from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import ground_mesh
 from softground_addon.core.files.files import remove_leftovers
 from tests.blender import command_line, shots
+from tests.tiers import slow_but_one
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and mounts")
 
@@ -222,7 +223,7 @@ def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
 NAMES = ['it\'s "two"\nlines  ❄', "%s{0}$HOME`x` #####", "-rf", "--save", "ä" * 70, ".dot"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", slow_but_one(NAMES))
 def test_a_hostile_file_name_is_only_a_name(shot, name, tmp_path, capfd):
     folder = tmp_path / name
     folder.mkdir()

@@ -201,6 +201,7 @@ def test_an_absurd_cell_size_is_refused_with_the_estimate(scene, capfd, monkeypa
 
 
 @pytest.mark.parametrize("memory", [None, 1e12])
+@pytest.mark.slow
 def test_an_absurd_cell_size_is_refused_on_a_machine_of_any_memory(scene, capfd, monkeypatch, memory):
     shots.walker(scene, frames=72)
     monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: memory)
@@ -282,7 +283,7 @@ def fifty(first, *marks):
 @pytest.mark.parametrize(
     "numbers",
     [
-        range(8),
+        range(4),
         fifty(0, pytest.mark.slow, pytest.mark.marathon),
         *(fifty(first, pytest.mark.marathon) for first in range(50, 500, 50)),
     ],

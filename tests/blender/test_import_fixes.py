@@ -76,6 +76,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     bpy.data.objects.remove(armature.parent)
 
 
+@pytest.mark.slow
 def test_a_walk_on_the_spot_travels_ahead_by_one_button(scene):
     armature = shots.walker(scene, frames=72)
     bpy.ops.softground.add_character()

@@ -13,6 +13,7 @@ from softground_addon.blender.interface import menus
 from softground_addon.blender.live import live
 from tests.blender import fingerprints
 from tests.blender.shots import walker
+from tests.tiers import slow_but_one
 
 LEVEL = 1e-9
 """How far the undisturbed ground may be from the plane that it was fitted to [m]."""
@@ -202,11 +203,11 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("change", slow_but_one(CHANGES))
 def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_shot, change):
     live_shot.frame_set(48)
     before = display_heights(live_shot)
-    change(live_shot.softground)
+    CHANGES[change](live_shot.softground)
     assert live.is_answering()
     answered(live_shot)
     shown = display_heights(live_shot)
@@ -217,6 +218,7 @@ def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_s
     assert baked_heights(live_shot) == pytest.approx(shown, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_cells_that_nobody_waits_for_are_refused_in_words_and_the_prints_stay(live_shot):
     live_shot.frame_set(48)
     shown, size = display_heights(live_shot), live_shot.softground.cell_size
@@ -233,6 +235,7 @@ def test_cells_that_nobody_waits_for_are_refused_in_words_and_the_prints_stay(li
     assert (display_heights(live_shot) == shown).all()
 
 
+@pytest.mark.slow
 def test_newest_steps_follow_a_slider_first_and_while_it_is_dragged(scene):
     """Each move of a drag shows at the feet; what lies further back follows when it rests."""
     walker(scene, frames=150)

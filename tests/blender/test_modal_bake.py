@@ -15,6 +15,7 @@ from softground_addon.core.errors import InputError
 from tests.blender import fingerprints
 from tests.blender.redraws import fill, least_seconds, walk_over_all_objects
 from tests.blender.shots import walker
+from tests.tiers import slow_but_one
 
 
 def prepare(scene, ground):
@@ -58,7 +59,9 @@ def states_left(scene):
             return
 
 
-@pytest.mark.parametrize(("ground", "again"), [("created", False), ("coarse", False), ("coarse", True), ("fine", True)])
+@pytest.mark.parametrize(
+    ("ground", "again"), slow_but_one([("fine", True), ("created", False), ("coarse", False), ("coarse", True)])
+)
 def test_a_bake_left_in_any_state_leaves_the_file_as_it_was(scene, ground, again):
     prepare(scene, ground)
     if again:
@@ -85,6 +88,7 @@ def pictures_of(scene, folder):
     return pixels
 
 
+@pytest.mark.slow
 def test_renders_between_the_steps_of_a_bake_change_neither(scene, tmp_path):
     walker(scene, frames=24)
     bpy.ops.softground.add_character()

@@ -56,6 +56,7 @@ def test_the_rig_stands_in_its_moved_print_and_in_all_others_as_before(rig):
     assert gaps["penetration"]["p95"] < 2.0
 
 
+@pytest.mark.slow
 def test_edits_that_are_reset_give_the_walk_back(scene):
     armature = shots.walker(scene)
     set_up(armature)

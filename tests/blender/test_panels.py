@@ -1,5 +1,6 @@
 """Panels, presets and the depth to expect, as far as they can be seen without a window."""
 
+import itertools
 import json
 import time
 from dataclasses import replace
@@ -22,6 +23,7 @@ from softground_addon.blender.interface import (
 from softground_addon.blender.reading import analysis
 from softground_addon.core.ground import presets
 from tests.blender.shots import import_motion, walker
+from tests.tiers import slow_but_one
 
 
 @pytest.fixture
@@ -207,8 +209,7 @@ def test_a_ground_that_is_moved_or_exchanged_makes_the_prediction_worthless(shot
     assert analysis.known(shot) is None
 
 
-@pytest.mark.parametrize("depth", [2.0, 6.0])
-@pytest.mark.parametrize("motion", [None, "walk", "run"])
+@pytest.mark.parametrize(("motion", "depth"), slow_but_one(itertools.product(["walk", "run", None], [2.0, 6.0])))
 def test_a_matched_depth_is_met_by_the_bake(scene, motion, depth):
     if motion:
         import_motion(motion)

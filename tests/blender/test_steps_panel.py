@@ -23,15 +23,24 @@ from tests.blender import fingerprints, shots
 from tests.blender.grounds import heights, rest
 
 
-@pytest.fixture
-def baked(scene):
+@pytest.fixture(scope="module")
+def baked_file(addon, tmp_path_factory):
     """A walk, baked once more on the ground that the first bake has made."""
-    shots.walker(scene, frames=60)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    shots.walker(bpy.context.scene, frames=60)
     bpy.ops.softground.add_character()
-    scene.softground.cell_size = 0.02
+    bpy.context.scene.softground.cell_size = 0.02
     for _ in range(2):
         bpy.ops.softground.bake()
-    return scene
+    path = tmp_path_factory.mktemp("steps") / "baked.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    return path
+
+
+@pytest.fixture
+def baked(baked_file):
+    bpy.ops.wm.read_homefile(filepath=str(baked_file))  # as a new file, which is not saved anywhere
+    return bpy.context.scene
 
 
 def stored(scene):

@@ -19,6 +19,7 @@ from softground_addon.core.after.weather_places import WeatherPlaces, section_of
 from tests.blender import shots
 from tests.core.after.weather_course import Weather
 from tests.core.after.weathered_ground import weathered
+from tests.tiers import slow_but_one
 
 FRAMES = (1, 20, 34, 300)
 SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}
@@ -115,7 +116,7 @@ def contents(mesh):
     return held
 
 
-@pytest.mark.parametrize("surface", ["snow", "sand", "mud", "wet_sand"])
+@pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud", "wet_sand"]))
 def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
     scene = opened(surface)
     before = {frame: positions(scene, frame) for frame in FRAMES}
@@ -191,7 +192,7 @@ KEYS = {
 }
 
 
-@pytest.mark.parametrize("surface", ["snow", "sand", "mud"])
+@pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud"]))
 def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_add_on(opened, surface, tmp_path):
     scene = opened(surface)
     before = {frame: positions(scene, frame) for frame in FRAMES}
@@ -249,6 +250,7 @@ def test_a_changed_and_a_removed_key_count_at_once(opened):
     assert positions(scene, 300)[:, 2].max() < 0.1 * steady[:, 2].max()
 
 
+@pytest.mark.slow
 def test_keys_stay_through_a_bake(opened):
     scene = opened()
     bpy.ops.softground.add_weather(preset="SNOWFALL")
@@ -343,6 +345,7 @@ def test_alembic_carries_the_weather(opened, tmp_path):
         ({"Water Table": 2.0}, (nodes.WATER,)),
     ],
 )
+@pytest.mark.slow
 def test_only_what_the_sliders_ask_for_is_stored(opened, values, stored):
     scene = opened("wet_sand")
     there = set(shown(scene, 300).attributes.keys())
@@ -352,6 +355,7 @@ def test_only_what_the_sliders_ask_for_is_stored(opened, values, stored):
     assert set(shown(scene, 300).attributes.keys()) - there - set(nodes.OF_WEATHER) == {*stored, *anywhere}
 
 
+@pytest.mark.slow
 def test_what_is_blown_full_looks_trodden_no_more(opened):
     scene = opened("sand")
     before = read(shown(scene, 300), "softground_compression").max()
@@ -361,6 +365,7 @@ def test_what_is_blown_full_looks_trodden_no_more(opened):
     assert read(carrier(scene).data, "softground_compression").max() == before
 
 
+@pytest.mark.slow
 def test_a_beach_turns_pale_as_it_dries(opened):
     scene = opened("wet_sand")
     bpy.ops.softground.add_weather(preset="DRYING_BEACH")
@@ -370,7 +375,7 @@ def test_a_beach_turns_pale_as_it_dries(opened):
     assert (pale[1] < pale[2]).all()
 
 
-@pytest.mark.parametrize("preset", weather.PRESETS)
+@pytest.mark.parametrize("preset", slow_but_one(weather.PRESETS))
 def test_each_preset_has_something_to_show(opened, preset):
     scene = opened({"THAW": "snow", "SNOWFALL": "snow", "WINDY_DUNES": "sand"}.get(preset, "mud"))
     before = positions(scene, 300)
@@ -380,6 +385,7 @@ def test_each_preset_has_something_to_show(opened, preset):
     assert changed > 5e-3 or read(now, nodes.WETNESS).min() < 0.6
 
 
+@pytest.mark.slow
 def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened):
     scene = opened()
     bpy.ops.softground.clear_bake()
@@ -416,6 +422,7 @@ def test_the_panel_says_that_steps_do_not_feel_the_weather_where_there_is_some(o
         bpy.ops.softground.add_weather()
 
 
+@pytest.mark.slow
 def test_it_plays_without_the_add_on(opened, tmp_path):
     scene = opened()
     bpy.ops.softground.add_weather(preset="SNOWFALL")

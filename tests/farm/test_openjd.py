@@ -63,6 +63,7 @@ def test_one_task_bakes_a_shot_and_its_renders_depend_on_the_bake(night):
     assert references["outputs"]["directories"] == [str(night.parent / name) for name in ("baked", "night.batch")]
 
 
+@pytest.mark.slow
 def test_openjd_accepts_the_template(night):
     for options in (("--frames", "1-5"), ("--chunk", "0")):
         bundle(night, *options)
