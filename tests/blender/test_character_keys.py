@@ -44,8 +44,7 @@ MAKE = {
 }
 
 QUICK_AND_SLOW = [
-    rig if rig in ("walker", "ik", "auto-rig pro") else pytest.param(rig, marks=pytest.mark.slow)
-    for rig in (*MAKE, "rigify")
+    rig if rig in ("walker", "ik") else pytest.param(rig, marks=pytest.mark.slow) for rig in (*MAKE, "rigify")
 ]
 
 

@@ -21,6 +21,7 @@ def walker(scene):
     return armature
 
 
+@pytest.mark.slow
 def test_the_copy_poses_the_rig_as_the_nla_layer_does(scene, walker):
     bpy.ops.softground.create_ground()
     responders.bake(scene)
@@ -33,6 +34,7 @@ def test_the_copy_poses_the_rig_as_the_nla_layer_does(scene, walker):
     )  # keys are good to 0.04°
 
 
+@pytest.mark.slow
 def test_standing_soles_lie_on_their_prints(scene, walker):
     result = responders.bake(scene)
     terrain = FlatTerrain(scene.softground.ground.matrix_world.translation.z)
@@ -68,6 +70,7 @@ def test_the_strength_scales_it_without_a_bake_and_none_is_the_source(scene, wal
     assert responders.world_matrices(scene, walker, BONES, FRAMES) == pytest.approx(before, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_baking_again_reads_the_original_and_replaces_only_the_copy(scene, walker):
     first = responders.bake(scene).report
     actions = sorted(action.name for action in bpy.data.actions)

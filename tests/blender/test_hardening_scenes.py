@@ -95,6 +95,7 @@ def test_bones_without_length_do_not_matter(scene, capfd):
     assert code in (0, 2), capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_rig_of_2000_bones_is_baked(walker):
     bpy.context.view_layer.objects.active = walker
     bpy.ops.object.mode_set(mode="EDIT")
@@ -190,6 +191,7 @@ def test_a_linked_ground_is_refused_with_what_to_do(walker, tmp_path, capfd):
     assert "'Ground'" in refused(capfd)
 
 
+@pytest.mark.slow
 def test_an_absurd_cell_size_is_refused_with_the_estimate(scene, capfd, monkeypatch):
     shots.walker(scene, frames=72)
     monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 2e9)

@@ -12,6 +12,7 @@ from tests.blender import responders, shots
 from tests.blender.grounds import plane
 
 
+@pytest.mark.slow
 def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monkeypatch):
     shots.walker(scene)
     bpy.ops.softground.add_character()
@@ -58,6 +59,7 @@ def test_contacts_are_looked_for_once_with_a_ground_that_is_there(scene, monkeyp
     assert len(found) == times
 
 
+@pytest.mark.slow
 def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, monkeypatch):
     shots.walker(scene)
     bpy.ops.softground.add_character()
