@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -47,9 +48,10 @@ def picture_of_ground(scene: bpy.types.Scene) -> int:
     return next(filter(None, map(preset_icons.of, _files_of(scene.softground.material.preset))), 0)
 
 
-def _files_of(name: str) -> tuple[Path, Path]:
+def _files_of(name: str) -> Iterator[Path]:
     """Where a preset of that name is, if it comes with the add-on, and if it is the user's."""
-    return presets.FOLDER / _file_name(name), _file_for(name)
+    yield presets.FOLDER / _file_name(name)
+    yield _file_for(name)
 
 
 def _last_read(name: str) -> presets.Preset | None:

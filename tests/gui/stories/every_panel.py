@@ -9,7 +9,7 @@ import bpy
 
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
-from tests.gui.stories.edit_steps import show_alone
+from tests.gui.stories.edit_steps import show_alone, steps
 from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
 COLUMNS = (
@@ -37,6 +37,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     with_viewport(hand, bpy.ops.softground.bake)
     with_viewport(hand, bpy.ops.softground.add_weather, preset="NONE")
     yield from hand.wait_for(lambda: not session().is_baking, 120)
+    with_viewport(hand, bpy.ops.softground.choose_step, step=steps()[1].name)
     facts["width"] = hand.region().width
     columns = []
     for number, names in enumerate(COLUMNS):
