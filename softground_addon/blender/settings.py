@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -26,6 +27,10 @@ STANDARD_GRAVITY = 9.81
 
 USER_FOLDER = "presets/softground"
 """Where the user's presets are, below the folder of Blender's user scripts."""
+
+
+ADD_ON = __package__.rpartition(".")[0].removesuffix(".softground_addon")
+"""The name by which Blender knows the add-on, which as an extension has `softground_addon` within it."""
 
 
 def scene_of(context: bpy.types.Context) -> bpy.types.Scene:
@@ -294,19 +299,42 @@ def take_defaults(scene: bpy.types.Scene) -> None:
     For the first character of a scene. The defaults of the properties themselves are those of version 0.1: a file keeps
     only what was set, and the others are to stay as they were when it was saved.
     """
-    preset = presets.find(presets.DEFAULT)
+    preset = default_preset()
     options = scene.softground
     for group, field, value in _defaults(scene, preset):
         if not group.is_property_set(field):
             setattr(group, field, value)
     if not options.is_property_set("cell_size") and not options.is_property_set("cells_along_sole"):
-        options.cells_along_sole = preset.cells_along_sole
+        options.cells_along_sole = preset.cells_along_sole or presets.find(presets.DEFAULT).cells_along_sole
+
+
+def default_preset() -> Preset:
+    """What scenes start with: the preset of the user's preferences, or the add-on's own where that is gone."""
+    with suppress(InputError):
+        return presets.find(_preferred(), (presets.FOLDER, user_folder()))
+    return presets.find(presets.DEFAULT)
+
+
+def _preferred() -> str:
+    """The preset that the user's preferences name; in background the add-on's own, for farms to bake alike."""
+    add_on = bpy.context.preferences.addons.get(ADD_ON)
+    if bpy.app.background or add_on is None or add_on.preferences is None:
+        return presets.DEFAULT
+    return str(add_on.preferences.default_preset)
+
+
+def preset_of(scene: bpy.types.Scene) -> str:
+    """The name of the preset that a scene was set to last, or will be with its first character."""
+    options = scene.softground
+    if options.characters or options.material.is_property_set("preset"):
+        return str(options.material.preset)
+    return _preferred()
 
 
 def untouched(scene: bpy.types.Scene) -> list[tuple[Any, str]]:
     """The settings that `take_defaults` would set, as groups and names."""
     options = scene.softground
-    fields = [(group, field) for group, field, _ in _defaults(scene, presets.find(presets.DEFAULT))]
+    fields = [(group, field) for group, field, _ in _defaults(scene, default_preset())]
     fields += [(options, "cell_size"), (options, "cells_along_sole")]
     return [(group, field) for group, field in fields if not group.is_property_set(field)]
 

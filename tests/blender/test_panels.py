@@ -10,7 +10,7 @@ import blf
 import bpy
 import pytest
 
-from softground_addon.blender import jobs, registration
+from softground_addon.blender import jobs, registration, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.interface import (
     bake_result,
@@ -257,6 +257,24 @@ def test_a_preset_of_one_s_own_comes_back_as_it_was_saved(shot, user_folder):
     assert not list(user_folder.glob("*.json"))
     with pytest.raises(RuntimeError, match="comes with SoftGround"):
         bpy.ops.softground.save_preset(name="Snow")
+
+
+def test_scenes_start_with_the_preset_of_the_preferences(scene, user_folder, monkeypatch):
+    ours = bpy.context.preferences.addons.new()
+    try:
+        ours.module = settings.ADD_ON
+        ours.preferences.default_preset = "Mud"
+        assert settings.default_preset().name == "Snow"  # in background, on every machine alike
+        monkeypatch.setattr(settings, "_preferred", lambda: ours.preferences.default_preset)
+        assert preset_menu.title_of_ground(scene) == "Mud"
+        walker(scene, frames=24)
+        bpy.ops.softground.add_character()
+        assert (scene.softground.material.preset, scene.softground.material.surface) == ("Mud", "mud")
+        ours.preferences.default_preset = "Gone"
+        assert settings.default_preset().name == "Snow"
+    finally:
+        bpy.context.preferences.addons.remove(ours)
+    assert "Mud" in presets.names()
 
 
 def test_broken_preset_files_are_left_out_with_a_message(user_folder):

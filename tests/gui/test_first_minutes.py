@@ -18,6 +18,10 @@ def test_a_scene_without_a_character_offers_one(facts):
     assert facts["sample"] == ["Walking Figure"]
 
 
+def test_scenes_start_with_the_preset_of_the_preferences(facts):
+    assert facts["preferred"] == "Mud"
+
+
 def test_two_clicks_show_prints_with_feet_in_them(facts):
     assert facts["prints"]["steps"] >= 6
     assert facts["deepest in view"] < -0.02

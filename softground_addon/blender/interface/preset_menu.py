@@ -38,14 +38,14 @@ _read: dict[Path, tuple[int, presets.Preset]] = {}
 
 def title_of_ground(scene: bpy.types.Scene) -> str:
     """The name of the preset that was loaded last, and whether the ground is still as it says."""
-    name = scene.softground.material.preset
+    name = settings.preset_of(scene)
     preset = _last_read(name)
     return f"{name} (modified)" if preset and not settings.holds(scene, preset) else name
 
 
 def picture_of_ground(scene: bpy.types.Scene) -> int:
     """The number of the picture of the preset that was loaded last; 0 where it has none."""
-    return next(filter(None, map(preset_icons.of, _files_of(scene.softground.material.preset))), 0)
+    return next(filter(None, map(preset_icons.of, _files_of(settings.preset_of(scene)))), 0)
 
 
 def _files_of(name: str) -> Iterator[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .character import DEFAULT_MASS, SoftGroundCharacter, SoftGroundJoint, SoftGroundPart, SoftGroundSole
 from .material import SoftGroundMaterial, SoftGroundPainted
+from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
 from .scene import DEFAULT_CELL_SIZE, SoftGroundSettings
 
@@ -17,6 +18,7 @@ CLASSES = (
     SoftGroundTilt,
     SoftGroundGrounding,
     SoftGroundSettings,
+    SoftGroundPreferences,
 )
 
 __all__ = [
@@ -28,6 +30,7 @@ __all__ = [
     "SoftGroundJoint",
     "SoftGroundMaterial",
     "SoftGroundPainted",
+    "SoftGroundPreferences",
     "SoftGroundSettings",
     "SoftGroundSole",
     "SoftGroundTilt",

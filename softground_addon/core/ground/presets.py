@@ -165,6 +165,15 @@ def _bare(name: str) -> str:
     return re.sub(r"[\W_]+", "_", name.casefold()).strip("_")
 
 
+def names(folders: tuple[Path, ...] = (FOLDER,)) -> list[str]:
+    """Names of the presets in some folders, in their order; broken files are left out."""
+    found = []
+    for path in (path for folder in folders for path in sorted(folder.glob("*.json"))):
+        with suppress(InputError):
+            found.append(load(path).name)
+    return found
+
+
 def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
     """The preset of that file stem or display name, the first found in `folders`.
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.gui.hand import Hand, Steps
-from tests.gui.stories.interrupted_bake import scene, session
+from tests.gui.stories.interrupted_bake import ADD_ON, scene, session
 
 TYPED = 9.0
 """Depth that is asked for [cm]."""
@@ -17,6 +17,10 @@ TYPED = 9.0
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
     facts["to begin with"] = sorted(obj.name for obj in scene().objects), names(hand, "selected_objects")
+    ours = bpy.context.preferences.addons[ADD_ON].preferences
+    ours.default_preset = "Mud"
+    facts["preferred"] = title()
+    ours.default_preset = "Snow"
     yield from hand.open_sidebar()
     yield from hand.picture("first_screen_empty", of="UI", in_docs=False)
     yield from hand.press_button("softground.add_sample_scene")

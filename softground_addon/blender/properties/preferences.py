@@ -1,0 +1,35 @@
+"""What the user sets once for all files, in Blender's own preferences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ...core.ground import presets
+from ..settings import ADD_ON, user_folder
+
+
+def _names(_preferences: bpy.types.AddonPreferences, _context: bpy.types.Context, _typed: str) -> list[str]:
+    """The presets that there are, by name; a file that is none is no choice."""
+    return presets.names((presets.FOLDER, user_folder()))
+
+
+class SoftGroundPreferences(bpy.types.AddonPreferences):
+    """What new scenes start with."""
+
+    bl_idname = ADD_ON
+
+    default_preset: StringProperty(
+        name="Default Preset",
+        description="Ground that scenes start with, one of your own too. The command line starts with Snow, on every "
+        "machine alike",
+        default=presets.DEFAULT,
+        search=_names,
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "default_preset")
