@@ -104,6 +104,41 @@ def test_the_gait_of_an_animal_is_found_in_its_skin(
     assert np.linalg.norm(found.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
 
 
+@given(
+    legs=st.integers(2, 8),
+    duty=st.floats(0.5, 0.7),
+    on_the_spot=st.booleans(),
+    every=st.sampled_from([1, 2]),
+    first=st.integers(0, 40),
+    length=st.integers(40, 50),
+    share=st.floats(0.4, 1.0),
+    noise=st.floats(0, 2e-4),
+    seed=st.integers(0, 99),
+)
+def test_the_gait_is_found_at_other_frame_rates_in_parts_of_the_shot_and_in_coarse_or_rough_skin(
+    legs: int,
+    duty: float,
+    on_the_spot: bool,
+    every: int,
+    first: int,
+    length: int,
+    share: float,
+    noise: float,
+    seed: int,
+) -> None:
+    skin, stands = animal(legs, duty=duty, stride=0.6, on_the_spot=on_the_spot)
+    chance, seen = np.random.default_rng(seed), slice(first, first + length, every)
+    kept = chance.random(len(skin.part)) < share
+    kept |= np.diff(skin.part, prepend=-1) > 0  # of each part at least a point of its underside
+    positions = skin.positions[seen][:, kept]
+    positions = positions + chance.normal(0, noise * skin.height, positions.shape)
+    found = find_contacts(SkinMotion(positions, skin.part[kept], skin.links, RATE / every, skin.height))
+    speed = 0.6 * RATE / PERIOD if on_the_spot else 0.0
+    assert found.level == pytest.approx(0.0, abs=0.005 * skin.height)
+    assert np.linalg.norm(found.drift) == pytest.approx(speed, abs=0.1 * speed + 0.01)
+    assert_gait(found, stands[seen])
+
+
 @pytest.mark.parametrize("on_the_spot", [False, True])
 def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) -> None:
     skin, _ = animal(2, duty=0.6, stride=0.6, on_the_spot=on_the_spot)
