@@ -56,7 +56,7 @@ def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     box = layout.box().column(align=True)
     box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)
     box.label(text="above their prints", icon="BLANK1")
-    box.operator("softground.sink_feet", icon="TRIA_DOWN_BAR")
+    box.operator("softground.sink_feet", text="Sink Feet Now", icon="TRIA_DOWN_BAR")
 
 
 def _moved_action(layout: Any, character: Any) -> None:
