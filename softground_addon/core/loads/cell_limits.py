@@ -19,8 +19,8 @@ BYTES_PER_CELL = 1000.0
 SECONDS_PER_CELL = 5e-5
 """What it takes to write [s], and over the square of the cell size ..."""
 
-SECONDS_OF_FINE_CELLS = 6.2e-11
-"""... [s m²]: 61, 65, 107 and 299 µs on a walk with cells of 4, 2, 1 and 0.5 mm, 50 to 90 on others, ..."""
+SECONDS_OF_FINE_CELLS = 1.5e-11
+"""... [s m²]: 61, 65, 67 and 106 µs on a walk with cells of 4, 2, 1 and 0.5 mm, 50 to 90 on others, ..."""
 
 SECONDS_PER_CELL_HELD = 5.5e-5
 """... and what it takes to simulate, for each second that a sole is on it [s/s]: 45 to 70 µs, standing or walking."""

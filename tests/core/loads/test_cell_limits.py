@@ -60,14 +60,14 @@ def test_what_a_bake_takes_grows_with_the_cells_and_with_how_long_a_sole_is_on_t
 
 @pytest.mark.parametrize("available", [1e15, None])
 def test_cells_that_take_too_long_are_refused_with_a_size_that_does_not(available):
-    took = bake_time([LOADS], 3e-4)
+    took = bake_time([LOADS], 2e-4)
     with pytest.raises(
         InputError, match=rf"GB of memory and {int(took / 60) + 1} minutes .* 1 minutes are allowed"
     ) as error:
-        check_cell_size([LOADS], 3e-4, 60.0, available)
-    assert 3e-4 < named_size(error) < 2e-3
+        check_cell_size([LOADS], 2e-4, 60.0, available)
+    assert 2e-4 < named_size(error) < 2e-3
     check_cell_size([LOADS], named_size(error), 60.0, available)
-    check_cell_size([LOADS], 3e-4, took, available)
+    check_cell_size([LOADS], 2e-4, took, available)
 
 
 def test_no_size_is_named_where_none_helps():
