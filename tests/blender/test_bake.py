@@ -22,6 +22,7 @@ from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.record import edits, record
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import bake, heights, plane, rest
+from tests.tiers import slow_but_one
 
 PRESETS = sorted(path.stem for path in FOLDER.glob("*.json"))
 
@@ -188,7 +189,7 @@ def test_a_bake_that_is_stopped_half_way_changes_nothing(walk, stage):
     assert fingerprints.of_file() == before
 
 
-@pytest.mark.parametrize("transform", ["tilted", "scaled", "parented", "moved"])
+@pytest.mark.parametrize("transform", slow_but_one(["tilted", "scaled", "parented", "moved"]))
 def test_grounds_with_a_transform_take_the_same_prints(walk, transform):
     """A level field looks the same however its object is turned and scaled, and so do the prints."""
     walk.softground.ground = plane(walk)

@@ -264,6 +264,7 @@ def arrays_of_points(text, name):
     return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in found}
 
 
+@pytest.mark.slow
 def test_usd_carries_debris_as_points_with_sizes_and_speeds(scene, tmp_path):
     ground = scene.softground.ground
     obj, before = debris_object.of(ground), fingerprints.of_file()

@@ -44,6 +44,7 @@ def of_a_walk_on(scene, walker, preset):
     return record.load(lane.ground.data[ground_mesh.RECORD]).about["inputs"]
 
 
+@pytest.mark.slow
 def test_two_clicks_the_demo_and_the_gallery_bake_the_same_ground(scene, walker, monkeypatch):
     bpy.ops.softground.add_character()
     clicked = jobs.run(bake_job.bake(scene, write=False)).report["inputs"]

@@ -10,6 +10,7 @@ from softground_addon.blender.ground import ground_mesh, hidden_ground, playback
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane, refusal
+from tests.tiers import slow_but_one
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def test_nothing_is_left_of_a_playback_whose_modifier_the_user_has_deleted(baked
     assert not [thing for thing in bpy.data.objects if thing.name.startswith(playback.TABLE)]
 
 
-@pytest.mark.parametrize("change", ["delete", "rename"])
+@pytest.mark.parametrize("change", slow_but_one(["delete", "rename"]))
 def test_a_display_key_that_is_gone_is_made_again(baked, change):
     shown = baked.data.shape_keys.key_blocks[DISPLAY_KEY]
     if change == "delete":
@@ -97,8 +98,8 @@ def raise_far_corner(ground):
     mesh.update()
 
 
-@pytest.mark.parametrize("shape_keys", [True, False])
-@pytest.mark.parametrize("model", [add_cube_in_edit_mode, join_cube, raise_far_corner])
+@pytest.mark.parametrize("shape_keys", slow_but_one([True, False]))
+@pytest.mark.parametrize("model", slow_but_one([add_cube_in_edit_mode, join_cube, raise_far_corner]))
 def test_what_was_modelled_beside_the_prints_stays(scene, model, shape_keys):
     shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()
@@ -163,13 +164,15 @@ def retype(attribute, kind, domain):
 
 @pytest.mark.parametrize(
     "spoil",
-    [
-        retype("softground_moved", "FLOAT", "POINT"),
-        retype("softground_compression", "INT", "FACE"),
-        lambda ground: ground.data.__setitem__(ground_mesh.SUMMARY, "many steps"),
-        lambda ground: ground.data.__setitem__(ground_mesh.RECORD, {"steps": 3}),
-        lambda ground: ground.__setitem__(hidden_ground.WAS_HIDDEN, "yes"),
-    ],
+    slow_but_one(
+        [
+            retype("softground_moved", "FLOAT", "POINT"),
+            retype("softground_compression", "INT", "FACE"),
+            lambda ground: ground.data.__setitem__(ground_mesh.SUMMARY, "many steps"),
+            lambda ground: ground.data.__setitem__(ground_mesh.RECORD, {"steps": 3}),
+            lambda ground: ground.__setitem__(hidden_ground.WAS_HIDDEN, "yes"),
+        ]
+    ),
     ids=["moved", "compression", "summary", "record", "was hidden"],
 )
 def test_whatever_is_made_of_the_bakes_data_clearing_gives_the_ground_back(scene, spoil):

@@ -19,6 +19,7 @@ from softground_addon.blender.output import event_exports, export_formats, expor
 from tests.blender import command_line, point_caches, shots
 from tests.blender.grounds import plane
 from tests.blender.test_exports import assert_stands_as_recorded, import_and_select, played, read_image
+from tests.tiers import slow_but_one
 
 
 @pytest.fixture(scope="module")
@@ -244,6 +245,7 @@ def test_the_command_line_writes_what_it_names_and_keeps_the_blend(scene, tmp_pa
     assert cli.run_in_blender(["export", "--format", "obj", "--scene", "None"]) == cli.EXIT_BAD_INPUT
 
 
+@pytest.mark.slow
 def test_the_bpy_module_writes_the_same_file(scene, tmp_path):
     within, alone = tmp_path / "within.pc2", tmp_path / "alone.pc2"
     options = ("--format", "pc2", "--frames", "30-31", "--output")
@@ -254,7 +256,7 @@ def test_the_bpy_module_writes_the_same_file(scene, tmp_path):
     assert alone.read_bytes() == within.read_bytes()
 
 
-@pytest.mark.parametrize("shot", ["missing.blend", "flat.blend"])
+@pytest.mark.parametrize("shot", slow_but_one(["missing.blend", "flat.blend"]))
 def test_the_bpy_module_names_a_shot_that_cannot_be_exported(addon, tmp_path, shot):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "flat.blend"))

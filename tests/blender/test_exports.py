@@ -77,6 +77,7 @@ def test_a_point_cache_holds_every_frame_of_the_record(scene, ground, tmp_path):
 
 
 @pytest.mark.parametrize("remapped", [(100, 200), (100, 50)])
+@pytest.mark.slow
 def test_nodes_and_mesh_cache_play_in_the_scenes_frames_where_its_time_is_remapped(scene, tmp_path, remapped):
     scene.render.frame_map_old, scene.render.frame_map_new = remapped
     shots.walker(scene)
@@ -139,7 +140,8 @@ def write_and_read(kind, scene, ground, folder, start, end):
     return import_and_select(importer, folder / f"ground.{kind}", **options)
 
 
-@pytest.mark.parametrize("kind", slow_but_one(["abc", "usdc"]))
+@pytest.mark.parametrize("kind", ["abc", "usdc"])
+@pytest.mark.slow
 def test_a_ground_that_the_user_subdivides_is_written_as_it_is_rendered(scene, ground, tmp_path, kind):
     display_mesh = baked_ground.display_mesh_of(ground)
     finer = display_mesh.modifiers.new("Finer", "SUBSURF")
@@ -249,7 +251,7 @@ def scale_uv(ground, factor, shift):
 
 @pytest.mark.parametrize(
     ("factor", "shift", "is_written"),
-    [(10.0, 0.0, False), (1.0, 1.0, False), (1.0, 0.02, True), (0.5, 0.0, True)],
+    slow_but_one([(10.0, 0.0, False), (1.0, 1.0, False), (1.0, 0.02, True), (0.5, 0.0, True)]),
     ids=["tiled", "another tile", "a margin outside", "a corner"],
 )
 def test_images_are_refused_where_prints_would_be_missing(scene, ground, tmp_path, factor, shift, is_written):
@@ -292,7 +294,7 @@ def test_a_ground_without_a_bake_is_refused_with_the_remedy(scene, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("spoil", ["cut", "text", "bits"])
+@pytest.mark.parametrize("spoil", slow_but_one(["cut", "text", "bits"]))
 def test_a_damaged_record_is_refused_and_the_ground_still_opens(scene, ground, tmp_path, spoil):
     mesh = ground_mesh.mesh_of(baked_ground.display_mesh_of(ground))
     stored = bytes(mesh[ground_mesh.RECORD])

@@ -13,6 +13,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.record.pressed_ground import GroundSample
 from tests.blender import fingerprints, shots
+from tests.tiers import slow_but_one
 
 
 def grid(scene, size=2.0, spacing=0.02, height=0.0, unit_scale=1.0):
@@ -195,9 +196,9 @@ def test_a_ground_that_waves_is_taken_at_the_first_frame_of_the_bake_whatever_is
     assert not still_ground.changes_with_time(ground)
 
 
-@pytest.mark.parametrize("wanted", [True, False])
-@pytest.mark.parametrize("too", [True, False])
-@pytest.mark.parametrize("dense", [True, False])
+@pytest.mark.parametrize("wanted", slow_but_one([True, False]))
+@pytest.mark.parametrize("too", slow_but_one([True, False]))
+@pytest.mark.parametrize("dense", slow_but_one([True, False]))
 def test_dense_grounds_keep_shape_keys_only_where_that_is_asked_for(scene, monkeypatch, wanted, too, dense):
     shots.walker(scene, frames=20)
     bpy.ops.softground.add_character()

@@ -72,6 +72,7 @@ def test_options_are_assigned_by_their_path(scene):
     assert scene.softground.painted.stiffness == "path"
 
 
+@pytest.mark.slow
 def test_sand_with_an_angle_of_repose_bakes_within_its_checks_and_leaves_no_steeper_wall(walk):
     settings.apply_preset(walk, find("loose_dry_sand"))
     walk.softground.ground = plane(walk, vertices=560, size=5.6)  # a vertex on every cell of 1 cm

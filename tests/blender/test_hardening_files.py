@@ -209,7 +209,7 @@ def test_a_signal_ends_a_bake_cleanly_at_any_moment(scene, tmp_path, number):
     assert [path.name for path in shot.parent.iterdir()] == ["shot.blend"]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("share", slow_but_one([0.0, 0.1, 0.5, 0.9, 0.99]))
 def test_a_truncated_shot_exits_with_2(shot, share, tmp_path):
     broken = tmp_path / "broken.blend"
     content = shot.read_bytes()

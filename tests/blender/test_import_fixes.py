@@ -9,6 +9,7 @@ from softground_addon.blender.compat import action_curves
 from tests.blender import shots
 from tests.blender.grounds import bake
 from tests.blender.test_self_check import codes
+from tests.tiers import slow_but_one
 
 
 def keys_of(armature):
@@ -46,8 +47,8 @@ def metres(scene):
     return steps, mass
 
 
-@pytest.mark.parametrize("loose", [False, True])
-@pytest.mark.parametrize("factor", [100.0, 0.01])
+@pytest.mark.parametrize("loose", slow_but_one([False, True]))
+@pytest.mark.parametrize("factor", slow_but_one([100.0, 0.01]))
 def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres, factor, loose):
     steps, mass = metres
     armature = imported(scene, factor, loose=loose)

@@ -66,7 +66,7 @@ def test_the_age_of_prints_is_that_of_a_bake_at_every_frame(live_shot):
         assert (shown[frame] >= 0).sum() > 300
 
 
-@pytest.mark.parametrize("preset", ["Snow", "Mud", "Fresh Snow"])
+@pytest.mark.parametrize("preset", slow_but_one(["Snow", "Mud", "Fresh Snow"]))
 def test_scrubbing_back_and_forth_shows_every_frame_as_it_was(live_shot, preset):
     bpy.ops.softground.load_preset(name=preset)
     shown = {}
@@ -321,7 +321,7 @@ def status():
     return [call.kwargs["text"] for call in header.layout.label.mock_calls]
 
 
-@pytest.mark.parametrize("end", ["discard", "keep", "delete the ground", "new file"])
+@pytest.mark.parametrize("end", slow_but_one(["discard", "keep", "delete the ground", "new file"]))
 def test_the_status_bar_says_that_live_mode_is_on_until_it_ends(shot, end):
     assert menus.draw_in_status_bar in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
     assert status() == []

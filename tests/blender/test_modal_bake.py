@@ -174,14 +174,14 @@ def end_of(scene, stage, disturb):
     return None
 
 
-@pytest.mark.parametrize("stage", MOMENTS)
-@pytest.mark.parametrize("disturb", [remove_characters, add_characters])
+@pytest.mark.parametrize("stage", slow_but_one(MOMENTS))
+@pytest.mark.parametrize("disturb", slow_but_one([remove_characters, add_characters]))
 def test_a_bake_goes_on_whatever_becomes_of_the_list_of_characters(scene, stage, disturb):
     assert end_of(scene, stage, disturb) is None
 
 
-@pytest.mark.parametrize("stage", MOMENTS)
-@pytest.mark.parametrize(("disturb", "gone"), [(delete_rig, "Walker"), (delete_ground, "Plane")])
+@pytest.mark.parametrize("stage", slow_but_one(MOMENTS))
+@pytest.mark.parametrize(("disturb", "gone"), slow_but_one([(delete_rig, "Walker"), (delete_ground, "Plane")]))
 def test_a_bake_whose_parts_go_names_what_is_gone(scene, stage, disturb, gone):
     assert end_of(scene, stage, disturb).startswith((f"'{gone}' was deleted", f"Object '{gone}' is gone"))
 

@@ -8,6 +8,7 @@ from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from tests.blender import fingerprints
 from tests.blender.grounds import as_rendered, field, mover, node_group, plane, refusal
+from tests.tiers import slow_but_one
 
 
 def lift_by_scene_time(ground, _scene):
@@ -128,7 +129,7 @@ def test_live_prints_show_where_modifiers_would_undo_them(short_walk, shrinkwrap
         bpy.ops.softground.live()
 
 
-@pytest.mark.parametrize("kind", ["SUBSURF", "DISPLACE", "SOLIDIFY", "SMOOTH", "WAVE"])
+@pytest.mark.parametrize("kind", slow_but_one(["SUBSURF", "DISPLACE", "SOLIDIFY", "SMOOTH", "WAVE"]))
 def test_modifiers_that_let_prints_through_stay_on_the_ground(short_walk, kind):
     ground = field(short_walk, vertices=200, size=6.0)
     ground.scale = (1.0, -1.0, 1.0)

@@ -161,7 +161,7 @@ def test_the_depth_to_expect_holds_on_for_a_ground_that_is_created_to_fit(shot):
     assert analysis.expected_depth(shot) == expected
 
 
-@pytest.mark.parametrize("grounding", [False, True])
+@pytest.mark.parametrize("grounding", slow_but_one([False, True]))
 def test_the_depth_to_expect_holds_on_through_a_bake_and_its_end(shot, grounding):
     shot.softground.grounding.use = grounding
     bpy.ops.softground.predict_depth()

@@ -11,6 +11,7 @@ from softground_addon.blender.reading import analysis
 from softground_addon.core.errors import InputError
 from softground_addon.core.prediction import ContactLoads
 from tests.blender.shots import walker
+from tests.tiers import slow_but_one
 
 
 @pytest.fixture
@@ -131,7 +132,7 @@ def the_view_of_the_ground(scene):
     scene.softground.ground.display_type = "WIRE"
 
 
-@pytest.mark.parametrize("change", [sculpted_ground, sculpted_foot, later_key, another_range])
+@pytest.mark.parametrize("change", slow_but_one([sculpted_ground, sculpted_foot, later_key, another_range]))
 def test_it_is_known_no_more_when_an_undo_has_brought_back_something_else(shot, change):
     bpy.ops.softground.create_ground()
     bpy.ops.softground.predict_depth()

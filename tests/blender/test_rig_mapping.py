@@ -190,6 +190,7 @@ def test_an_armature_without_bones_is_refused(scene):
         map_rig(bpy.data.objects.new("Empty", bpy.data.armatures.new("Empty")))
 
 
+@pytest.mark.slow
 def test_a_rigify_human_maps_to_its_deform_bones(rigify_file):
     mapping = map_rig(rigs.open_rigify(rigify_file, "Generated"))
     assert [(s.bone, s.toe_bone) for s in mapping.soles] == [(f"DEF-foot.{s}", f"DEF-toe.{s}") for s in "LR"]
