@@ -57,7 +57,8 @@ test: $(READY)
 	$(PYTEST) -m "$(QUICK) and alone" $(TESTS) || [ $$? -eq 5 ]
 
 slow: $(READY)
-	$(PYTEST) $(SIDE_BY_SIDE) -m slow $(TESTS)
+	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not alone" $(TESTS)
+	$(PYTEST) -m "slow and alone" $(TESTS) || [ $$? -eq 5 ]
 
 # One file baked in each Blender that is here, played in the others.
 versions: $(READY)

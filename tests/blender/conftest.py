@@ -17,33 +17,38 @@ def scene(addon):
 
 
 @pytest.fixture(scope="session")
-def added_walker(addon, tmp_path_factory):
-    """Opens a scene with a character that walks for so many frames, ready to be baked; each is set up once."""
+def opened_as(addon, tmp_path_factory):
+    """Opens a scene as a function of it leaves it, which is called once and from then on read from a file."""
     files = {}
 
-    def opened(frames):
-        if frames not in files:
+    def opened(function, *arguments):
+        key = (function, *arguments)
+        if key not in files:
             bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-            shots.walker(bpy.context.scene, frames=frames)
-            bpy.ops.softground.add_character()
-            files[frames] = tmp_path_factory.mktemp("walk") / "walk.blend"
-            bpy.ops.wm.save_as_mainfile(filepath=str(files[frames]), copy=True)
-        bpy.ops.wm.read_homefile(filepath=str(files[frames]))  # as a new file, which is not saved anywhere
+            function(bpy.context.scene, *arguments)
+            files[key] = tmp_path_factory.mktemp("scene") / "scene.blend"
+            bpy.ops.wm.save_as_mainfile(filepath=str(files[key]), copy=True)
+        bpy.ops.wm.read_homefile(filepath=str(files[key]))  # as a new file, which is not saved anywhere
         return bpy.context.scene
 
     return opened
 
 
+def added_walker(scene, frames):
+    shots.walker(scene, frames=frames)
+    bpy.ops.softground.add_character()
+
+
 @pytest.fixture
-def walk(added_walker):
+def walk(opened_as):
     """A scene with a character that walks, ready to be baked."""
-    return added_walker(72)
+    return opened_as(added_walker, 72)
 
 
 @pytest.fixture
-def short_walk(added_walker):
+def short_walk(opened_as):
     """A short walk to be baked with coarse cells."""
-    scene = added_walker(30)
+    scene = opened_as(added_walker, 30)
     scene.softground.cell_size = 0.02
     return scene
 

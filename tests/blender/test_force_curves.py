@@ -16,12 +16,15 @@ from tests.blender.shots import walker
 FRAMES = 72
 
 
-@pytest.fixture
-def baked(scene):
+def bake_a_walk(scene):
     walker(scene, frames=FRAMES)
     bpy.ops.softground.add_character()
     bpy.ops.softground.bake()
-    return scene
+
+
+@pytest.fixture
+def baked(opened_as):
+    return opened_as(bake_a_walk)
 
 
 def test_the_curves_carry_the_body_s_weight_on_average(baked):

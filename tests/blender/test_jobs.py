@@ -9,6 +9,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.jobs import Progress, meanwhile, run
 from softground_addon.core.numerics.slices import sliced
 from tests.blender.shots import walker
+from tests.tiers import slow_but_one
 
 LONGEST_STEP = 0.1
 """Longest time that a step of a bake may take of the processor [s]."""
@@ -70,7 +71,7 @@ def create_grid():
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("create", [None, create_plane, create_grid])
+@pytest.mark.parametrize("create", slow_but_one([None, create_plane, create_grid]))
 def test_no_step_of_a_bake_of_250_frames_takes_long(scene, create):
     walker(scene, frames=250, coarseness=1.0)
     bpy.ops.softground.add_character()

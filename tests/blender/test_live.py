@@ -19,12 +19,15 @@ LEVEL = 1e-9
 """How far the undisturbed ground may be from the plane that it was fitted to [m]."""
 
 
-@pytest.fixture
-def shot(scene):
+def on_its_ground(scene):
     walker(scene, frames=48)
     bpy.ops.softground.add_character()
     bpy.ops.softground.create_ground()
-    return scene
+
+
+@pytest.fixture
+def shot(opened_as):
+    return opened_as(on_its_ground)
 
 
 @pytest.fixture

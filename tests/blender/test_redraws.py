@@ -7,6 +7,7 @@ from softground_addon.blender.after import debris_object
 from softground_addon.blender.settings import exists
 from tests.blender import grounds, responders
 from tests.blender.redraws import empty, fill, least_seconds, redraw, walk_over_all_objects
+from tests.tiers import slow_but_one
 
 OBJECTS = 10_000
 
@@ -44,7 +45,8 @@ def copy_deleted(scene):
 
 @pytest.mark.alone
 @pytest.mark.parametrize(
-    "set_up", [nothing_baked, baked_on_a_copy, baked_with_a_response, baked_with_debris, live, copy_deleted]
+    "set_up",
+    slow_but_one([nothing_baked, baked_on_a_copy, baked_with_a_response, baked_with_debris, live, copy_deleted]),
 )
 def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, set_up):
     set_up(short_walk)

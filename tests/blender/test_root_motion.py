@@ -17,6 +17,7 @@ from softground_addon.blender.baking import root_motion
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from tests.blender import fingerprints, responders, shots
+from tests.tiers import slow_but_one
 
 WITHIN = 0.02
 """Bar: speed, over that of the same cycle with its travel."""
@@ -49,9 +50,9 @@ def speed_of(scene, armature, bone="hips"):
     return np.linalg.norm(path[1] - path[0]) * scene.render.fps / (end - start)
 
 
-@pytest.mark.parametrize("rate", [24, 60])
-@pytest.mark.parametrize("hips_held", [False, True], ids=["treadmill", "hips held"])
-@pytest.mark.parametrize("speed", [0.7, 1.2, 1.7])
+@pytest.mark.parametrize("rate", slow_but_one([24, 60]))
+@pytest.mark.parametrize("hips_held", slow_but_one([False, True]), ids=["treadmill", "hips held"])
+@pytest.mark.parametrize("speed", slow_but_one([0.7, 1.2, 1.7]))
 def test_walks_get_the_speed_that_they_have_with_their_travel(scene, speed, hips_held, rate):
     gait = Gait(speed=speed)
     strides = round(2 * gait.stride_time(Body()) * rate) / rate  # whole ones: hips surge within a stride

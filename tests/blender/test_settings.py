@@ -30,8 +30,7 @@ NO_INPUT = {
 """Settings of which a bake asks nothing, and why."""
 
 
-@pytest.fixture
-def shot(scene):
+def all_on(scene):
     """A walker and a ball on a plane, with everything switched on."""
     shots.walker(scene, frames=40)
     bpy.ops.softground.add_character()
@@ -41,7 +40,11 @@ def shot(scene):
     options.ground, options.frame_end = plane(scene), 40
     options.tilt.use = options.grounding.use = True
     bpy.context.view_layer.update()
-    return scene
+
+
+@pytest.fixture
+def shot(opened_as):
+    return opened_as(all_on)
 
 
 def groups_of(owner, path=""):
@@ -127,15 +130,18 @@ def cell_size(options):
     options.cell_size = 0.02
 
 
-@pytest.fixture
-def baked(scene):
+def bake_on_a_plane(scene):
     shots.walker(scene, frames=24)
     bpy.ops.softground.add_character()
     scene.softground.frame_end = 24
     scene.softground.ground = plane(scene)
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
-    return scene
+
+
+@pytest.fixture
+def baked(opened_as):
+    return opened_as(bake_on_a_plane)
 
 
 @pytest.mark.parametrize("change", [tread, detail, shape_keys, rolling, cell_size])

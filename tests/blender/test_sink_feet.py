@@ -17,15 +17,18 @@ from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 
 
-@pytest.fixture
-def baked(scene):
+def bake_on_a_plane(scene):
     shots.walker(scene, frames=48)
     bpy.ops.softground.add_character()
     scene.softground.frame_end = 48
     scene.softground.ground = plane(scene)
     bpy.context.view_layer.update()
     bpy.ops.softground.bake()
-    return scene
+
+
+@pytest.fixture
+def baked(opened_as):
+    return opened_as(bake_on_a_plane)
 
 
 def floating_mm(scene):

@@ -23,24 +23,18 @@ from tests.blender import fingerprints, shots
 from tests.blender.grounds import heights, rest
 
 
-@pytest.fixture(scope="module")
-def baked_file(addon, tmp_path_factory):
+def bake_again(scene):
     """A walk, baked once more on the ground that the first bake has made."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    shots.walker(bpy.context.scene, frames=60)
+    shots.walker(scene, frames=60)
     bpy.ops.softground.add_character()
-    bpy.context.scene.softground.cell_size = 0.02
+    scene.softground.cell_size = 0.02
     for _ in range(2):
         bpy.ops.softground.bake()
-    path = tmp_path_factory.mktemp("steps") / "baked.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    return path
 
 
 @pytest.fixture
-def baked(baked_file):
-    bpy.ops.wm.read_homefile(filepath=str(baked_file))  # as a new file, which is not saved anywhere
-    return bpy.context.scene
+def baked(opened_as):
+    return opened_as(bake_again)
 
 
 def stored(scene):

@@ -7,6 +7,7 @@ from softground_addon.blender import mesh_arrays
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data, playback
 from tests.blender import fingerprints
 from tests.blender.grounds import field, refusal
+from tests.tiers import slow_but_one
 
 FINE = {"vertices": 150, "size": 5.0}
 
@@ -158,9 +159,9 @@ def played_heights(scene, shown):
     return played
 
 
-@pytest.mark.parametrize("shape_keys", [True, False])
-@pytest.mark.parametrize("copied", [False, True])
-@pytest.mark.parametrize("part", ["attach", "write_shading"])
+@pytest.mark.parametrize("shape_keys", slow_but_one([True, False]))
+@pytest.mark.parametrize("copied", slow_but_one([False, True]))
+@pytest.mark.parametrize("part", slow_but_one(["attach", "write_shading"]))
 def test_a_bake_that_fails_while_it_is_written_leaves_the_one_before(short_walk, monkeypatch, part, copied, shape_keys):
     def fail(*_arguments, **_named):
         raise MemoryError(part)

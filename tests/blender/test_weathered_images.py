@@ -13,6 +13,7 @@ from softground_addon.core.after.weather import matter_of
 from tests.blender import shots
 from tests.blender.grounds import plane
 from tests.blender.images import read_image
+from tests.tiers import slow_but_one
 
 SIDE = 128
 """Vertices and pixels along a side: a power of two, so that both lie at the same places to the last bit."""
@@ -83,8 +84,8 @@ def write(scene, folder, frame, resolution=SIDE):
     return {path.stem.split("_")[1]: read_image(path)[..., :3] for path in paths}
 
 
-@pytest.mark.parametrize("surface", ["snow", "sand", "mud"])
-@pytest.mark.parametrize("frame", [20, 300])
+@pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud"]))
+@pytest.mark.parametrize("frame", slow_but_one([20, 300]))
 def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame):
     scene = opened(surface, **SOME)
     height, attributes = shown(scene, frame)
