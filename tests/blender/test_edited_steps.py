@@ -114,6 +114,8 @@ def test_an_edit_whose_sole_is_not_in_the_bake_is_named(shot):
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"depth": 1}}}', "unknown field 'depth'"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"strength": NaN}}}', "'strength' is nan"),
         ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"sole": "paw"}}}', "'sole' is 'paw'"),
+        ('{"schema_version": 1, "steps": {"Walker/foot.L@7.0": {"sole": "\\ud800/paw"}}}', r"'sole' is '\ud800/paw'"),
+        ('{"schema_version": 1, "steps": {"\\ud800/foot.L@7.0": {"mute": true}}}', "not the id of a step"),
         ('{"schema_version": 9, "steps": {}}', "version 9"),
         ("[" * 100_000, "are not valid JSON"),
     ],

@@ -25,7 +25,7 @@ SMALLEST, LARGEST = 0.2, 5.0
 LONGEST_SHIFT = 1000
 """Most frames of `StepEdit.shift_frames`, either way."""
 LONGEST_NAME = 200
-"""Most letters of `StepEdit.sole`."""
+"""Most bytes of `StepEdit.sole`."""
 MOST_COPIES = 999
 """Most copies of one step."""
 
@@ -227,10 +227,11 @@ def from_json(content: object, origin: str) -> dict[str, StepEdit]:
 
 
 def _edit(name: str, change: object, origin: str) -> StepEdit:
-    where = f"{origin}, step '{name}'"
+    where = f"{origin}, step {name!r}"
     try:
         _parts(name)
-    except ValueError:
+        name.encode()
+    except ValueError:  # also for half a character
         raise InputError(f"{where}: this is not the id of a step. The bake's report names them: steps, id.") from None
     if not isinstance(change, dict):
         raise InputError(f'{where} must be a table such as {{"mute": true}}.')
@@ -251,16 +252,20 @@ def _is_move(value: object) -> bool:
     )
 
 
+def _is_sole(value: object) -> bool:
+    try:
+        return isinstance(value, str) and len(value.encode()) <= LONGEST_NAME and (value == "" or "/" in value)
+    except UnicodeEncodeError:  # half a character
+        return False
+
+
 _VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
     "mute": (lambda value: isinstance(value, bool), "true or false"),
     "strength": (lambda value: _is_number(value, 0.0, STRONGEST), f"a number from 0 to {STRONGEST:g}"),
     "move_m": (_is_move, f"two numbers up to {FARTHEST:g} m, along x and y"),
     "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360"),
     "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}"),
-    "sole": (
-        lambda value: isinstance(value, str) and len(value) <= LONGEST_NAME and (value == "" or "/" in value),
-        "the character and contact of a step, such as 'Fox/paw.L'",
-    ),
+    "sole": (_is_sole, "the character and contact of a step, such as 'Fox/paw.L'"),
     "shift_frames": (
         lambda value: _is_number(value, -LONGEST_SHIFT, LONGEST_SHIFT) and value == int(value),
         f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
