@@ -1,12 +1,10 @@
-"""Entries in Blender's own menus, through which the search (F3) finds operators, and a line in its status bar."""
+"""Entries in Blender's own menus, through which the search (F3) finds operators."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import bpy
-
-from .. import session
 
 
 class SOFTGROUND_MT_object(bpy.types.Menu):
@@ -61,18 +59,11 @@ def draw_in_add_menu(menu: Any, _context: bpy.types.Context) -> None:
     menu.layout.operator("softground.create_ground", text="SoftGround", icon="MESH_GRID").use_selected = False
 
 
-def draw_in_status_bar(header: Any, _context: bpy.types.Context) -> None:
-    """Say that live mode is on, and how it ends; in every workspace, unlike `WorkSpace.status_text_set`."""
-    if session.current().is_live:
-        header.layout.label(text="Live Footprints  |  End with Keep or Discard in the sidebar")
-
-
 def register() -> None:
     """Add the entries."""
     bpy.types.VIEW3D_MT_object.append(draw_in_object_menu)
     bpy.types.VIEW3D_MT_mesh_add.append(draw_in_add_menu)
     bpy.types.VIEW3D_MT_armature_add.append(draw_in_armature_menu)
-    bpy.types.STATUSBAR_HT_header.prepend(draw_in_status_bar)
 
 
 def unregister() -> None:
@@ -80,7 +71,6 @@ def unregister() -> None:
     bpy.types.VIEW3D_MT_object.remove(draw_in_object_menu)
     bpy.types.VIEW3D_MT_mesh_add.remove(draw_in_add_menu)
     bpy.types.VIEW3D_MT_armature_add.remove(draw_in_armature_menu)
-    bpy.types.STATUSBAR_HT_header.remove(draw_in_status_bar)
 
 
 CLASSES = (SOFTGROUND_MT_object,)

@@ -118,7 +118,13 @@ def forget() -> None:
     if bpy.app.timers.is_registered(answer):
         bpy.app.timers.unregister(answer)
     session.current().is_live = False
+    bpy.types.STATUSBAR_HT_header.remove(_draw_in_status_bar)
     session.redraw()
+
+
+def _draw_in_status_bar(header: Any, _context: bpy.types.Context) -> None:
+    """Say that live mode is on, and how it ends; in every workspace, unlike `WorkSpace.status_text_set`."""
+    header.layout.label(text="Live Footprints  |  End with Keep or Discard in the sidebar")
 
 
 def discard() -> None:
@@ -172,6 +178,7 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
         if _mode is None:
             _mode = LiveMode(scene)
             session.current().is_live = True
+            bpy.types.STATUSBAR_HT_header.prepend(_draw_in_status_bar)
             _mode.follow(scene)
             watch()
         elif self.keep:
