@@ -1,4 +1,4 @@
-"""What pictures out of doors have in common: ground to the horizon, sky and low sun, trees, a camera with a focus."""
+"""What pictures out of doors have in common: ground to the horizon, a walk, sky and low sun, trees, a sharp camera."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import ArrayLike
 
-from sample_scenes import stage, terrain
+from sample_scenes import production, stage, terrain
+from sample_scenes.body import Body
+from sample_scenes.character import create_character
+from sample_scenes.gait import Gait, walk
+from sample_scenes.keys import write_action
+from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
 
 NEAR, FAR = 9.0, 600.0
@@ -55,6 +60,36 @@ def rolling(swell: float, hills: float, seed: int = 0) -> terrain.Field:
         return swell * aside * summed(near, x, y) + hills * away * ridges
 
     return height
+
+
+def add_ground(
+    scene: bpy.types.Scene, name: str, along: tuple[float, float], height: terrain.Field, surface: str
+) -> bpy.types.Object:
+    """Ground to the horizon, even around the way and from one y to another `along` it [m]."""
+    return terrain.add_terrain(name, places(-NEAR, NEAR), places(*along), height, surface, scene.collection)
+
+
+def bake_walk(
+    scene: bpy.types.Scene,
+    ground: bpy.types.Object,
+    start: float,
+    frames: int,
+    preset: str,
+    cell_size: float | None,
+    options: Options | None,
+) -> Bake:
+    """A hiker who walks along the way toward -y, from y = `start` [m], in prints as fine as close-ups ask for.
+
+    The camera is there first: relief is fine where it comes near.
+    """
+    body = Body()
+    walker = create_character("Hiker", body, scene.collection)
+    walker.location = (0.0, start, 0.0)
+    write_action(walker, walk(body, Gait(), frames, scene.render.fps), "Walk")
+    scene.frame_start, scene.frame_end = 1, frames
+    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "detail": "ALWAYS", "sink_feet": "true"}
+    chosen |= dict(options or {})
+    return production.bake(scene, [Walker(walker, body.mass)], preset, cell_size, ground=ground, options=chosen)
 
 
 _SUN_WIDTH = radians(0.7)

@@ -9,12 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage, terrain
-from sample_scenes.body import Body
-from sample_scenes.character import create_character
-from sample_scenes.gait import Gait, walk
-from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes import open_air, production, stage
+from sample_scenes.production import Bake, Claim, Options
 from softground_addon.blender.ground import weather
 
 CELL_SIZE: float | None = None
@@ -37,25 +33,10 @@ class PathAfterRain:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PathAfterRain:
     """A wide ground, a walk away from the camera, and a shower on its prints."""
-    ground = terrain.add_terrain(
-        "Path",
-        open_air.places(-open_air.NEAR, open_air.NEAR),
-        open_air.places(-20.0, START + 3.0),
-        HEIGHT,
-        "soil",
-        scene.collection,
-    )
-    body = Body()
-    walker = create_character("Hiker", body, scene.collection)
-    walker.location = (0.0, START, 0.0)
-    write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    scene.frame_start, scene.frame_end = 1, FRAMES
+    ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), HEIGHT, "soil")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (0.40, 1.70, 0.62), (-0.12, -1.2, 0.06), 28.0, (0.0, 0.1, 0.0), 8.0)
-    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "detail": "ALWAYS", "sink_feet": "true"}
-    bake = production.bake(
-        scene, [Walker(walker, body.mass)], PRESET, cell_size, ground=ground, options=chosen | dict(options or {})
-    )
+    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
     weather.set_preset(weather.add(bake.ground), "SHOWER")
     return PathAfterRain({PRESET: bake})
 

@@ -9,12 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage, terrain
-from sample_scenes.body import Body
-from sample_scenes.character import create_character
-from sample_scenes.gait import Gait, walk
-from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes import open_air, production, stage
+from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -36,25 +32,10 @@ class SnowAtDusk:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> SnowAtDusk:
     """A wide ground, and a walk away from the camera, which is there first: relief is fine where it comes near."""
-    ground = terrain.add_terrain(
-        "Snow Field",
-        open_air.places(-open_air.NEAR, open_air.NEAR),
-        open_air.places(-26.0, START + 3.0),
-        HEIGHT,
-        "snow",
-        scene.collection,
-    )
-    body = Body()
-    walker = create_character("Hiker", body, scene.collection)
-    walker.location = (0.0, START, 0.0)
-    write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    scene.frame_start, scene.frame_end = 1, FRAMES
+    ground = open_air.add_ground(scene, "Snow Field", (-26.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (0.45, 1.75, 0.60), (-0.13, -1.5, 0.09), 28.0, (0.0, 0.1, 0.0), 8.0)
-    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "detail": "ALWAYS", "sink_feet": "true"}
-    bake = production.bake(
-        scene, [Walker(walker, body.mass)], PRESET, cell_size, ground=ground, options=chosen | dict(options or {})
-    )
+    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
     return SnowAtDusk({PRESET: bake})
 
 

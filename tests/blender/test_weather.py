@@ -16,14 +16,13 @@ from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import matter_of
 from softground_addon.core.after.weather_places import WeatherPlaces, section_of
-from tests.blender import shots
+from tests.blender import weathered_shots
 from tests.core.after.weather_course import Weather
 from tests.core.after.weathered_ground import weathered
 from tests.tiers import slow_but_one
 
 FRAMES = (1, 20, 34, 300)
-SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}
-SOME |= {"Water Table": 2.0, "Halo": 0.8}
+SOME = weathered_shots.SOME | {"Water Table": 2.0, "Halo": 0.8}
 DEFAULTS = {name: value for name, value, *_ in nodes.INPUTS}
 MAY_LACK = (*nodes.OF_HOLLOWS, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)
 """What is not stored where no water stands, and where there is no weather."""
@@ -34,10 +33,7 @@ HOUR = 3600.0
 def baked(addon, tmp_path_factory):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    shots.walker(scene, frames=34)
-    bpy.ops.softground.add_character()
-    bpy.ops.softground.load_preset(name="Snow")
-    scene.softground.cell_size = 0.02
+    weathered_shots.added_walker(scene)
     bpy.ops.softground.bake()
     path = tmp_path_factory.mktemp("weather") / "shot.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -49,11 +45,7 @@ def opened(baked, tmp_path, monkeypatch):
     """Opens a bake on snow, which weather may take for another surface."""
 
     def open_(surface="snow"):
-        path = tmp_path / "shot.blend"
-        path.write_bytes(baked.read_bytes())
-        bpy.ops.wm.open_mainfile(filepath=str(path))
-        monkeypatch.setattr(weather, "matter_of", lambda _, *of_bake: matter_of(surface, *of_bake))
-        return bpy.context.scene
+        return weathered_shots.opened_as(surface, baked, tmp_path, monkeypatch)
 
     return open_
 

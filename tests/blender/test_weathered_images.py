@@ -6,18 +6,16 @@ import pytest
 
 from softground_addon.blender import compat, jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import baked_ground, weather, weather_modifier
+from softground_addon.blender.ground import baked_ground, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.output import image_exports
-from softground_addon.core.after.weather import matter_of
-from tests.blender import shots
+from tests.blender import weathered_shots
 from tests.blender.grounds import plane
 from tests.blender.images import read_image
 from tests.tiers import slow_but_one
 
 SIDE = 128
 """Vertices and pixels along a side: a power of two, so that both lie at the same places to the last bit."""
-SOME = {"Snowfall": 2.0, "Temperature": 1.5, "Wind": 8.0, "Rain": 30.0, "Drying": 0.4, "Time Scale": 900.0}
 KINDS = ("displacement", "mask", "weather")
 
 
@@ -26,14 +24,11 @@ def baked(addon, tmp_path_factory):
     """A baked plane of whose UV map each vertex has a pixel of its own."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    shots.walker(scene, frames=34)
-    bpy.ops.softground.add_character()
-    bpy.ops.softground.load_preset(name="Snow")
+    weathered_shots.added_walker(scene)
     ground = scene.softground.ground = plane(scene, vertices=SIDE)
     layer = ground.data.uv_layers.new(name="UVMap")
     row, column = np.divmod([loop.vertex_index for loop in ground.data.loops], SIDE)
     layer.uv.foreach_set("vector", ((np.stack([column, row], axis=-1) + 0.5) / SIDE).astype(np.float32).ravel())
-    scene.softground.cell_size = 0.02
     bpy.context.view_layer.update()
     jobs.run(bake_job.bake(scene))
     path = tmp_path_factory.mktemp("images") / "shot.blend"
@@ -46,11 +41,7 @@ def opened(baked, tmp_path, monkeypatch):
     """Opens a bake on snow, with weather that may take it for another surface."""
 
     def open_(surface, **values):
-        path = tmp_path / "shot.blend"
-        path.write_bytes(baked.read_bytes())
-        bpy.ops.wm.open_mainfile(filepath=str(path))
-        monkeypatch.setattr(weather, "matter_of", lambda _, *of_bake: matter_of(surface, *of_bake))
-        scene = bpy.context.scene
+        scene = weathered_shots.opened_as(surface, baked, tmp_path, monkeypatch)
         bpy.ops.softground.add_weather()
         modifier = weather_modifier.modifier_of(baked_ground.display_mesh_of(scene.softground.ground))
         for name, identifier in weather_modifier.inputs_of(modifier).items():
@@ -87,7 +78,7 @@ def write(scene, folder, frame, resolution=SIDE):
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud"]))
 @pytest.mark.parametrize("frame", slow_but_one([20, 300]))
 def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame):
-    scene = opened(surface, **SOME)
+    scene = opened(surface, **weathered_shots.SOME)
     height, attributes = shown(scene, frame)
     scene.frame_set(7)
     images = write(scene, tmp_path, frame)
@@ -122,7 +113,7 @@ def test_keyed_weather_and_remapped_time_are_those_of_the_scene(opened, tmp_path
 
 
 def test_hidden_weather_and_none_write_the_bake_alone(opened, tmp_path):
-    scene = opened("snow", **SOME)
+    scene = opened("snow", **weathered_shots.SOME)
     ground = scene.softground.ground
     weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)).show_viewport = False
     hidden = write(scene, tmp_path, 30)
@@ -134,7 +125,7 @@ def test_hidden_weather_and_none_write_the_bake_alone(opened, tmp_path):
 
 
 def test_an_export_leaves_nothing_behind(opened, tmp_path):
-    scene = opened("mud", **SOME)
+    scene = opened("mud", **weathered_shots.SOME)
 
     def there():
         return {kind: {one.name for one in getattr(bpy.data, kind)} for kind in ("meshes", "objects", "scenes")}

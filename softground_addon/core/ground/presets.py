@@ -165,10 +165,14 @@ def _bare(name: str) -> str:
     return re.sub(r"[\W_]+", "_", name.casefold()).strip("_")
 
 
+def _files(folders: tuple[Path, ...]) -> list[Path]:
+    return [path for folder in folders for path in sorted(folder.glob("*.json"))]
+
+
 def names(folders: tuple[Path, ...] = (FOLDER,)) -> list[str]:
     """Names of the presets in some folders, in their order; broken files are left out."""
     found = []
-    for path in (path for folder in folders for path in sorted(folder.glob("*.json"))):
+    for path in _files(folders):
         with suppress(InputError):
             found.append(load(path).name)
     return found
@@ -182,8 +186,7 @@ def find(name: str, folders: tuple[Path, ...] = (FOLDER,)) -> Preset:
     InputError
         If there is none, listing those that there are.
     """
-    wanted = _bare(name)
-    paths = [path for folder in folders for path in sorted(folder.glob("*.json"))]
+    wanted, paths = _bare(name), _files(folders)
     for path in paths:
         if _bare(path.stem) == wanted:
             return load(path)
