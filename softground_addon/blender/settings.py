@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -151,7 +150,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         painted=(options.painted.stiffness, options.painted.layer_depth, options.painted.rim),
         cell_size_m=typed(options.cell_size),
         frames=(options.frame_start, options.frame_end),
-        **asdict(units_of(scene)),
+        **vars(units_of(scene)),
         response=_response(options, grounded=grounded),
         sink_feet=options.sink_feet,
         output=options.output,
@@ -204,7 +203,7 @@ def character_of(character: Any) -> CharacterSettings:
         skin_mass_kg=typed(character.skin_mass),
         size_m=typed(character.size),
         force_model=character.force_model,
-        joints={entry.name: (entry.bone, entry.end.lower()) for entry in character.joints if entry.bone},
+        joints={entry.name: (bone, entry.end.lower()) for entry in character.joints if (bone := entry.bone)},
         soles=soles,
     )
 

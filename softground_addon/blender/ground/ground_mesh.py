@@ -113,7 +113,7 @@ def is_baked(ground: bpy.types.Object) -> bool:
 
 def has_remains(ground: bpy.types.Object) -> bool:
     """Whether a bake is on this ground, or at least what a bake would take away again."""
-    return ground.type == "MESH" and REST in own_data.made(mesh_of(ground))
+    return ground.type == "MESH" and own_data.has_made(mesh_of(ground), REST)
 
 
 def summary_of(ground: bpy.types.Object) -> dict[str, float]:
@@ -389,7 +389,7 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
     Vertices that the bake does not move are where they are now, so that what the user has modelled since stays.
     """
-    attribute = mesh.attributes[REST] if REST in own_data.made(mesh) else None
+    attribute = mesh.attributes[REST] if own_data.has_made(mesh, REST) else None
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return mesh_arrays.positions(mesh)
     kept = np.empty(len(mesh.vertices) * 3, dtype=np.float32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import bpy
@@ -43,12 +43,21 @@ PROPERTIES = (RECORD, SUMMARY, WARNINGS, FINGERPRINTS, MADE)
 
 def made(mesh: bpy.types.Mesh) -> set[str]:
     """Names of the attributes that a bake has made on a mesh, as far as they are still there."""
+    return {name for name in _noted(mesh) if name in ATTRIBUTES and name in mesh.attributes}
+
+
+def has_made(mesh: bpy.types.Mesh, name: str) -> bool:
+    """Whether a bake has made one of `ATTRIBUTES` on a mesh; asked at each redraw."""
+    return name in _noted(mesh) and name in mesh.attributes
+
+
+def _noted(mesh: bpy.types.Mesh) -> Sequence[str]:
     noted = mesh.get(MADE)
-    if noted is None:  # as version 0.1 left it, which noted nothing
-        rest = mesh.attributes.get(REST)
-        whole = rest is not None and (rest.domain, rest.data_type) == ("POINT", "FLOAT_VECTOR")
-        noted = "\n".join(ATTRIBUTES) if whole and hasattr(mesh.get(RECORD), "to_list") else ""
-    return {name for name in str(noted).split("\n") if name in ATTRIBUTES and name in mesh.attributes}
+    if noted is not None:
+        return str(noted).split("\n")
+    rest = mesh.attributes.get(REST)  # as version 0.1 left it, which noted nothing
+    whole = rest is not None and (rest.domain, rest.data_type) == ("POINT", "FLOAT_VECTOR")
+    return ATTRIBUTES if whole and hasattr(mesh.get(RECORD), "to_list") else ()
 
 
 def users_own(ground: bpy.types.Object) -> list[str]:
