@@ -129,6 +129,9 @@ class Simulation:
             for contact in ended:
                 contacts.remove(contact)
                 changed += self._solver.settle(contact, frame)
+                if self._solver.weathered:
+                    ended_at = float(contact.layout.steps.frames[-1])
+                    self._solver.weathered.ended(ended_at, contact.compressed, contact.area)
             start = int(end)
             yield FrameResult(
                 frame,

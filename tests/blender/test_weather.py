@@ -15,9 +15,9 @@ from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import matter_of
+from softground_addon.core.after.weather_course import Weather
 from softground_addon.core.after.weather_places import WeatherPlaces, section_of
 from tests.blender import weathered_shots
-from tests.core.after.weather_course import Weather
 from tests.core.after.weathered_ground import weathered
 from tests.tiers import slow_but_one
 

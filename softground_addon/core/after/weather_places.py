@@ -114,6 +114,12 @@ def weather_places(
     )
 
 
+def shares(variance: Array) -> Array:
+    """How far a variance (K,) [m²] is through each of the spans between `BOUNDS`, (K, 3), 0 to 1."""
+    low, high = np.array(BOUNDS[:-1]), np.array(BOUNDS[1:])
+    return np.asarray(np.clip((np.asarray(variance)[..., None] - low) / (high - low), 0.0, 1.0))
+
+
 def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
     """Least and largest share of their soaking that the hollows have left; in between, puddles are interpolated.
 

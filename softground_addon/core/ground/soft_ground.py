@@ -3,10 +3,60 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
-from .heightfield import Terrain
+import numpy as np
+from numpy.typing import NDArray
+
+from .heightfield import HeightField, Terrain, Window
 from .material import GroundMaterial, Pressure
 from .variation import Variation
+
+Array = NDArray[np.float64]
+
+
+class Weathering(Protocol):
+    """What weather does between one contact and the next; frames are those of the scene."""
+
+    @property
+    def reach(self) -> float:
+        """How far around it what a cell becomes depends on the ground [m]."""
+        ...
+
+    def level(self, frame: float) -> float:
+        """How much higher open ground is at a frame than without weather, where steps press what fell [m]."""
+        ...
+
+    def aged(
+        self,
+        ground: HeightField,
+        window: Window,
+        *,
+        since: Array,
+        trodden: NDArray[np.bool_],
+        frame: float,
+        section: float | None,
+    ) -> Array:
+        """Compression and rim of cells, as weather has left them by a frame.
+
+        Parameters
+        ----------
+        ground : HeightField
+            As it was left by steps.
+        window : Window
+        since : (rows, columns) float array
+            Frame at which each cell changed last.
+        trodden : (rows, columns) bool array
+            Cells that were ever in contact.
+        frame : float
+        section : float or None
+            Volume of a print over its width [m²], None where it is not known yet.
+
+        Returns
+        -------
+        (2, rows, columns) float array
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -22,9 +72,12 @@ class SoftGround:
         How the force on a sole spreads over its contact.
     variation : Variation or None
         How the ground varies from place to place.
+    weathering : Weathering or None
+        What steps find of earlier ones; None where these stay as they are.
     """
 
     terrain: Terrain
     material: GroundMaterial
     pressure: Pressure = "UNIFORM"
     variation: Variation | None = None
+    weathering: Weathering | None = None

@@ -31,6 +31,8 @@ class OpenContact:
         None until something is pressed.
     compression : SparseGrid or None
         What it compressed itself [m], kept where the ground hardens.
+    met : Imprints or None
+        Those of which it was last seen what weather had left there.
     compressed, raised, unplaced : float
         Volumes that it compressed and raised, and that found no place to rise [m³].
     """
@@ -45,6 +47,7 @@ class OpenContact:
         self.layout, self.earlier, self.pressed_by = layout, earlier, pressed_by
         self.recorder: FootprintRecorder | None = None
         self.compression: SparseGrid | None = None
+        self.met: Imprints | None = None
         self.compressed = self.raised = self.unplaced = 0.0
         self._load = self._area = self._sinkage = 0.0
         self._moment = np.zeros(3)
@@ -64,6 +67,11 @@ class OpenContact:
                 self._laid_out[start, end] = imprints
             self._imprints = imprints
         return imprints
+
+    @property
+    def area(self) -> float:
+        """Largest area of contact so far [m²]."""
+        return self._area
 
     def add_loads(self, imprints: Imprints, first: int, last: int) -> None:
         """Add the loads of some of the imprints, which were pressed."""

@@ -17,6 +17,7 @@ from .ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
 from .open_contact import OpenContact
 from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
 from .rim import displaced_volume
+from .weathered_cells import WeatheredCells
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,6 +40,10 @@ class GroundSolver:
         self.contact: list[tuple[Window, Mask]] = []
         """Cells that were in contact in the steps pressed last."""
         self.cells = GroundCells(ground, undisturbed)
+        self.weathered: WeatheredCells | None = None
+        """What weather does between contacts, where steps feel it."""
+        if ground.weathering:
+            self.weathered = WeatheredCells(ground.weathering, ground.material.layer_depth, state.cell_size)
 
     @property
     def material(self) -> GroundMaterial:
@@ -83,12 +88,15 @@ class GroundSolver:
         window, surface = self._around(contact.recorder.window)
         state = self.state.read(window)
         before = quantised(state)
+        lowered = self._lowered(window, frame)
+        state[0] += lowered
         state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
+        state[0] -= lowered
         change = quantised(state) - before
         if not change.any():
             return ()
         self.state.write(window, state)
-        contact.recorder.add(frame, window, change, np.zeros(change.shape[1:], bool))
+        self._record(contact.recorder, frame, window, change, np.zeros(change.shape[1:], bool))
         return (window,)
 
     def _press(
@@ -105,6 +113,9 @@ class GroundSolver:
         before = quantised(whole)
         inside = window.slices(imprints.window)
         state = whole[:, inside[0], inside[1]]
+        thicker = self._meet(contact, imprints, state, frame, timing)
+        lowered = self._lowered(window, frame)
+        whole[0] += lowered
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
         rim = imprints.rim[steps].reshape(len(steps), -1)
@@ -112,7 +123,7 @@ class GroundSolver:
             compression = compress(
                 state[0],
                 imprints.coverage[step],
-                imprints.target[step],
+                imprints.target[step] * thicker,
                 imprints.rate[step],
                 holds=False if imprints.holds is None else imprints.holds[step],
                 compacted=compacted,
@@ -133,9 +144,10 @@ class GroundSolver:
         rise = displaced @ rim
         if not surface:
             state[1] += rise.reshape(state[1].shape)
-        self.state.write(window, whole)
         if contact.compression is not None and compacted is not None:
             contact.compression.write(imprints.window, (state[0] - compacted)[None])
+        whole[0] -= lowered
+        self.state.write(window, whole)
         contact.add_loads(imprints, first, last)
         cell_area = self.cell_size**2
         contact.compressed += float(heights.sum()) * cell_area
@@ -145,9 +157,29 @@ class GroundSolver:
             contact.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
         touched = np.zeros(whole.shape[1:], bool)
         touched[inside] = imprints.contact[steps].any(axis=0)
-        contact.recorder.add(frame, window, quantised(whole) - before, touched)
+        self._record(contact.recorder, frame, window, quantised(whole) - before, touched)
         self.contact.append((window, touched))
         return [window] if surface else []
+
+    def _meet(self, contact: OpenContact, imprints: Imprints, state: Array, frame: float, timing: Timing) -> float:
+        """Let a contact find under new imprints what weather has left; how much thicker the layer is."""
+        if not self.weathered:
+            return 1.0
+        if contact.met is not imprints:
+            contact.met = imprints
+            state[:] = self.weathered.met(self.state, imprints, frame, timing.frame_step)
+        return self.weathered.thicker(frame)
+
+    def _lowered(self, window: Window, frame: float) -> Array | float:
+        """How much less than its depth below open ground each trodden cell of a window is recorded as [m]."""
+        return self.weathered.trodden(window) * self.weathered.level(frame) if self.weathered else 0.0
+
+    def _record(
+        self, recorder: FootprintRecorder, frame: float, window: Window, change: NDArray[np.int64], touched: Mask
+    ) -> None:
+        recorder.add(frame, window, change, touched)
+        if self.weathered:
+            self.weathered.note(window, change.any(axis=0), touched, frame)
 
     def _compacted_before(self, contact: OpenContact, window: Window, state: Array) -> Array:
         """Compression of a window that a contact met when it began: all but its own (rows, columns) [m]."""

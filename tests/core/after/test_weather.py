@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp, trapezoid
 
 from softground_addon.core.after import weather as w
 from softground_addon.core.after.weather import Span
-from tests.core.after.weather_course import Weather, course_of
+from softground_addon.core.after.weather_course import Weather, course_of
 
 HOUR, DAY = 3600.0, 86_400.0
 SECTION = 0.27 * 0.04

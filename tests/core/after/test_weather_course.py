@@ -7,7 +7,7 @@ import pytest
 
 from softground_addon.core.after import weather as w
 from softground_addon.core.after.weather import PARTS, Span
-from tests.core.after.weather_course import Weather, course_of
+from softground_addon.core.after.weather_course import Weather, course_of
 
 HOUR = 3600.0
 SPAN = Span(1.0, 1.0 + 2 * PARTS, 24.0)

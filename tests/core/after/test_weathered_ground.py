@@ -7,10 +7,10 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from softground_addon.core.after.weather import DEGREE_DAY, SNOW, WATER_DENSITY, Span, matter_of
+from softground_addon.core.after.weather_course import Weather, course_of
 from softground_addon.core.after.weather_places import KNOTS, SIGMAS, WeatherPlaces, section_of, weather_places
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import recompose
-from tests.core.after.weather_course import Weather, course_of
 from tests.core.after.weathered_ground import weathered
 from tests.core.walkers import pressed, walk
 

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from softground_addon.core.after import weather as w
 from softground_addon.core.after.weather import Span
+from softground_addon.core.after.weather_course import Course, Weather, course_of
 from softground_addon.core.after.weather_places import (
-    BOUNDS,
     COVERED,
     KNOTS,
     LEAST_RANGE,
     NEAR,
     WeatherPlaces,
+    shares,
     soaking_shares,
 )
-from tests.core.after.weather_course import Course, Weather, course_of
 
 Array = NDArray[np.float64]
 
@@ -111,9 +111,3 @@ def _standing(places: WeatherPlaces, change: Array, weather: Weather, matter: w.
     seep = np.maximum(rises.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)
     level = np.maximum(rain, seep)
     return np.where(level > 0, np.maximum(level - above - change, 0.0), 0.0)
-
-
-def shares(variance: Array) -> Array:
-    """How far a variance (K,) [m²] is through each of the spans between `BOUNDS`, (K, 3), 0 to 1."""
-    low, high = np.array(BOUNDS[:-1]), np.array(BOUNDS[1:])
-    return np.asarray(np.clip((np.asarray(variance)[..., None] - low) / (high - low), 0.0, 1.0))

@@ -6,15 +6,17 @@ are those of each part; within it every integral but that over the settling of i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softground_addon.core.after import weather as w
-from softground_addon.core.after.weather import NO_WATER, PARTS, Span
+from . import weather as w
+from .weather import NO_WATER, PARTS, Span
 
 Array = NDArray[np.float64]
+Rate = float | Sequence[float] | Array
 
 KEYED = ("snowfall", "temperature", "wind", "rain", "drying", "time_scale")
 """What is summed up over time."""
@@ -22,21 +24,21 @@ KEYED = ("snowfall", "temperature", "wind", "rain", "drying", "time_scale")
 
 @dataclass(frozen=True)
 class Weather:
-    """Rates, each a number, or (PARTS + 1,): the mean of each part of a span, and what holds from its end on.
+    """Rates, each a number, or PARTS + 1 of them: the mean of each part of a span, and what holds from its end on.
 
     Attributes
     ----------
-    snowfall : float or array
+    snowfall : float or sequence of float
         New snow [m/s].
-    temperature : float or array
+    temperature : float or sequence of float
         Of the air [°C].
-    wind : float or array
+    wind : float or sequence of float
         At 10 m [m/s].
-    rain : float or array
+    rain : float or sequence of float
         [m/s].
-    drying : float or array
+    drying : float or sequence of float
         Evaporation [m/s].
-    time_scale : float or array
+    time_scale : float or sequence of float
         How many times faster it goes than the animation.
     water_table : float
         How far below the brim of each print water comes to stand from below, now [m].
@@ -44,12 +46,12 @@ class Weather:
         How pale wet sand turns around a loaded foot, 0 to 1.
     """
 
-    snowfall: float | Array = 0.0
-    temperature: float | Array = 0.0
-    wind: float | Array = 0.0
-    rain: float | Array = 0.0
-    drying: float | Array = 0.0
-    time_scale: float | Array = 1.0
+    snowfall: Rate = 0.0
+    temperature: Rate = 0.0
+    wind: Rate = 0.0
+    rain: Rate = 0.0
+    drying: Rate = 0.0
+    time_scale: Rate = 1.0
     water_table: float = NO_WATER
     halo: float = 0.0
 

@@ -1,0 +1,97 @@
+"""Cells that weather acts on between contacts: when each changed last, and what a new contact finds of it.
+
+Ground is recorded as it lies without weather. Where a contact presses ground that weather has raised or lowered, the
+record takes that in: its compression is less than 0 where a step lies on new snow.
+"""
+
+from __future__ import annotations
+
+from math import fsum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.soft_ground import Weathering
+from .ground_cells import Imprints
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class WeatheredCells:
+    """What weather needs to know of a ground that is pressed.
+
+    Parameters
+    ----------
+    weathering : Weathering
+    layer_depth : float
+        Of the loose layer [m].
+    cell_size : float
+        Side of a cell [m].
+    """
+
+    def __init__(self, weathering: Weathering, layer_depth: float, cell_size: float) -> None:
+        self._weathering, self._layer_depth = weathering, layer_depth
+        self._last = SparseGrid(cell_size, channels=2, fill=-np.inf)
+        """Scene frame at which each cell changed last; 0 where it was ever in contact."""
+        self._sections: list[tuple[float, float]] = []
+
+    def ended(self, frame: float, compressed: float, area: float) -> None:
+        """A contact ended at a scene frame, after it compressed a volume [m³] with an area [m²]."""
+        if area > 0:
+            self._sections.append((frame, compressed / np.sqrt(area)))
+
+    def note(self, window: Window, changed: Mask, touched: Mask, frame: float) -> None:
+        """Cells of a window (rows, columns) changed or were in contact at a scene frame."""
+        values = self._last.read(window)
+        values[0][changed | touched] = frame
+        values[1][touched] = 0.0
+        self._last.write(window, values)
+
+    def trodden(self, window: Window) -> Mask:
+        """Cells of a window that were ever in contact, (rows, columns)."""
+        return self._last.read(window)[1] == 0.0
+
+    def level(self, frame: float) -> float:
+        """Height of open ground [m]."""
+        return self._weathering.level(frame)
+
+    def thicker(self, frame: float) -> float:
+        """Thickness of the loose layer over what it is without weather."""
+        return max(1.0 + self.level(frame) / self._layer_depth, 0.0)
+
+    def met(self, ground: HeightField, imprints: Imprints, frame: float, frame_step: float) -> Array:
+        """What a contact finds as it begins: compression and rim, (2, rows, columns), as they are recorded [m].
+
+        Parameters
+        ----------
+        ground : HeightField
+        imprints : Imprints
+            Where it will press and raise the ground.
+        frame, frame_step : float
+            Scene frame, and how many are between those that are recorded.
+        """
+        window, pressing = imprints.window, imprints.pressing
+        pressed = imprints.contact[pressing].any(axis=0)
+        last, was_trodden = self._last.read(window)
+        trodden = was_trodden == 0.0
+        # What changes all along has no age.
+        stale = (pressed | (imprints.rim[pressing] > 0).any(axis=0)) & (last > -np.inf)
+        stale &= last < frame - 1.5 * frame_step
+        state = ground.read(window)
+        if stale.any():
+            section = self._section(frame - frame_step)
+            aged = self._weathering.aged(
+                ground, window, since=np.where(stale, last, frame), trodden=trodden, frame=frame, section=section
+            )
+            state = np.where(stale, aged, state)
+        new = pressed & ~trodden
+        state[0] -= new * self.level(frame)
+        self.note(window, new, new, frame)
+        return state
+
+    def _section(self, frame: float) -> float | None:
+        """Mean volume over width of the prints that ended by a frame [m²]."""
+        known = [section for ended, section in self._sections if ended <= frame]
+        return fsum(known) / len(known) if known else None

@@ -1,0 +1,169 @@
+"""Steps that feel the weather: a second step into a print that snow, rain, wind or warmth was at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from softground_addon.core.after import weather as w
+from softground_addon.core.after.felt_weather import FeltWeather, PrintsInWeather
+from softground_addon.core.after.weather import PARTS, Span
+from softground_addon.core.after.weather_course import course_of
+from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, Window
+from softground_addon.core.ground.material import GroundMaterial
+from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.motion.motion import steps_per_frame
+from softground_addon.core.record.footprints import recompose
+from softground_addon.core.simulation import simulate
+from tests.core.walkers import box_sole, loads_of, pose, walk
+
+RATE, CELL, LAYER = 24.0, 0.02, 0.4
+MATERIAL = GroundMaterial(60e3, 0.1, 0.05, layer_depth=LAYER)
+SPAN = Span(1.0, 1.0 + PARTS, RATE)
+SIDE, FORCE = 0.6, 2000.0
+DEPTH = FORCE / SIDE**2 * LAYER / 60e3
+"""Of a first print [m]: 3.7 cm."""
+FIRST, SECOND = (1, 48), (145, 192)
+"""Frames of the two contacts."""
+BETWEEN = np.arange(PARTS + 1)
+BETWEEN = (BETWEEN >= 60) & (BETWEEN < 130)
+"""Parts of the time in which there is weather: one each frame, none of them while anybody stands."""
+SECONDS = BETWEEN.sum() / RATE
+WHERE = Window(-40, -40, 80, 80)
+
+
+def two_steps(second=1.0):
+    """A flat sole that stands twice in one place; the second time under a part of the force."""
+    count = 240 * steps_per_frame(RATE) + 1
+    frames = 1.0 + np.arange(count) / steps_per_frame(RATE)
+    force = np.zeros((count, 1))
+    for (start, end), part in ((FIRST, 1.0), (SECOND, second)):
+        force[(frames > start) & (frames <= end)] = part * FORCE
+    poses = np.tile(pose([0.0, 0.0, 0.0]), (count, 1, 1, 1))
+    return loads_of([box_sole(SIDE, SIDE)], [poses], force, force > 0, RATE)
+
+
+def between(**rates):
+    """Weather while nobody stands."""
+    time_scale = rates.pop("time_scale", 1.0)
+    return FeltWeather(time_scale=tuple(np.where(BETWEEN, time_scale, 0.0).tolist()), **rates)
+
+
+def prints(weather, second=1.0, material=MATERIAL, loads=None):
+    weathering = PrintsInWeather(weather, SPAN, LAYER) if weather else None
+    ground = SoftGround(FlatTerrain(), material, weathering=weathering)
+    found = [one for result in simulate([loads or two_steps(second)], ground, CELL) for one in result.footprints]
+    return sorted(found, key=lambda one: one.start_frame)
+
+
+def cells(footprints):
+    """Compression and rim that the record has, over `WHERE`."""
+    return recompose(footprints, cell_size=CELL).read(WHERE)
+
+
+def middle(footprints):
+    return float(cells(footprints)[0][40, 40])
+
+
+def course(weather, surface, frame, section=0.1):
+    return course_of(weather, w.matter_of(surface, LAYER, section), frame=frame, span=SPAN)
+
+
+@pytest.mark.parametrize("surface", ["snow", "sand", "soil"])
+@pytest.mark.parametrize("options", [{}, {"hardening": 1.0, "repose_angle": np.radians(34.0)}, {"rim_bias": 0.5}])
+def test_weather_that_is_none_changes_no_bit(surface, options):
+    material, loads = replace(MATERIAL, **options), walk(steps=5, speed=0.2)
+    calm = FeltWeather(temperature=-10.0, wind=2.0, time_scale=3600.0, surface=surface)
+    plain, felt = (prints(weather, material=material, loads=loads) for weather in (None, calm))
+    for one, other in zip(plain, felt, strict=True):
+        assert one.compressed_m3 == other.compressed_m3
+        for changes in ("compression", "rim"):
+            before, after = getattr(one, changes), getattr(other, changes)
+            assert np.array_equal(before.cells[:], after.cells[:])
+            assert np.array_equal(before.amounts[:], after.amounts[:])
+            assert np.array_equal(before.frames, after.frames)
+
+
+def test_a_step_on_new_snow_is_as_deep_below_it_as_one_before_the_snow():
+    weather = replace(between(snowfall=0.05 / SECONDS, temperature=-5.0), surface="snow")
+    first, second = prints(weather)
+    level = float(course(weather, "snow", SECOND[0]).cover[0])
+    assert level == pytest.approx(0.05, rel=1e-4)
+    assert middle([first]) == pytest.approx(DEPTH, rel=1e-3)
+    # The layer is thicker by the new snow, and gives way the more.
+    below = DEPTH * (1 + level / LAYER)
+    assert middle([first, second]) == pytest.approx(below - level, abs=1e-5)
+    assert middle([first, second]) < 0
+    # In the middle, the second step found a print as deep as before with new snow in it, and pressed that snow alone.
+    assert second.compressed_m3 > DEPTH * level / LAYER * SIDE**2
+
+
+def test_a_step_on_untrodden_new_snow_is_that_deep_too():
+    weather = replace(between(snowfall=0.05 / SECONDS, temperature=-5.0), surface="snow")
+    loads = two_steps()
+    loads.contacts.touching[: 100 * steps_per_frame(RATE)] = False
+    (only,) = prints(weather, loads=loads)
+    level = float(course(weather, "snow", SECOND[0]).cover[0])
+    assert middle([only]) == pytest.approx(DEPTH * (1 + level / LAYER) - level, abs=1e-5)
+    # The volumes are those that the step displaced, and not the snow's.
+    assert only.compressed_m3 == pytest.approx(DEPTH * (1 + level / LAYER) * SIDE**2, rel=0.02)
+    assert only.rim_m3 == pytest.approx(2 * 0.1 * only.compressed_m3, rel=1e-9)
+
+
+def test_a_print_that_rain_rounded_is_pressed_as_the_blur_left_it():
+    rain = 0.03**2 / w.RAIN_ROUNDING / SECONDS
+    weather = replace(between(rain=rain), surface="soil")
+    first, second = prints(weather, second=0.8)
+    made = cells([first])
+    rounded = np.array([gaussian_filter(one, 0.03 / CELL, mode="constant", truncate=4.0) for one in made])
+    assert np.abs(rounded - made).max() > 5e-3
+    contact = np.zeros((80, 80), bool)
+    contact[25:55, 25:55] = True
+    pressed = np.where(contact, np.maximum(rounded[0], 0.8 * DEPTH), rounded[0])
+    assert cells([first, second])[0][contact] == pytest.approx(pressed[contact], abs=2e-5)
+    volume = (pressed - rounded[0])[contact].sum() * CELL**2
+    assert second.compressed_m3 == pytest.approx(volume, rel=0.01)
+    rim = second.rim_m3 / (second.rim_m3 + first.rim_m3)
+    assert second.rim_m3 == pytest.approx(0.2 * second.compressed_m3, rel=1e-9)
+    assert 0 < rim < 1
+
+
+@pytest.mark.parametrize("part", [0.4, 1.0])
+def test_sand_blown_into_a_print_is_pressed_down_again(part):
+    weather = replace(between(wind=8.0, time_scale=600.0), surface="sand")
+    first, second = prints(weather, second=part)
+    section = first.compressed_m3 / np.sqrt(first.area_m2)
+    flux = w.blown_flux(8.0, w.SAND)
+    kept = float(np.exp(-w.fill_rate(flux, section, w.SAND) * 600.0 * SECONDS))
+    assert 0.5 < kept < 0.9
+    assert middle([first, second]) == pytest.approx(DEPTH * max(kept, part), rel=2e-3)
+
+
+def test_a_step_into_a_print_that_stands_up_in_a_thaw():
+    weather = replace(between(temperature=4.0, time_scale=40_000.0), surface="snow")
+    first, second = prints(weather)
+    thawed = float(course(weather, "snow", SECOND[0]).thawed[0])
+    assert 0.03 < thawed < LAYER / 2
+    ratio = 1.0 - DEPTH / LAYER
+    left = DEPTH - thawed * (1.0 - ratio**2)
+    below = max(left, DEPTH * (1.0 - thawed / LAYER))
+    assert middle([first, second]) == pytest.approx(below + thawed, abs=2e-5)
+
+
+def test_new_snow_on_sand_is_trodden_down_to_the_sand():
+    weather = replace(between(snowfall=0.05 / SECONDS, temperature=-5.0), surface="sand")
+    assert middle(prints(weather)) == pytest.approx(DEPTH, rel=1e-3)
+
+
+def test_wind_takes_of_a_print_what_it_fills_and_no_more():
+    weather = replace(between(wind=8.0, time_scale=600.0), surface="sand")
+    in_weather, ground = PrintsInWeather(weather, SPAN, LAYER), HeightField(CELL)
+    made = np.zeros((2, 80, 80))
+    made[:, 35:45, 30:50] = np.random.default_rng(1).random((2, 10, 20)) * 0.05
+    ground.write(WHERE, made)
+    known = {"trodden": made[0] > 0, "frame": 145.0, "section": 0.05}
+    left = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
+    kept = np.exp(-w.fill_rate(w.blown_flux(8.0, w.SAND), 0.05, w.SAND) * 600.0 * SECONDS)
+    assert left.sum(axis=(1, 2)) == pytest.approx(kept * made.sum(axis=(1, 2)), rel=1e-4)
+    assert np.array_equal(in_weather.aged(ground, WHERE, since=np.full((80, 80), 145.0), **known), made)
