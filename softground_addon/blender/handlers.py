@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import InputError
-from . import session
+from . import session, tread_images
 from .characters.rig_sampling import IS_TEMPORARY
 from .compat import remove_scene
 from .ground import baked_ground, weather_keys
@@ -39,6 +39,8 @@ def follow_frame(scene: bpy.types.Scene, depsgraph: Any = None) -> None:
 def notice_edits(scene: Any, depsgraph: Any = None) -> None:
     """An edited animation or mesh makes what was read from it worthless, and may leave a bake outdated."""
     live.watch()
+    if depsgraph is not None and depsgraph.id_type_updated("IMAGE"):
+        tread_images.forget()
     if scene.softground.ground is not None:
         if not bpy.app.background:
             _later(compare_bake)
@@ -101,6 +103,7 @@ def before_undo(*_: Any) -> None:
 def after_undo(*_: Any) -> None:
     """Live mode shows its ground on what the undo brought back."""
     _remove_left_over_scenes()
+    tread_images.forget()
     analysis.look_again()
     live.after_undo()
     _follow_weather_keys(bpy.context.scene)
@@ -115,6 +118,7 @@ def before_load(*_: Any) -> None:
     except InputError:  # a ground in Edit Mode keeps its prints, for Clear Bake
         live.forget()
     analysis.forget()
+    tread_images.forget()
 
 
 @persistent

@@ -14,10 +14,12 @@ from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
 from ..core.motion.motion import shortest_length
+from ..core.relief_plan import IMAGE
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
 from ..core.settings import BakeSettings, CharacterSettings, ObjectName, ResponseOptions, SceneUnits, SoleSource
+from . import tread_images
 
 MATERIAL_FIELDS = tuple(MATERIAL_RANGES)
 
@@ -159,6 +161,7 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         dense_shape_keys=options.dense_shape_keys,
         tread_m=typed(options.tread),
         tread_pattern=options.tread_pattern,
+        tread_image=tread_images.map_of(options.tread_image) if options.tread_pattern == IMAGE else "",
         relief=options.relief,
         relief_vertices=options.relief_vertices,
         relief_strength=typed(options.relief_strength),
@@ -401,12 +404,16 @@ def _parse(path: str) -> list[str | int]:
     return steps
 
 
+_OTHERS = ("rna_type", "armature", "ground", "tread_image")
+"""What settings name but do not hold."""
+
+
 def _descend(owner: Any, step: str | int, path: str) -> Any:
     is_list = isinstance(owner, bpy.types.bpy_prop_collection) or not hasattr(owner, "bl_rna")
     try:
         if is_list:
             return owner[step]
-        if isinstance(step, str) and step in owner.bl_rna.properties and step not in ("rna_type", "armature", "ground"):
+        if isinstance(step, str) and step in owner.bl_rna.properties and step not in _OTHERS:
             return getattr(owner, step)
     except (KeyError, IndexError, TypeError):
         pass
@@ -443,8 +450,9 @@ def _value(setting: bpy.types.Property, text: str, path: str) -> Any:
         return text
     if kind == "STRING":
         return text
-    if kind == "POINTER" and setting.fixed_type.identifier == "Object":
-        if text not in bpy.data.objects:
-            raise InputError(f"'{path}' cannot be {text!r}: there is no object of that name.")
-        return bpy.data.objects[text]
+    kept: dict[str, Any] = {"Object": bpy.data.objects, "Image": bpy.data.images}
+    if kind == "POINTER" and (target := setting.fixed_type.identifier) in kept:
+        if text not in kept[target]:
+            raise InputError(f"'{path}' cannot be {text!r}: there is no {target.lower()} of that name.")
+        return kept[target][text]
     raise InputError(f"'{path}' is a group of settings: name one of those in it.")

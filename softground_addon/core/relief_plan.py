@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,18 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .ground.presets import SURFACES
+from .motion.motion import CharacterMotion
 from .numerics.slices import Slices, sliced
 from .record.footprints import Footprint
-from .relief import amounts
+from .relief import amounts, tread_map
 from .relief.steps import ReliefSettings, StepRelief, relief_of_steps
-from .relief.tread import PATTERNS
+from .relief.tread import PATTERNS, SoleTread, of_map
+from .settings import BakeSettings
 
 Array = NDArray[np.float64]
+
+IMAGE, SHOES = "IMAGE", "SHOES"
+"""Patterns that are read: from an image that is the same under all soles, and from the undersides of each."""
 
 FEET_IN_SHOES = 2
 """Feet of those who wear shoes."""
@@ -53,16 +59,61 @@ def asked_of(inputs: Mapping[str, Any]) -> ReliefSettings | None:
         return None
     try:
         numbers = [float(inputs[name]) for name in ("relief_strength", "tread_m")]
-        shod = shod_of(inputs)
-        known = look in SURFACES and inputs["tread_pattern"] in PATTERNS
+        treads = treads_of(inputs)
+        known = look in SURFACES
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
-        known, numbers = False, []
+        known, numbers, treads = False, [], {}
     if not known or not all(math.isfinite(number) and number >= 0 for number in numbers):
         raise InputError("The stored record of the footprints says nothing sensible of its relief: bake again.")
     strength, tread = numbers
     if not strength > 0:
         return None
-    return ReliefSettings(amounts.of_look(look), strength, inputs["tread_pattern"], tread / TREAD, shod)
+    return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD)
+
+
+def treads_of(inputs: Mapping[str, Any]) -> dict[tuple[str, str], SoleTread]:
+    """The treads of those in shoes, by character and name of the sole; none of those whose meshes show none.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If there is no such pattern.
+    """
+    pattern, shod = inputs["tread_pattern"], shod_of(inputs)
+    if pattern == SHOES:
+        maps = {(name, sole): text for name, sole, text in inputs["shoe_treads"]}
+        return {key: SoleTread(of_map(tread_map.from_text(text))) for key, text in maps.items() if key in shod}
+    under = of_map(tread_map.from_text(inputs["tread_image"])) if pattern == IMAGE else PATTERNS[pattern]
+    sides = {(one["name"], sole["name"]): sole["side"] for one in inputs["characters"] for sole in one["soles"]}
+    return {key: SoleTread(under, sides[key] == "L") for key in shod}
+
+
+def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> BakeSettings:
+    """Settings with the treads of the soles of some motions, where these are asked for.
+
+    Raises
+    ------
+    InputError
+        If none of those who wear shoes has grooves in its soles.
+    """
+    if wanted.tread_pattern != SHOES or not (wanted.relief_look and wanted.tread_m > 0):
+        return wanted
+    found = []
+    shod = shod_of(wanted.inputs())
+    soles = [
+        (one.name, of_foot.sole) for one in motions for of_foot in one.soles if (one.name, of_foot.sole.name) in shod
+    ]
+    for name, sole in soles:
+        of_sole = tread_map.from_underside(sole.underside, sole.length) if sole.underside is not None else None
+        if of_sole is not None:
+            found.append((name, sole.name, tread_map.as_text(of_sole)))
+    if soles and not found:
+        names = ", ".join(f"'{name}'" for name in dict.fromkeys(name for name, _ in soles))
+        raise InputError(
+            f"The soles of {names} are flat, and Tread Pattern is 'From Shoes': model grooves of half a millimetre or "
+            "deeper into their undersides, with vertices 4 mm apart or less, or choose another pattern."
+        )
+    return replace(wanted, shoe_treads=tuple(found))
 
 
 @sliced

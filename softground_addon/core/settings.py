@@ -172,7 +172,9 @@ class BakeSettings(SceneUnits):
         Whether they are kept, and also where the ground is dense.
     tread_m : float
     tread_pattern : str
-        One of `relief.tread.PATTERNS`.
+        One of `relief.tread.PATTERNS`, 'IMAGE' or 'SHOES'.
+    tread_image : str
+        A `relief.tread_map` as text; empty where the pattern is none of an image, or that cannot be read.
     relief : 'OFF', 'FINE' or 'CLOSE_UP'
     relief_vertices : int
         Most that a close-up may have along the trail.
@@ -187,6 +189,8 @@ class BakeSettings(SceneUnits):
         A bake that would take longer is refused.
     debris : bool
         Whether steps throw what physics says, which is then missing from their rims.
+    shoe_treads : tuple of (str, str, str)
+        Character, name of a sole, and its `relief.tread_map` as text, as a bake has read them from its meshes.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -208,6 +212,7 @@ class BakeSettings(SceneUnits):
     dense_shape_keys: bool = field(metadata=_on(Acts.WRITING))
     tread_m: float = field(metadata=_on(Acts.WRITING))
     tread_pattern: str = field(metadata=_on(Acts.WRITING))
+    tread_image: str = field(metadata=_on(Acts.WRITING))
     relief: str = field(metadata=_on(Acts.WRITING))
     relief_vertices: int = field(metadata=_on(Acts.WRITING))
     relief_strength: float = field(metadata=_on(Acts.WRITING))
@@ -216,6 +221,7 @@ class BakeSettings(SceneUnits):
     keep_forces: bool = field(metadata=_on(Acts.OUTPUT))
     longest_bake_s: float = field(metadata=_on(Acts.OUTPUT))
     debris: bool = field(default=False, metadata=_on(Acts.RESPONDING))
+    shoe_treads: tuple[tuple[str, str, str], ...] = field(default=(), metadata=_on(Acts.OUTPUT))
 
     @property
     def spacing_m(self) -> float:

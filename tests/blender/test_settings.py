@@ -38,6 +38,7 @@ def all_on(scene):
     bpy.ops.softground.add_character()
     options = scene.softground
     options.ground, options.frame_end = plane(scene), 40
+    options.tread_pattern, options.tread_image = "IMAGE", bpy.data.images.new("Sole", 4, 8)
     options.tilt.use = options.grounding.use = True
     bpy.context.view_layer.update()
 
@@ -62,7 +63,9 @@ def groups_of(owner, path=""):
 def change(owner, name, scene):
     """Give a setting another value."""
     setting, value = owner.bl_rna.properties[name], getattr(owner, name)
-    if setting.type == "POINTER":
+    if setting.type == "POINTER" and setting.fixed_type.identifier == "Image":
+        setattr(owner, name, None)
+    elif setting.type == "POINTER":
         kind = "ARMATURE" if name == "armature" else "MESH"
         other = next((one for one in scene.objects if one.type == kind and one != value), None)
         setattr(owner, name, other if value is None else None)

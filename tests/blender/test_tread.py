@@ -4,9 +4,13 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.ground import ground_mesh, own_data
+from softground_addon.blender import settings, tread_images
+from softground_addon.blender.baking import bake_report
+from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
+from softground_addon.core.errors import InputError
+from softground_addon.core.relief_plan import asked_of
 from tests.blender import shots
-from tests.blender.grounds import bake
+from tests.blender.grounds import bake, heights
 
 
 @pytest.fixture
@@ -50,3 +54,119 @@ def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scen
     bake(scene)
     bpy.ops.softground.clear_bake()
     assert own_data.SOLE not in ground.data.attributes
+
+
+def picture(values, name="Sole"):
+    """An image of grey values (rows, columns), the first row at the bottom."""
+    rows, columns = values.shape
+    image = bpy.data.images.new(name, columns, rows, float_buffer=True)
+    paint(image, values)
+    return image
+
+
+def paint(image, values):
+    pixels = np.ones((*values.shape, 4), np.float32)
+    pixels[..., :3] = values[..., None]
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+
+
+@pytest.fixture
+def shod(scene):
+    """A walker whose soles have a pattern that shows from close by."""
+    shots.walker(scene, frames=16)
+    bpy.ops.softground.add_character()
+    options = scene.softground
+    options.relief, options.tread, options.material.surface = "CLOSE_UP", 0.003, "wet_sand"
+    return scene
+
+
+CHECKER = np.indices((6, 2)).sum(axis=0) % 2.0
+
+
+def shown(scene):
+    bake(scene, cell_size=0.01)
+    return heights(baked_ground.display_mesh_of(scene.softground.ground), "SoftGround Display")
+
+
+def test_an_image_is_pressed_and_the_same_bytes_again_and_another_is_not_the_same(shod):
+    options = shod.softground
+    options.tread_pattern, options.tread_image = "IMAGE", picture(CHECKER)
+    first = shown(shod)
+    assert bake_report.stale_reasons(shod) == ()
+    assert np.array_equal(first, shown(shod))
+    paint(options.tread_image, 1.0 - CHECKER)
+    bpy.context.view_layer.update()
+    tread_images.forget()  # which the handler does, where images are painted in a window
+    assert bake_report.stale_reasons(shod) == ("The settings have changed",)
+    other = shown(shod)
+    assert len(other) == len(first)
+    assert np.abs(other - first).max() > 0.002
+
+
+def test_steps_are_edited_and_exported_with_the_image_that_was_pressed(shod):
+    options = shod.softground
+    options.tread_pattern, options.tread_image = "IMAGE", picture(CHECKER)
+    shown(shod)
+    footprints, about = baked_ground.load(options.ground)
+    treads = asked_of(about["inputs"]).treads
+    bpy.data.images.remove(options.tread_image)
+    assert treads.keys() == {(step.character, step.sole) for step in footprints}
+    assert {tread.is_mirrored for tread in treads.values()} == {False, True}
+
+
+def missing():
+    image = bpy.data.images.new("Gone", 1, 1)
+    image.source, image.filepath = "FILE", "//not_there.png"
+    return image
+
+
+@pytest.mark.parametrize(("make", "named"), [(lambda: None, "none is chosen"), (missing, "'Gone'.*not_there.png")])
+def test_images_that_cannot_be_read_are_named_and_nothing_changes(shod, make, named):
+    options = shod.softground
+    options.tread_pattern, options.tread_image = "IMAGE", make()
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    with pytest.raises(InputError, match=named):
+        bake(shod)
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+    options.relief = "OFF"  # then nobody asks for it
+    bake(shod)
+
+
+def test_off_has_the_same_heights_whatever_the_pattern(shod):
+    shod.softground.relief = "OFF"
+    first = shown(shod)
+    shod.softground.tread_pattern, shod.softground.tread_image = "IMAGE", picture(CHECKER)
+    assert np.array_equal(first, shown(shod))
+
+
+def test_images_are_set_by_name_on_the_command_line(shod):
+    image = picture(CHECKER, "My Sole")
+    settings.assign(shod.softground, "tread_pattern", "IMAGE")
+    settings.assign(shod.softground, "tread_image", "My Sole")
+    assert shod.softground.tread_image == image
+    with pytest.raises(InputError, match="no image of that name"):
+        settings.assign(shod.softground, "tread_image", "Another")
+
+
+def test_soles_press_the_grooves_of_their_own_mesh(shod):
+    """The sample character's shoes have bars; from shoes without them nothing is taken, and the bake says so."""
+    plain = shown(shod)
+    shod.softground.tread_pattern = "SHOES"
+    assert np.abs(shown(shod) - plain).max() > 0.002
+    assert bake_report.stale_reasons(shod) == ()
+    ground = shod.softground.ground
+    maps = baked_ground.load(ground)[1]["inputs"]["shoe_treads"]
+    assert {sole for _, sole, _ in maps} == {sole.name for sole in shod.softground.characters[0].soles}
+    for obj in shod.objects:
+        if obj.type == "MESH" and obj.parent == shod.softground.characters[0].armature:
+            flatten(obj.data)
+    with pytest.raises(InputError, match=r"The soles of 'Walker' are flat.*choose another pattern"):
+        bake(shod)
+
+
+def flatten(mesh):
+    """Take the grooves out of a figure that stands on z = 0."""
+    for vertex in mesh.vertices:
+        if vertex.co.z < 0.012:
+            vertex.co.z = 0.0

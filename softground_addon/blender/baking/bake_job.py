@@ -30,6 +30,7 @@ from ...core.record import record
 from ...core.record.edits import StepEdit
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
+from ...core.relief_plan import with_shoe_treads
 from ...core.self_check import self_check
 from ...core.settings import Acts, BakeSettings
 from ...core.simulation import simulate
@@ -97,10 +98,12 @@ def bake(
     started = time.perf_counter()
     moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
+    wanted = with_shoe_treads(wanted, shot.motions)
     movers = staleness.of_movers(scene, wanted)
     surface = shot.surface
-    hashing = report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
-    shot_hash = yield from meanwhile(Progress("sample", 1.0), hashing)
+    shot_hash = yield from meanwhile(
+        Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
+    )
     sampled = time.perf_counter()
 
     if edits is None:

@@ -112,6 +112,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             time_stretch=units["time_stretch"],
             gravity_m_s2=units["gravity_m_s2"],
             unit_scale_m=units["unit_scale_m"],
+            shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs.get("shoe_treads", ())),
         )
     except (KeyError, TypeError, ValueError):
         raise InputError(

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ...core.loads.cell_limits import BYTES_PER_CELL
+from ...core.relief_plan import IMAGE
 from ...core.settings import spacing_of
 from .. import settings
 from ..after import debris_object
@@ -40,6 +41,8 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
             column.prop(options.material, field)
         column.prop(options, "tread_mm")
         column.prop(options, "tread_pattern")
+        if options.tread_pattern == IMAGE:
+            column.template_ID(options, "tread_image", open="image.open")
         column.prop(options, "relief")
         amount = column.row()
         amount.active = options.relief != "OFF"

@@ -25,6 +25,7 @@ from ...core.numerics.cell_keys import cells_at, keys_at
 from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
+from ...core.relief_plan import with_shoe_treads
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report
@@ -245,6 +246,8 @@ class LiveMode:
             dense_shape_keys=now.dense_shape_keys,
             tread_m=now.tread_m,
         )
+        with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
+            made_with = with_shoe_treads(made_with, self._analysis.shot.motions)
         footprints = self._playhead.footprints()
         vertices = ground_mesh.rest_vertices(ground, made_with.unit_scale_m)
         shown = PressedGround.at(footprints, **at_the_end(made_with))

@@ -170,9 +170,17 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         items=[
             ("HIKING", "Hiking", "Blocks around the edge, chevrons within, a plain waist"),
             ("TRAINER", "Trainer", "Waves across the sole, cut along its middle"),
-            ("BARE", "Bare Foot", "No shoe: gaps between the ball and the toes"),
+            ("BARE", "Bare Foot", "No shoe: pads of heel, ball and toes, with an arch"),
+            ("IMAGE", "Image", "An image of the sole: white presses, black is a groove"),
+            ("SHOES", "From Shoes", "The grooves that the meshes of the characters' own soles have"),
         ],
         default="HIKING",
+    )
+    tread_image: PointerProperty(
+        name="Tread Image",
+        description="Right sole as seen in its print from above, toes at the top (or at the right of a wide image). "
+        "It reaches from edge to edge of the sole, and is mirrored for left feet",
+        type=bpy.types.Image,
     )
     relief: EnumProperty(
         name="Relief",

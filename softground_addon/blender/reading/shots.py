@@ -18,8 +18,9 @@ from ...core.ground_plan import GroundPlan, extent, plan_ground
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
+from ...core.relief_plan import IMAGE
 from ...core.settings import BakeSettings
-from .. import settings
+from .. import settings, tread_images
 from ..characters.control_poses import PoseRecorder
 from ..characters.import_fixes import size_of
 from ..characters.prop_extraction import check_props
@@ -83,7 +84,10 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 f"The object of '{character.name}' is gone: choose another one in Contacts, or remove "
                 f"'{character.name}' from the characters."
             )
+    tread_images.forget()
     wanted = settings.snapshot(scene, grounded=grounded)
+    if wanted.tread_pattern == IMAGE and wanted.relief_look and wanted.tread_m > 0:
+        tread_images.check(scene.softground.tread_image)
     if not wanted.characters:
         raise InputError(
             "No character is set up: select an animated armature, or objects that fall or roll, and press Add "

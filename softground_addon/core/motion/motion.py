@@ -107,6 +107,9 @@ class Sole:
     prop : Prop or None
         The whole surface, in place of patches, of what prints by whatever faces down; its frame is that of the one
         pose that it has.
+    underside : (N, M) float array or None
+        Heights of the flat sole's mesh from heel to toes and from left to right [m], infinite where there is none;
+        None where it is of no mesh.
     """
 
     name: str
@@ -116,6 +119,7 @@ class Sole:
     landmark_patch: NDArray[np.intp]
     outline: Array
     prop: Prop | None = None
+    underside: Array | None = None
 
     @property
     def area(self) -> float:

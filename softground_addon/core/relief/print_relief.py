@@ -12,7 +12,7 @@ from .amounts import Amounts, Chunks
 from .lattice_noise import cells, noise, rise, uniform
 from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
-from .tread import GROOVE, LENGTH, PATTERNS, Under
+from .tread import GROOVE, LENGTH, SoleTread, Under
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,8 @@ class PrintRelief:
         The print's own.
     finest : float
         Least size of what the ground shows [m].
-    tread : str, optional
-        One of `tread.PATTERNS` that the sole has; nothing of it is shown where its grooves are too narrow for that.
+    tread : SoleTread, optional
+        That the sole has; nothing of it is shown where its grooves are too narrow for that.
     tread_strength : float
         Its height over that of the amounts.
     """
@@ -69,7 +69,7 @@ class PrintRelief:
         amounts: Amounts,
         seed: int,
         finest: float,
-        tread: str | None = None,
+        tread: SoleTread | None = None,
         tread_strength: float = 1.0,
     ) -> None:
         self._shape, self._amounts, self._seed = shape, amounts, seed
@@ -188,12 +188,16 @@ class PrintRelief:
             return np.zeros(len(places.x))
         bent = [around.length(1.2) * around.noise(number, 20.0) for number in (41, 42)]
         along, across = shape.under_sole(places.x + bent[0], places.y + bent[1])
-        middle = sum(shape.along) / 2
-        under = Under((along - middle) / self._size, across / self._size, around.inward / self._size)
+        under = Under(
+            (along - sum(shape.along) / 2) / self._size,
+            (across - sum(shape.across) / 2) / self._size,
+            around.inward / self._size,
+            (shape.across[1] - shape.across[0]) / self._size,
+        )
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
         lost = tread.kept + (tread.lost - tread.kept) * worn * worn
         within = rise((around.inward - around.length(3.0)) / around.length(6.0))
-        ridges = PATTERNS[self._tread](under)
+        ridges = self._tread(under)
         return (ridges - 0.3) * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
 
 
@@ -222,7 +226,7 @@ def relief_of_print(
     blur_sigma: float,
     finest: float,
     seed: int,
-    tread: str | None = None,
+    tread: SoleTread | None = None,
     tread_strength: float = 1.0,
 ) -> PrintRelief | None:
     """The relief of a footprint; None where it pressed next to nothing. See `PrintRelief`."""

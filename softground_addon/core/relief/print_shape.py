@@ -61,8 +61,8 @@ class PrintShape:
         Middle of the pressure [m].
     heading : (2,) float array
         Direction of the toes.
-    along : (float, float)
-        Where heel and toes end along it, from the middle of the pressure [m].
+    along, across : (float, float)
+        Where heel and toes end along it, and where its right and left side do, from the middle of the pressure [m].
     """
 
     window: Window
@@ -73,6 +73,7 @@ class PrintShape:
     position: Array
     heading: Array
     along: tuple[float, float]
+    across: tuple[float, float]
 
     def at(self, x: Array, y: Array) -> Array:
         """The fields at world places (N,), bilinear between cells, (8, N)."""
@@ -122,7 +123,7 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
         fineness,
         footprint.position[:2],
         heading,
-        _ends(window, size, inside, footprint.position[:2], heading),
+        *_ends(window, size, inside, footprint.position[:2], heading),
     )
 
 
@@ -143,11 +144,13 @@ def _displayed(
     return displayed, risen, continued, np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0)
 
 
-def _ends(window: Window, size: float, inside: Mask, position: Array, heading: Array) -> tuple[float, float]:
-    """See `PrintShape.along`."""
-    x, y = np.meshgrid(*window.centres(size))
-    along = (x[inside] - position[0]) * heading[0] + (y[inside] - position[1]) * heading[1]
-    return float(along.min()), float(along.max())
+def _ends(
+    window: Window, size: float, inside: Mask, position: Array, heading: Array
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """See `PrintShape.along` and `across`."""
+    x, y = (place[inside] - at for place, at in zip(np.meshgrid(*window.centres(size)), position, strict=True))
+    along, across = x * heading[0] + y * heading[1], y * heading[0] - x * heading[1]
+    return (float(along.min()), float(along.max())), (float(across.min()), float(across.max()))
 
 
 def nearest(chosen: Mask, far: int) -> tuple[Array, Indices]:

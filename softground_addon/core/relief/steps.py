@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from ..record.edits import step_id
 from ..record.footprints import Footprint
 from .amounts import Amounts
 from .print_relief import relief_of_print
+from .tread import SoleTread
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -59,19 +60,16 @@ class ReliefSettings:
     amounts : Amounts
     strength : float
         Of all of it: 1 is as the amounts say.
-    tread : str
-        One of `tread.PATTERNS`.
+    treads : mapping of (str, str) to SoleTread
+        Of the soles that have one, by character and name.
     tread_strength : float
         Height of the tread over that of the amounts.
-    shod : collection of (str, str)
-        Characters and names of the soles that have a tread.
     """
 
     amounts: Amounts
     strength: float = 1.0
-    tread: str = "HIKING"
+    treads: Mapping[tuple[str, str], SoleTread] = field(default_factory=dict)
     tread_strength: float = 1.0
-    shod: Collection[tuple[str, str]] = ()
 
 
 @sliced
@@ -114,14 +112,14 @@ def _step(
     point = places.within(footprint.window.expanded(margin), footprint.cell_size) if len(places.x) else NOTHING.point
     if not len(point):
         return NOTHING
-    shod = (footprint.character, footprint.sole) in wanted.shod and wanted.tread_strength > 0
+    tread = wanted.treads.get((footprint.character, footprint.sole)) if wanted.tread_strength > 0 else None
     of_print = relief_of_print(
         footprint,
         wanted.amounts,
         blur_sigma=blur_sigma,
         finest=_finest(places, point, footprint.cell_size),
         seed=zlib.crc32(step_id(footprint).encode()),
-        tread=wanted.tread if shod else None,
+        tread=tread,
         tread_strength=wanted.tread_strength,
     )
     if of_print is None:

@@ -1,14 +1,18 @@
-"""Tread of soles as heights: what the grooves of a sole leave standing in the ground."""
+"""Tread of soles as heights: what the grooves of a sole leave standing in the ground.
+
+Patterns are those of right feet.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .lattice_noise import rise
+from .tread_map import height_at
 
 Array = NDArray[np.float64]
 
@@ -26,11 +30,18 @@ class Under:
         From the middle between heel and toes, and from the middle of the foot to its left.
     inward : array
         Distance to the outline.
+    breadth : float
+        From side to side.
     """
 
     along: Array
     across: Array
     inward: Array
+    breadth: float
+
+
+Pattern = Callable[[Under], Array]
+"""Height of the ground under a sole (N,), from 0 under what presses to 1 in grooves."""
 
 
 GROOVE = 0.0044
@@ -65,12 +76,49 @@ def trainer(under: Under) -> Array:
     return np.asarray(np.maximum(bars * (under.inward > 0.006), _band(under.across, 0.0022) * (under.inward > 0.012)))
 
 
+_PADS = np.array(
+    [
+        (-0.365, 0.005, 0.125, 0.37), (-0.13, -0.24, 0.25, 0.20), (0.13, -0.17, 0.14, 0.30), (0.165, 0.22, 0.125, 0.28),
+        (0.405, 0.27, 0.085, 0.165), (0.425, 0.045, 0.046, 0.085), (0.395, -0.115, 0.040, 0.075),
+        (0.350, -0.255, 0.036, 0.070), (0.295, -0.375, 0.034, 0.070),
+    ]
+)  # fmt: skip
+"""Heel, outer side, ball and toes of a bare right foot as ellipses: middle over length and over breadth from the middle
+of the foot, ahead and to the left, and half axes. Drawn after prints on paper."""
+_FLESH = 0.006
+"""Width over which pads of flesh fall off [m]."""
+
+
 def bare(under: Under) -> Array:
-    """The arch on the inner side, and gaps between ball and toes and from toe to toe."""
-    gap = _band(under.along - 0.083 + 0.25 * np.abs(under.across), 0.004)
-    toes = _band(_from_line(under.across - 0.009, 0.018), 0.0024) * (under.along > 0.085)
-    return np.asarray(np.maximum(gap, toes))
+    """Pads of heel, ball and toes; the arch, and the gaps before and between the toes, stand."""
+    along, across = under.along / LENGTH, under.across / under.breadth
+    far = np.full(len(along), -np.inf)
+    for ahead, left, half_length, half_breadth in _PADS:
+        share = np.hypot((along - ahead) / half_length, (across - left) / half_breadth)
+        far = np.maximum(far, (1.0 - share) * min(half_length * LENGTH, half_breadth * under.breadth))
+    return np.asarray(1.0 - rise(far / _FLESH + 0.5))
 
 
-PATTERNS: Mapping[str, Callable[[Under], Array]] = {"HIKING": hiking, "TRAINER": trainer, "BARE": bare}
-"""Height of the ground under a sole (N,), from 0 under what presses to 1 in grooves."""
+PATTERNS: Mapping[str, Pattern] = {"HIKING": hiking, "TRAINER": trainer, "BARE": bare}
+"""Those that are drawn by formulas."""
+
+
+def of_map(of_sole: Array) -> Pattern:
+    """The pattern of a sole by how far it stands out; see `tread_map`."""
+
+    def mapped(under: Under) -> Array:
+        return 1.0 - height_at(of_sole, 0.5 + under.along / LENGTH, 0.5 - under.across / under.breadth)
+
+    return mapped
+
+
+@dataclass(frozen=True)
+class SoleTread:
+    """The tread of one sole: a pattern, mirrored for left feet."""
+
+    pattern: Pattern
+    is_mirrored: bool = False
+
+    def __call__(self, under: Under) -> Array:
+        """See `Pattern`."""
+        return self.pattern(replace(under, across=-under.across) if self.is_mirrored else under)

@@ -17,7 +17,7 @@ from ..motion.motion import Array, Sole, SolePatch
 from ..motion.props import Prop, supports
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
-from .undersides import continue_outside, sample_map, underside_map
+from .undersides import continue_outside, lowest_surface, sample_map, underside_map
 
 FOOT_BREADTH = 0.373
 """Breadth over length of a foot: 10.06 cm / 26.97 cm, means of 1774 men (Gordon et al. 1989, NATICK/TR-89/044)."""
@@ -37,6 +37,9 @@ FOOT_TO_LEG = 0.152 / (0.245 + 0.246)
 
 NODES_PER_LENGTH = 54
 """Nodes along a sole: 5 mm apart for a foot of 27 cm."""
+
+TREAD_NODES = 192
+"""Nodes along a sole by which its tread is seen: 1.4 mm apart for a foot of 27 cm."""
 
 _SEAM = 0.06
 """Overlap of foot and toes over sole length, so that bent toes leave no gap under the ball."""
@@ -182,7 +185,13 @@ def sole_from_underside(
             "Give the sole another object, or let it use the foot bones."
         )
     ball_x = float(used[:, 0].min() + BALL_POSITION * extent[0]) if ball is None else ball
-    return _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
+    placed = _assemble(grid, continue_outside(heights), loops, ball_x, split=ball is not None, name=name, side=side)
+    low = used[:, :2].min(axis=0)
+    fine = float(extent[0]) / TREAD_NODES
+    columns, rows = np.ceil(extent / fine).astype(int)
+    drawn = lowest_surface(np.asarray(vertices, dtype=float), triangles, low + fine / 2, (rows, columns), fine)
+    drawn[drawn > drawn.min() + _UNDERSIDE_BAND * length] = np.inf
+    return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T))
 
 
 def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "", give: float = 0.0) -> Sole:

@@ -13,6 +13,7 @@ from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import sample_at
 from softground_addon.core.relief import amounts
 from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, water_at
+from softground_addon.core.relief.tread import SoleTread, hiking
 from tests.core.walkers import pressed, walk
 
 MATERIALS = {
@@ -40,8 +41,8 @@ def around(footprints, spacing=SPACING, reach=0.26):
 
 
 def settings_of(look, footprints, **more):
-    shod = {(step.character, step.sole) for step in footprints}
-    return ReliefSettings(amounts.of_look(look), **({"shod": shod} | more))
+    treads = {(step.character, step.sole): SoleTread(hiking) for step in footprints}
+    return ReliefSettings(amounts.of_look(look), **({"treads": treads} | more))
 
 
 def relief(look, footprints, place, **more):

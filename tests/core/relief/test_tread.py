@@ -1,0 +1,139 @@
+"""Treads: a map of a sole from an image or a mesh presses what it shows, to scale, mirrored for left feet."""
+
+import numpy as np
+import pytest
+
+from softground_addon.core.errors import InputError
+from softground_addon.core.relief import tread_map
+from softground_addon.core.relief.amounts import Amounts, Tread
+from softground_addon.core.relief.print_relief import relief_of_print
+from softground_addon.core.relief.print_shape import shape_of
+from softground_addon.core.relief.tread import LENGTH, PATTERNS, SoleTread, Under, bare, of_map
+from softground_addon.core.relief_plan import asked_of
+from tests.core.relief.test_steps import MATERIALS, steps_on
+
+HEIGHT = 3.0
+"""Of the tread [mm]."""
+
+
+def checker(rows, columns):
+    return np.indices((rows, columns)).sum(axis=0) % 2.0
+
+
+def under(along, across, breadth=0.1):
+    return Under(along, across, np.full(len(along), 0.03), breadth)
+
+
+def pressed_in(values, *, mirrored=False, spacing=0.0025):
+    """Heights that a picture under the first sole of a walk adds in the middle of its print, with where, in parts of
+    the print from the heel and from its left side."""
+    step = steps_on("wet_sand")[0]
+    shape = shape_of(step, MATERIALS["wet_sand"].blur_sigma)
+    of_sole = tread_map.from_text(tread_map.as_text(tread_map.from_picture(values)))
+    plain = Amounts(10.0, tread=Tread(HEIGHT, kept=0.0, lost=0.0))
+    tread = SoleTread(of_map(of_sole), mirrored)
+    more = {"blur_sigma": MATERIALS["wet_sand"].blur_sigma, "finest": spacing, "seed": 1}
+    with_it = relief_of_print(step, plain, tread=tread, **more)
+    without = relief_of_print(step, plain, **more)
+    grid = np.arange(-0.2, 0.2, spacing)
+    x, y = (axis.ravel() + middle for axis, middle in zip(np.meshgrid(grid, grid), step.position, strict=False))
+    along, left = shape.under_sole(x, y)
+    along = (along - shape.along[0]) / np.ptp(shape.along)
+    right = (shape.across[1] - left) / np.ptp(shape.across)
+    inner = shape.at(x, y)[0] > 0.016
+    change = (with_it.at(x, y).height - without.at(x, y).height)[inner]
+    return along[inner], right[inner], change, np.ptp(shape.along) / LENGTH
+
+
+def test_a_checker_presses_a_checker_of_the_height_that_is_asked_for():
+    along, right, change, size = pressed_in(checker(6, 2))
+    white = (np.floor(along * 6) + np.floor(right * 2)) % 2 == 1
+    clear = (np.abs(along * 6 % 1 - 0.5) < 0.3) & (np.abs(right * 2 % 1 - 0.5) < 0.3)  # the places are bent by 2 mm
+    assert min((clear & white).sum(), (clear & ~white).sum()) > 50
+    between = change[clear & ~white].mean() - change[clear & white].mean()
+    assert between == pytest.approx(HEIGHT * 1e-3 * size, rel=0.02)
+    assert change[clear & white].std() < 0.06 * between  # the floor is as deep as elsewhere on the whole
+
+
+def test_left_feet_have_the_mirror_image_of_right_ones():
+    rng = np.random.default_rng(4)
+    along, across = rng.uniform(-0.13, 0.13, 500), rng.uniform(-0.05, 0.05, 500)
+    picture = of_map(tread_map.from_picture(rng.uniform(size=(40, 20))) / 255.0)
+    for pattern in (*PATTERNS.values(), picture):
+        right, left = SoleTread(pattern), SoleTread(pattern, is_mirrored=True)
+        assert np.array_equal(left(under(along, across)), right(under(along, -across)))
+    assert not np.array_equal(picture(under(along, across)), picture(under(along, -across)))
+
+
+def test_a_wide_picture_is_a_high_one_turned_clockwise():
+    high = np.random.default_rng(5).uniform(size=(50, 20))
+    assert np.array_equal(tread_map.from_picture(high), tread_map.from_picture(high.T[::-1]))
+    assert np.array_equal(tread_map.from_picture(high), tread_map.from_picture(np.repeat(high, 2, axis=1)))
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 1), (7, 5), (1000, 400)])
+def test_a_map_has_the_mean_brightness_of_its_picture(shape):
+    picture = np.random.default_rng(6).uniform(size=shape)
+    assert tread_map.from_picture(picture).mean() / 255 == pytest.approx(picture.mean(), abs=0.003)
+
+
+def test_pictures_of_no_numbers_are_black_and_too_bright_ones_white():
+    assert (tread_map.from_picture(np.full((4, 2), np.nan)) == 0).all()
+    assert (tread_map.from_picture(np.full((4, 2), 80.0)) == 255).all()
+
+
+def test_a_bare_foot_is_on_its_heel_ball_and_five_toes_and_not_on_its_arch():
+    def stands(ahead, left):
+        return bare(under(np.array([ahead * LENGTH]), np.array([left * 0.1])))[0]
+
+    pressing = [(-0.37, 0.0), (-0.1, -0.25), (0.17, 0.2), (0.13, -0.2)]
+    assert all(stands(*place) == 0 for place in pressing)
+    assert stands(-0.08, 0.25) == 1  # the arch, on the inner side
+    assert stands(0.31, 0.15) == 1  # before the big toe
+    row = bare(under(np.full(400, 0.385 * LENGTH), np.linspace(0.05, -0.05, 400)))
+    assert np.diff((row < 0.5).astype(int)).tolist().count(1) >= 3  # toe by toe
+
+
+def ribbed(depth, pitch=0.014, slope=0.1, nodes=192):
+    """The underside of a sole of 0.27 m with grooves across it, which rises toward its right side."""
+    along, across = np.meshgrid(np.linspace(0, 0.27, nodes), np.linspace(0, 0.1, 71), indexing="ij")
+    heights = depth * (along % pitch < 0.4 * pitch) + slope * across + 0.03 * (along - 0.13) ** 2
+    heights[across < 0.004] = np.inf
+    return heights
+
+
+def test_grooves_of_a_mesh_are_found_whatever_the_shape_of_its_sole():
+    of_sole = tread_map.from_underside(ribbed(0.002), 0.27)
+    shown = of_sole[10:-10, 8:-8] / 255
+    groove = (np.linspace(0, 0.27, 192) % 0.014 < 0.4 * 0.014)[10:-10]
+    assert shown[groove].mean() < 0.15
+    assert shown[~groove].mean() > 0.9
+
+
+def test_soles_that_are_flat_or_only_curved_have_none():
+    assert tread_map.from_underside(ribbed(0.0), 0.27) is None
+    assert tread_map.from_underside(ribbed(0.0004), 0.27) is None
+    assert tread_map.from_underside(np.full((192, 70), np.inf), 0.27) is None
+
+
+def inputs_of(**more):
+    sole = {"name": "foot.L", "side": "L", "bone": "foot", "limb": False}
+    other = sole | {"name": "foot.R", "side": "R"}
+    return {
+        "relief_look": "snow", "relief_strength": 1.0, "tread_m": 0.003, "tread_pattern": "HIKING", "tread_image": "",
+        "shoe_treads": [], "characters": [{"name": "A", "soles": [sole, other]}],
+    } | more  # fmt: skip
+
+
+def test_records_ask_for_the_treads_that_they_hold():
+    text = tread_map.as_text(tread_map.from_picture(checker(4, 2)))
+    asked = asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text)).treads
+    assert {key: tread.is_mirrored for key, tread in asked.items()} == {("A", "foot.L"): True, ("A", "foot.R"): False}
+    shoes = asked_of(inputs_of(tread_pattern="SHOES", shoe_treads=[["A", "foot.L", text]])).treads
+    assert {key: tread.is_mirrored for key, tread in shoes.items()} == {("A", "foot.L"): False}
+
+
+@pytest.mark.parametrize("text", ["", "no map", "AAAA", 7, None])
+def test_records_with_a_broken_map_are_refused(text):
+    with pytest.raises(InputError, match="bake again"):
+        asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text))
