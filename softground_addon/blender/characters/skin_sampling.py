@@ -17,6 +17,7 @@ from ...core.errors import InputError
 from ...core.motion.motion import Array
 from ...core.numerics.slices import Slices, sliced
 from ...core.skin.skin_motion import SkinMotion
+from ...core.skin.twins import twins
 from .. import mesh_arrays
 from ..settings import ObjectName, found, name_of
 from .recording import Recording
@@ -295,7 +296,7 @@ def followed_skin(
     rate : float
         Samples per second [Hz].
     linked : bool
-        Whether to tell which parts hang together.
+        Whether to tell which parts hang together, and which are mirror images.
     """
     rig = name_of(armature)
     body = np.flatnonzero(~carried(skin, armature))
@@ -315,8 +316,14 @@ def followed_skin(
     if not np.isfinite(places).all():
         return None
     yield
-    links = _links(skin, found(rig))[np.ix_(used, used)] if linked else None
-    motion = SkinMotion(places, part, links, rate, size)
+    links = twin = None
+    if linked:
+        links = _links(skin, found(rig))[np.ix_(used, used)]
+        yield
+        place = np.full(len(skin.bones) + 1, -1)
+        place[used] = np.arange(len(used))
+        twin = place[twins(skin.vertices[body], skin.part[body], len(place))[used]]
+    motion = SkinMotion(places, part, links, rate, size, twin)
     return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
 
 

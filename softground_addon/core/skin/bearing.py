@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..numerics.intervals import hysteresis, runs
-from .skin_motion import Array, Mask, PartTracks
+from .skin_motion import CALM_SPEED, Array, Mask, PartTracks
 
 TOUCH, LEAVE = 0.015, 0.018
 """A part lower than the first over the ground starts to bear, one higher than the second has left, in body heights."""
@@ -93,6 +93,23 @@ def _landed(bears: Mask, height: Array) -> Mask:
             if first > 0 and len(down) > 1:
                 landed[first : first + down[0], part] = False
     return landed
+
+
+def without_glimpses(bears: Mask, tracks: PartTracks) -> Mask:
+    """Without the two frames at an end of the shot of what bears at other times and does not rest there.
+
+    Between two frames lies one step: that of a foot at rest, or of one about to land or just lifted.
+    """
+    seen = bears.copy()
+    for part in np.flatnonzero(bears.any(axis=0)):
+        intervals = list(zip(*runs(bears[:, part]), strict=True))
+        for first, last in intervals if len(intervals) > 1 else ():
+            at_end = last - first == 2 and (first == 0 or last == len(bears))
+            rests = tracks.rise[first:last, part].min() < CALM_SPEED
+            seen[first:last, part] = rests or not at_end
+        if not seen[:, part].any():
+            seen[:, part] = bears[:, part]
+    return seen
 
 
 def _usual_slip(height: Array, speed: Array, slip: Array, calm: float) -> float:

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
-from .bearing import bearing
+from .bearing import bearing, without_glimpses
 from .ground_level import drift_of, level_of
 from .merging import merged
 from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
 
-SHORT = 0.25
-"""A contact that never lasts longer may be a brush [s]."""
+SHORT = 0.2
+"""A contact that is never seen to last as long may be a brush [s]."""
 RARE = 0.5
 """A contact of less than this share of the busiest one's time is rare."""
 SLIPS = 0.5
@@ -73,7 +73,7 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     bears = np.zeros((len(skin.positions), 0), dtype=bool)
     if (groups >= 0).any():
         parts = yield from track_parts.slices(skin, groups, level)
-        bears = bearing(parts, level, drift)
+        bears = without_glimpses(bearing(parts, level, drift), parts)
     return SkinContacts(level * skin.height, drift * skin.height, groups, bears, tracks)
 
 
@@ -83,10 +83,15 @@ def _numbered(groups: Indices) -> Indices:
 
 
 def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Array) -> Slices[Indices]:
-    """The groups less those that only brush the ground: short, and slipping or rare, while others bear."""
+    """The groups less those that only brush the ground: short, and slipping or rare, while others bear.
+
+    Limbs that mirror each other are contacts together: none is a brush whose twin is a contact, and a short one whose
+    twin never bears is.
+    """
     tracks = yield from track_parts.slices(skin, groups, level)
     bears, slip = bearing(tracks, level, drift), tracks.slip(drift)
     fast, time = np.percentile(slip, 90, axis=0), bears.sum(axis=0)
+    twin = _twin_groups(groups, skin.twin, len(time))
     keeps = np.zeros(len(time), dtype=bool)
     for contact in np.flatnonzero(time):
         on = bears[:, contact]
@@ -94,6 +99,23 @@ def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Arr
         alone = (bears[on].sum(axis=1) == 1).mean()
         slips = np.median(slip[on, contact]) > SLIPS * fast[contact]
         rare = time[contact] < RARE * time.max()
-        keeps[contact] = (ends - starts).max() >= SHORT * skin.rate or alone >= ALONE or not (slips or rare)
+        lasts = (ends - starts).max() - 1 >= SHORT * skin.rate
+        keeps[contact] = lasts or alone >= ALONE or not (slips or rare or not time[twin[contact]].any())
+    keeps |= (time > 0) & (twin & keeps).any(axis=1)
     number = np.where(keeps, np.cumsum(keeps) - 1, -1)
     return np.where(groups >= 0, number[groups], -1)
+
+
+def _twin_groups(groups: Indices, twin: Indices | None, count: int) -> Mask:
+    """Which groups mirror which, (count, count); one without a mirror image mirrors itself."""
+    mirrors = np.zeros((count, count), dtype=bool)
+    for number in range(count):
+        own = np.flatnonzero(groups == number)
+        others = own if twin is None else twin[own]
+        sided = others != own
+        if sided.mean() > 0.5:  # most of it has a twin
+            here = groups[others[sided & (others >= 0)]]
+            mirrors[number, here[here >= 0]] = True
+        else:
+            mirrors[number, number] = True
+    return mirrors

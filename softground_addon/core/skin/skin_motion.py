@@ -48,6 +48,8 @@ class SkinMotion:
         Samples per second [Hz].
     height : float
         The median vertical extent of the body [m], H: lengths are told in it.
+    twin : (P,) int array, optional
+        The part that mirrors each, itself where none does, and -1 where that is not followed.
     """
 
     positions: NDArray[np.floating]
@@ -55,6 +57,7 @@ class SkinMotion:
     links: Mask | None
     rate: float
     height: float
+    twin: Indices | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softground_addon.core.skin.bearing import bearing
+from softground_addon.core.skin.bearing import bearing, without_glimpses
 from softground_addon.core.skin.contacts import SkinContacts, find_contacts
 from softground_addon.core.skin.skin_motion import PartTracks, SkinMotion, track_parts
 
@@ -139,6 +139,44 @@ def test_the_gait_is_found_at_other_frame_rates_in_parts_of_the_shot_and_in_coar
     assert_gait(found, stands[seen])
 
 
+def with_limb(skin: SkinMotion, height: np.ndarray, twin: np.ndarray) -> SkinMotion:
+    """With one more part, a plate beside the animal at a height (F,) [m]."""
+    plate = np.zeros((len(height), 9, 3))
+    plate[..., :2] = np.stack(np.meshgrid([-0.02, 0.0, 0.02], [0.58, 0.6, 0.62]), axis=-1).reshape(-1, 2)
+    plate[..., 2] = height[:, None]
+    positions = np.concatenate([skin.positions, plate], axis=1)
+    part = np.append(skin.part, np.full(9, skin.part.max() + 1))
+    links = np.pad(skin.links, (0, 1)) if skin.links is not None else None
+    return SkinMotion(positions, part, links, skin.rate, skin.height, twin)
+
+
+@pytest.mark.parametrize("seen", [slice(None), slice(18, 72), slice(0, None, 2), slice(1, None, 2), slice(30, 60)])
+def test_a_hand_that_dips_to_the_ground_is_no_contact_where_its_twin_is_none(seen: slice) -> None:
+    skin, stands = animal(2, duty=0.3, stride=0.6)
+    landed = np.flatnonzero(stands[:, 0] & (np.arange(FRAMES) > 35))[0]
+    dips = np.abs(np.arange(FRAMES) - landed - 4) < 3
+    feet = np.array([1, 0])
+    skin = with_limb(skin, np.where(dips, 0.0, 0.4), np.array([*feet, 2, -1]))  # the other hand is always high
+    found = find_contacts(
+        SkinMotion(skin.positions[seen], skin.part, skin.links, skin.rate / (seen.step or 1), 1.0, skin.twin)
+    )
+    assert sorted(found.group) == [-1, -1, 0, 1]
+    assert (found.group[:2] >= 0).all()
+
+
+@pytest.mark.parametrize("seen", [slice(None), slice(18, 72), slice(0, None, 2), slice(1, None, 2)])
+def test_a_foot_that_only_brushes_the_ground_is_a_contact_beside_its_twin(seen: slice) -> None:
+    skin, _ = animal(1, duty=0.999, stride=0.0)
+    kicks = np.abs(np.arange(FRAMES) - 40) > 2
+    for twin, contacts in ((np.array([2, 1, 0]), 2), (np.array([0, 1, 2]), 1)):  # without one, it is a brush
+        both = with_limb(skin, np.where(kicks, 0.3, 0.0), twin)
+        found = find_contacts(
+            SkinMotion(both.positions[seen], both.part, both.links, both.rate / (seen.step or 1), 1.0, twin)
+        )
+        assert found.bears.shape[1] == contacts
+        assert found.bears[:, found.group[0]].all()
+
+
 @pytest.mark.parametrize("on_the_spot", [False, True])
 def test_contacts_stay_when_only_the_end_of_the_shot_moves(on_the_spot: bool) -> None:
     skin, _ = animal(2, duty=0.6, stride=0.6, on_the_spot=on_the_spot)
@@ -155,6 +193,21 @@ def test_a_foot_that_comes_down_as_the_shot_ends_bears_once_two_frames_show_it(s
     end = next(frame for frame in range(50, FRAMES) if stands[frame, 0] and not stands[frame - 1, 0]) + seen
     found = find_contacts(SkinMotion(skin.positions[:end], skin.part, skin.links, skin.rate, skin.height))
     assert found.bears[-1, found.group[0]] == (seen > 1)
+
+
+@pytest.mark.parametrize("pace", [0.05, 0.4])
+def test_the_last_two_frames_show_a_contact_where_the_foot_rests_in_them(pace: float) -> None:
+    low = np.full(30, 0.1)
+    low[8:20], low[28], low[29] = 0.0, pace / 24, 0.0
+    rise = np.minimum(np.abs(np.diff(low, prepend=low[0])), np.abs(np.diff(low, append=0.1 + low[-1]))) * 24
+    rise[-1] = rise[-2] = pace
+    still = np.zeros((2, 30, 1, 2))
+    tracks = PartTracks(low[:, None], still[0], rise[:, None], still, 0.5, 24.0)
+    bears = bearing(tracks, 0.0, np.zeros(2))
+    assert bears[[9, 19, 28, 29], 0].all()
+    assert without_glimpses(bears, tracks)[[9, 19, 28, 29], 0].tolist() == [True, True, pace < 0.15, pace < 0.15]
+    only = bears & (np.arange(30) > 20)[:, None]  # of a foot that shows nothing else
+    assert (without_glimpses(only, tracks) == only).all()
 
 
 def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
