@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import bpy
 import numpy as np
 import pytest
 
 from softground_addon.blender import jobs
 from softground_addon.blender.characters.character_setup import add_character
+from softground_addon.blender.characters.recognition import recognise
 from softground_addon.blender.characters.rig_sampling import sample_character
 
 from . import rigs
@@ -31,11 +35,19 @@ def box(name: str, size: float, place: tuple[float, float, float], armature: bpy
     thing.vertex_groups.new(name=bone).add(range(8), 1.0, "REPLACE")
 
 
-def stool() -> bpy.types.Object:
-    """A stool of 1 m that walks on its three legs, its feet 10 cm wide and 6 cm above their bones' origin."""
+def stool(hands: Mapping[str, bool] = MappingProxyType({})) -> bpy.types.Object:
+    """A stool of 1 m that walks on its three legs, its feet 10 cm wide and 6 cm above their bones' origin.
+
+    Its hands, right and left, touch the ground for five frames where they are said to.
+    """
     bones = {"Root": ((0, 0, 0), (0, 0, 0.1)), "Pm": ((0, 0, 0.9), (0, 0, 1.0))}
     bones |= {name: ((x, y, 0.05), (x, y, 0.051)) for name, (x, y) in LEGS.items()}
-    armature = rigs.build("Stool", bones, dict.fromkeys(("Pm", *LEGS), "Root"))
+    bones |= {name: ((x, 0.3, 0.5), (x, 0.3, 0.501)) for name, x in zip(hands, (-0.5, 0.5), strict=False)}
+    armature = rigs.build("Stool", bones, dict.fromkeys(("Pm", *LEGS, *hands), "Root"))
+    for (name, dips), x in zip(hands.items(), (-0.5, 0.5), strict=False):
+        box(f"{name} hand", 0.1, (x, 0.3, 0.5), armature, name)
+        heights = {frame: -0.39 * (dips and 3 <= frame <= 7) for frame in range(1, FRAMES + 1)}
+        rigs.key(armature, "location", {frame: (0, height, 0) for frame, height in heights.items()}, bone=name)
     for name, (x, y) in LEGS.items():
         box(f"{name} foot", 0.1, (x, y, 0.11), armature, name)
     box("seat", 0.3, (0, 0, 0.95), armature, "Pm")
@@ -94,6 +106,13 @@ def test_what_a_hand_carries_is_no_part_of_the_body(scene):
     sword.parent, sword.parent_type, sword.parent_bone = armature, "BONE", "Slot"
     character = add_character(scene, armature)
     assert {sole.bone for sole in character.soles} == set(LEGS)
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_a_hand_that_touches_for_a_moment_is_a_contact_where_the_other_one_touches_too(scene, together):
+    armature = stool({"Hr": True, "Hl": together})
+    mapping = jobs.run(recognise(scene, armature, (1, 10))).mapping
+    assert {sole.bone for sole in mapping.soles} - set(LEGS) == ({"Hr", "Hl"} if together else set())
 
 
 def test_skin_that_no_bone_moves_is_no_contact(scene):
