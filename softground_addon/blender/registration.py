@@ -14,6 +14,7 @@ from .importing import import_capture
 from .interface import (
     bake_result,
     character_editing,
+    foot_locks_panel,
     ground_options_panel,
     menus,
     modal_bake,
@@ -63,6 +64,7 @@ CLASSES = (
     *panels.CLASSES,
     *ground_options_panel.CLASSES,
     *response_panel.CLASSES,
+    *foot_locks_panel.CLASSES,
     *weather_panel.CLASSES,
     *bake_result.CLASSES,
     *step_editing.CLASSES,

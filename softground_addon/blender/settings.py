@@ -15,6 +15,7 @@ from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
 from ..core.motion.motion import shortest_length
 from ..core.relief_plan import IMAGE
+from ..core.response.foot_holds import FootHold
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions
 from ..core.response.tilt import TiltGains
@@ -208,6 +209,10 @@ def character_of(character: Any) -> CharacterSettings:
         force_model=character.force_model,
         joints={entry.name: (bone, entry.end.lower()) for entry in character.joints if (bone := entry.bone)},
         soles=soles,
+        holds=tuple(
+            FootHold(one.foot, float(one.frame), one.mode, typed(one.strength), float(one.ease_in), float(one.ease_out))
+            for one in character.holds
+        ),
     )
 
 

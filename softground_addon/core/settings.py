@@ -15,6 +15,7 @@ from typing import Any
 
 from .ground.material import GroundMaterial, Pressure
 from .loads.estimate import ForceModel
+from .response.foot_holds import FootHold
 from .response.response import GroundingOptions, TiltOptions
 
 CLOSE_UP_SPACING = 0.0025
@@ -104,6 +105,8 @@ class CharacterSettings:
     joints : mapping of str to (str, str)
         Canonical joint to a bone and its end, "head" or "tail".
     soles : tuple of SoleSource
+    holds : tuple of FootHold
+        How Clean Feet holds single contacts.
     """
 
     armature: ObjectName | None
@@ -114,6 +117,7 @@ class CharacterSettings:
     force_model: ForceModel = field(metadata=_on(Acts.LOADS))
     joints: Mapping[str, tuple[str, str]]
     soles: tuple[SoleSource, ...]
+    holds: tuple[FootHold, ...] = field(default=(), metadata=_on(Acts.OUTPUT))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender import jobs
+from softground_addon.blender import jobs, settings
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking.clean_feet import clean_feet
 from softground_addon.blender.command_line import cli
@@ -15,8 +15,10 @@ from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
 from softground_addon.blender.response import response_job
 from softground_addon.core.motion.motion import SoleMotion
+from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.response.clean_feet import foot_faults
 from softground_addon.core.response.response import at_scene_frames
+from softground_addon.core.settings import Acts
 from tests.blender import fingerprints, responders, shots
 from tests.blender.grounds import plane
 
@@ -191,3 +193,79 @@ def test_reference_motions_keep_the_bars(scene, name):
     before = fastest_knee(responders.legs(scene))
     jobs.run(clean_feet(scene))
     check_bars(scene, name, before)
+
+
+def lock_contact(scene, mode, **options):
+    """A foot lock on the contact of the foot that is lowest in a frame, as the panel's button adds it."""
+    scene.frame_set(20)
+    assert bpy.ops.softground.add_foot_lock() == {"FINISHED"}
+    hold = scene.softground.characters[0].holds[-1]
+    hold.mode = mode
+    for name, value in options.items():
+        setattr(hold, name, value)
+    return hold
+
+
+def sole_in_contact(scene, hold):
+    """The held foot on the rig, in the frames of the held contact."""
+    shot, touching = read(scene)
+    moved, _ = on_the_rig(scene, shot.motions[0])
+    number = next(i for i, sole in enumerate(moved.soles) if sole.sole.name == hold.foot)
+    starts, ends = runs(touching[:, number])
+    at = np.searchsorted(starts, np.abs(moved.frames - hold.frame).argmin(), side="right") - 1
+    return moved.soles[number], slice(starts[at], ends[at])
+
+
+def test_a_contact_is_locked_as_a_whole_on_the_rig(floor_walk):
+    spoil(floor_walk)
+    hold = lock_contact(floor_walk, "FULL")
+    assert bpy.ops.softground.clean_feet() == {"FINISHED"}
+    sole, during = sole_in_contact(floor_walk, hold)
+    places = sole.transforms[during, 0, :3, 3]
+    assert np.linalg.norm(places - places[0], axis=1).max() < 1e-3
+    assert np.abs(sole.transforms[during, 0, :3, :3] - sole.transforms[during.start, 0, :3, :3]).max() < 5e-3
+
+
+def test_a_contact_without_strength_is_left_as_it_was_animated(floor_walk):
+    spoil(floor_walk)
+    hold = lock_contact(floor_walk, "FLAT", strength=0.0)
+    before, during = sole_in_contact(floor_walk, hold)
+    bpy.ops.softground.clean_feet()
+    after, _ = sole_in_contact(floor_walk, hold)
+    assert np.abs(after.transforms[during] - before.transforms[during]).max() < 1e-3
+
+
+def test_a_foot_lock_leaves_a_bake_as_it_is(floor_walk):
+    now = settings.snapshot(floor_walk)
+    lock_contact(floor_walk, "BALL")
+    assert settings.snapshot(floor_walk) != now
+    assert settings.snapshot(floor_walk).inputs(Acts.WRITING) == now.inputs(Acts.WRITING)
+
+
+def test_a_foot_lock_where_no_foot_stands_is_told(floor_walk):
+    hold = lock_contact(floor_walk, "HEEL")
+    hold.frame = 5000
+    cleaned = jobs.run(clean_feet(floor_walk))
+    assert cleaned.warnings == (f"'{hold.foot}' of Walker does not stand at frame 5000: its foot lock was left out.",)
+
+
+def test_the_selected_bone_says_which_foot_is_locked_and_a_lock_is_removed(floor_walk):
+    armature = floor_walk.softground.characters[0].armature
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="POSE")
+    for sole in floor_walk.softground.characters[0].soles:
+        armature.data.bones.active = armature.data.bones[sole.bone]
+        assert lock_contact(floor_walk, "ROLL").foot == sole.name
+    bpy.ops.object.mode_set(mode="OBJECT")
+    character = floor_walk.softground.characters[0]
+    bpy.ops.softground.remove_foot_lock()
+    assert [hold.foot for hold in character.holds] == [character.soles[0].name]
+    bpy.ops.softground.remove_foot_lock()
+    assert not bpy.ops.softground.remove_foot_lock.poll()
+
+
+def test_a_character_without_feet_takes_no_foot_lock(floor_walk):
+    floor_walk.softground.characters[0].soles.clear()
+    with pytest.raises(RuntimeError, match="has no foot with a bone"):
+        bpy.ops.softground.add_foot_lock()
+    assert not floor_walk.softground.characters[0].holds

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
-from ...core.response.clean_feet import FootFaults, clean, foot_faults
+from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds
 from ...core.response.grounding import leg_soles, responding
 from ...core.response.response import at_scene_frames, gaps
 from ...core.settings import BakeSettings
@@ -80,23 +80,31 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     shot = yield from read_shot(scene, wanted)
     standing = yield from response_job.standing_on(shot.motions, shot.terrain, wanted.response)
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
-    cleaned, feet = yield from _cleaned(shot, loads)
+    cleaned, feet, missed = yield from _cleaned(wanted, shot, loads)
     layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)
     response_job.put_layers(scene, wanted, layers)
     yield Progress("write", 1.0)
-    return CleanFeet(feet, _left_out(wanted, shot))
+    return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
 
 
-def _cleaned(shot: Shot, loads: Sequence[CharacterLoads]) -> Job[tuple[list[CharacterResponse], Faults]]:
-    """Each rigged character's response, and what its feet did before and do after."""
+def _cleaned(
+    wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
+) -> Job[tuple[list[CharacterResponse], Faults, list[str]]]:
+    """Each rigged character's response, what its feet did before and do after, and which foot locks hold nothing."""
     found: list[CharacterResponse] = []
+    missed: list[str] = []
     feet: Faults = {"before": {}, "after": {}}
     now = Progress("simulate", 1.0)
-    rigged = [one for one in zip(shot.motions, loads, strict=True) if one[0].centre is None]
-    for (motion, of_character), rig in zip(rigged, shot.rigs, strict=True):
+    each = zip(shot.motions, loads, wanted.characters, strict=True)
+    rigged = [one for one in each if one[0].centre is None]
+    for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain))
+        response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds))
+        missed += [
+            f"'{hold.foot}' of {motion.name} does not stand at frame {hold.frame:g}: its foot lock was left out."
+            for hold in missed_holds(motion, touching, asked.holds)
+        ]
         after = responding(motion, response)
         for when, moved in (("before", motion), ("after", after)):
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain))
@@ -104,7 +112,7 @@ def _cleaned(shot: Shot, loads: Sequence[CharacterLoads]) -> Job[tuple[list[Char
         made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, ()))
         left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, ()))
         found.append(CharacterResponse(motion, response, made, left, 0.0))
-    return found, feet
+    return found, feet, missed
 
 
 def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None:

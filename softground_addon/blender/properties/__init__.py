@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from .character import DEFAULT_MASS, SoftGroundCharacter, SoftGroundJoint, SoftGroundPart, SoftGroundSole
+from .character import (
+    DEFAULT_MASS,
+    SoftGroundCharacter,
+    SoftGroundHold,
+    SoftGroundJoint,
+    SoftGroundPart,
+    SoftGroundSole,
+)
 from .material import SoftGroundMaterial, SoftGroundPainted
 from .preferences import SoftGroundPreferences
 from .response import SoftGroundGrounding, SoftGroundTilt
@@ -12,6 +19,7 @@ CLASSES = (
     SoftGroundJoint,
     SoftGroundPart,
     SoftGroundSole,
+    SoftGroundHold,
     SoftGroundCharacter,
     SoftGroundMaterial,
     SoftGroundPainted,

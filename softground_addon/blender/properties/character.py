@@ -7,7 +7,7 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from .. import settings
 from ..animation_layer import nla_layer
-from .fields import is_mesh
+from .fields import is_mesh, share
 
 DEFAULT_MASS = 77.5
 """Body mass of the paper's character [kg]."""
@@ -70,6 +70,32 @@ class SoftGroundSole(bpy.types.PropertyGroup):
     )
 
 
+class SoftGroundHold(bpy.types.PropertyGroup):
+    """How Clean Feet holds one contact; see `core.response.foot_holds`."""
+
+    foot: StringProperty(name="Foot", description="Foot whose contact this is")
+    frame: IntProperty(name="Frame", description="Any frame in which the foot stands")
+    mode: EnumProperty(
+        name="Lock",
+        description="What stays in its place during this contact",
+        items=[
+            ("ROLL", "Roll", "Whatever bears the weight: the foot rolls over heel, ball and toes"),
+            ("HEEL", "Heel", "The heel: the rest of the foot moves around it"),
+            ("BALL", "Ball", "The ball of the foot: the heel moves around it"),
+            ("FLAT", "Flat", "The foot lies flat on the floor all the time"),
+            ("FULL", "Full", "The whole foot, as it is where it moves least"),
+        ],
+        default="FLAT",
+    )
+    strength: share("Strength", "0 leaves this contact as animated, 1 locks it", default=1.0)
+    ease_in: IntProperty(
+        name="Ease In", description="Frames over which the foot comes to rest after it lands", min=0, soft_max=20
+    )
+    ease_out: IntProperty(
+        name="Ease Out", description="Frames over which the foot starts to leave before it lifts", min=0, soft_max=20
+    )
+
+
 class SoftGroundCharacter(bpy.types.PropertyGroup):
     """A rig that walks on the ground."""
 
@@ -122,6 +148,8 @@ class SoftGroundCharacter(bpy.types.PropertyGroup):
     joints: CollectionProperty(name="Joints", type=SoftGroundJoint)
     soles: CollectionProperty(name="Soles", type=SoftGroundSole)
     active_sole: IntProperty(name="Active Sole", options={"HIDDEN"})
+    holds: CollectionProperty(name="Foot Locks", type=SoftGroundHold)
+    active_hold: IntProperty(name="Active Foot Lock", options={"HIDDEN"})
     sole_length: FloatProperty(
         name="Sole Length", description="Length of the shortest sole [m], which sets the cell size", options={"HIDDEN"}
     )

@@ -26,6 +26,14 @@ def quaternions(matrices: Array) -> Array:
     return np.asarray(np.where(result[:, :1] < 0, -result, result))
 
 
+def rotation_vectors(matrices: Array) -> Array:
+    """Rotation vectors (F, 3) [rad], no longer than pi, of rotation matrices (F, 3, 3)."""
+    quaternion = quaternions(matrices)
+    sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[:, :1])
+    return np.asarray(quaternion[:, 1:] * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0))
+
+
 def rotation_matrices(quaternion: Array) -> Array:
     """Rotation matrices (F, 3, 3) of quaternions (F, 4) of any length but 0, w first."""
     w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T

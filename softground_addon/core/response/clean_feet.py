@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..motion.motion import CharacterMotion
 from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
+from .foot_holds import FootHold, HeldContacts
 from .foot_lock import lock, moved, rim, slides, underside_on
 from .foot_placement import Placement, place_sole, posed_points
 from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
@@ -44,7 +46,9 @@ class FootFaults:
 
 
 @sliced
-def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[Response]:
+def clean(
+    motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: Sequence[FootHold] = ()
+) -> Slices[Response]:
     """What makes the feet stand where their contacts say that they stand.
 
     Parameters
@@ -54,32 +58,37 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
     touching : (F, S) bool array
     terrain : Terrain
         The floor.
+    holds : sequence of FootHold
+        Contacts that are held in another way than by what bears.
     """
-    floor = GroundHistory(terrain)
+    floor, frames = GroundHistory(terrain), motion.frames
     placements: dict[str, tuple[int, Placement]] = {}
     offsets = []
     for side, number in leg_soles(motion).items():
-        touches = touching[:, number]
+        sole, touches = motion.soles[number], touching[:, number]
+        contacts = HeldContacts.of(holds, sole.sole.name, frames, touches)
+        held = contacts.held(frames)
         yield
-        first = place_sole(motion, number, touches, floor, floor)
+        turned = contacts.attitude(sole, floor, frames, held)
+        first = place_sole(with_sole(motion, number, moved(sole, turned)), number, touches, floor, floor)
         yield
-        locked = first.carry
+        locked = first.carry @ turned
         for _ in range(LOCK_PASSES):
-            lying = moved(motion.soles[number], locked)
-            locked = lock(underside_on(lying, floor, motion.frames), touches) @ locked
-        held = moved(motion.soles[number], locked)
+            lying = moved(sole, locked)
+            under = underside_on(lying, floor, frames)
+            locked = lock(under, held, contacts.bearing(under, lying)) @ locked
+        lying = moved(sole, locked)
         placed = place_sole(
-            with_sole(motion, number, held),
+            with_sole(motion, number, lying),
             number,
             touches,
             floor,
             floor,
             align=0.0,
-            points=posed_points(held, rim(held.sole)),
+            points=posed_points(lying, rim(sole.sole)),
         )
-        lift = first.lift + placed.lift
-        placements[side] = number, Placement(placed.carry @ locked, lift, np.zeros_like(lift), placed.room)
-        carry = placements[side][1].carry
+        carry, lift = contacts.faded(sole, placed.carry @ locked, first.lift + placed.lift)
+        placements[side] = number, Placement(carry, lift, np.zeros_like(lift), placed.room)
         ankle = motion.joints[f"ankle_{side}"]
         offsets.append((carried(carry, ankle) - ankle)[:, :2])
     yield
@@ -87,6 +96,15 @@ def clean(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[R
     level = hips_go_along(motion, soles, offsets, touching, HIPS_TIME)
     upright = np.zeros((len(motion.frames), 2))
     return (yield from settle.slices(motion, placements, touching, upright, level=level, source_pace=True))
+
+
+def missed_holds(motion: CharacterMotion, touching: Mask, holds: Sequence[FootHold]) -> tuple[FootHold, ...]:
+    """Those of some holds that hold nothing: no leg stands on such a foot, or it does not touch in that frame."""
+    feet = {motion.soles[number].sole.name: touching[:, number] for number in leg_soles(motion).values()}
+    found = [hold for hold in holds if hold.foot not in feet]
+    for foot, touches in feet.items():
+        found += HeldContacts.of(holds, foot, motion.frames, touches).missed
+    return tuple(found)
 
 
 @sliced

@@ -116,15 +116,18 @@ def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Und
     return Underside(points, heights, piece, motion.sole.length)
 
 
-def lock(sole: Underside, touching: Mask) -> Array:
+def lock(sole: Underside, touching: Mask, weight: Array | None = None) -> Array:
     """Level displacements (F, 4, 4) that keep what bears of a sole in its place during each contact.
 
     Parameters
     ----------
     sole : Underside
     touching : (F,) bool array
+    weight : (F, Q) float array, optional
+        How much each point is to stay in its place, by default as much as it bears; 1 in all of a frame.
     """
-    points, weight, length = sole.points, sole.bearing(), sole.length
+    points, length = sole.points, sole.length
+    weight = sole.bearing() if weight is None else weight
     turn, move = np.zeros(len(points)), np.zeros((len(points), 2))
     middle = points[..., :2].mean(axis=1)
     for first, end in zip(*runs(touching), strict=True):
