@@ -79,7 +79,7 @@ def test_panels_come_in_the_order_of_work(addon):
 def test_all_that_is_not_on_the_first_screen_is_closed_under_advanced(addon):
     every = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
     below = [cls for cls in every if getattr(cls, "bl_parent_id", "")]
-    assert {cls.bl_parent_id for cls in below} == {"SOFTGROUND_PT_advanced"}
+    assert {cls.bl_parent_id for cls in below} == {"SOFTGROUND_PT_advanced", "SOFTGROUND_PT_response"}
     closed = [cls for cls in every if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())]
     assert {cls.bl_label for cls in closed} == {cls.bl_label for cls in below} | {"Advanced"}
 

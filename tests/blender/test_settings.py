@@ -21,6 +21,7 @@ NO_INPUT = {
     "grounding.by_button": "what Clear Bake switches off again",
     "has_layers": "noted by the response, for panels",
     "active_character": "which one the list shows",
+    "characters.active_hold": "which one the list shows",
     "characters.active_sole": "which one the list shows",
     "characters.response_strength": "how much of a baked layer shows; moves the layer itself",
     "animated_frames": "why the panel says that Start and End are what they are",
@@ -40,6 +41,7 @@ def all_on(scene):
     options.ground, options.frame_end = plane(scene), 40
     options.tread_pattern, options.tread_image = "IMAGE", bpy.data.images.new("Sole", 4, 8)
     options.tilt.use = options.grounding.use = True
+    options.characters[0].holds.add().foot = "foot.L"
     bpy.context.view_layer.update()
 
 
@@ -100,7 +102,14 @@ def test_every_setting_that_is_registered_is_in_the_snapshot_or_named_here(shot)
             setattr(owner, name, value)
             assert settings.snapshot(shot) == before, path + name
     assert {"ground", "material.hardening", "characters.soles.bone", "characters.joints.end", "tilt.damping"} <= seen
-    unused = {"name", "material.name", "painted.name", "tilt.name", "grounding.name"}  # groups that have no list
+    unused = {
+        "name",
+        "material.name",
+        "painted.name",
+        "tilt.name",
+        "grounding.name",
+        "characters.holds.name",
+    }  # groups that have no list
     assert seen - changing - unused == set(NO_INPUT)
 
 
