@@ -110,8 +110,9 @@ def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -
     if soles and not found:
         names = ", ".join(f"'{name}'" for name in dict.fromkeys(name for name, _ in soles))
         raise InputError(
-            f"The soles of {names} are flat, and Tread Pattern is 'From Shoes': model grooves of half a millimetre or "
-            "deeper into their undersides, with vertices 4 mm apart or less, or choose another pattern."
+            f"Tread Pattern is 'From Shoes', and the soles of {names} show no grooves: model some into the undersides "
+            "of their meshes (half a millimetre deep or more, vertices 4 mm apart or less), have these rendered, or "
+            "choose another pattern."
         )
     return replace(wanted, shoe_treads=tuple(found))
 

@@ -22,6 +22,10 @@ NEARLY = 0.8
 """Sizes down to this part of the vertices' distance are shown."""
 FULL = 0.9
 """How far ground is pressed where water may stand: within the walls."""
+MEAN_TREAD = 0.3
+"""Part of a tread that is grooves, about."""
+FLESH = 0.7
+"""Height of what a bare foot leaves standing over the depth of its print."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
 
@@ -194,11 +198,13 @@ class PrintRelief:
             around.inward / self._size,
             (shape.across[1] - shape.across[0]) / self._size,
         )
+        ridges = self._tread(under) - MEAN_TREAD
+        if self._tread.is_flesh:
+            return ridges * around.pressed * places.floor * FLESH * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
         lost = tread.kept + (tread.lost - tread.kept) * worn * worn
         within = rise((around.inward - around.length(3.0)) / around.length(6.0))
-        ridges = self._tread(under)
-        return (ridges - 0.3) * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
+        return ridges * (1.0 - lost) * within * tread.height * MM * self._size * self._tread_strength
 
 
 @dataclass(frozen=True)

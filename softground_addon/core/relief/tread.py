@@ -41,7 +41,7 @@ class Under:
 
 
 Pattern = Callable[[Under], Array]
-"""Height of the ground under a sole (N,), from 0 under what presses to 1 in grooves."""
+"""Height of the ground under a sole (N,), from 0 under what presses to 1 in the grooves of shoes."""
 
 
 GROOVE = 0.0044
@@ -85,17 +85,20 @@ _PADS = np.array(
 )  # fmt: skip
 """Heel, outer side, ball and toes of a bare right foot as ellipses: middle over length and over breadth from the middle
 of the foot, ahead and to the left, and half axes. Drawn after prints on paper."""
-_FLESH = 0.006
-"""Width over which pads of flesh fall off [m]."""
+_FLESH = 0.014
+"""Width over which pads of flesh fall off, and over which they run together [m]."""
 
 
 def bare(under: Under) -> Array:
     """Pads of heel, ball and toes; the arch, and the gaps before and between the toes, stand."""
     along, across = under.along / LENGTH, under.across / under.breadth
-    far = np.full(len(along), -np.inf)
+    far = np.full(len(along), -1.0)
     for ahead, left, half_length, half_breadth in _PADS:
         share = np.hypot((along - ahead) / half_length, (across - left) / half_breadth)
-        far = np.maximum(far, (1.0 - share) * min(half_length * LENGTH, half_breadth * under.breadth))
+        pad = (1.0 - share) * min(half_length * LENGTH, half_breadth * under.breadth)
+        width = min(_FLESH, 0.4 * half_length * LENGTH)  # toes stay apart
+        both = np.maximum(1.0 - np.abs(far - pad) / width, 0.0)
+        far = np.maximum(far, pad) + 0.25 * width * both * both
     return np.asarray(1.0 - rise(far / _FLESH + 0.5))
 
 
@@ -114,10 +117,22 @@ def of_map(of_sole: Array) -> Pattern:
 
 @dataclass(frozen=True)
 class SoleTread:
-    """The tread of one sole: a pattern, mirrored for left feet."""
+    """The tread of one sole.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    is_mirrored : bool
+        As it is for left feet.
+    """
 
     pattern: Pattern
     is_mirrored: bool = False
+
+    @property
+    def is_flesh(self) -> bool:
+        """Whether it is that of a bare foot: what it leaves standing is high and goes on into the wall."""
+        return self.pattern is bare
 
     def __call__(self, under: Under) -> Array:
         """See `Pattern`."""

@@ -13,7 +13,7 @@ from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import sample_at
 from softground_addon.core.relief import amounts
 from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, water_at
-from softground_addon.core.relief.tread import SoleTread, hiking
+from softground_addon.core.relief.tread import SoleTread, bare, hiking
 from tests.core.walkers import pressed, walk
 
 MATERIALS = {
@@ -50,11 +50,13 @@ def relief(look, footprints, place, **more):
                            blur_sigma=MATERIALS[look].blur_sigma)  # fmt: skip
 
 
+@pytest.mark.parametrize("pattern", [hiking, bare])
 @pytest.mark.parametrize("look", SURFACES)
-def test_volumes_stay_within_a_percent_and_heights_change(look):
+def test_volumes_stay_within_a_percent_and_heights_change(look, pattern):
     footprints = steps_on(look)
     place = around(footprints)
-    found = relief(look, footprints, place)
+    treads = {(step.character, step.sole): SoleTread(pattern) for step in footprints}
+    found = relief(look, footprints, place, treads=treads)
     sample = sample_at(footprints, *place, **SHOWN, blur_sigma=MATERIALS[look].blur_sigma)
     for step in found:
         pressed_there = sample.compression[step.point].sum()
