@@ -118,6 +118,14 @@ def test_a_mesh_with_bumps_is_a_hard_floor_too(floor_walk):
     check_bars(floor_walk, "bumps", before)
 
 
+def test_the_panel_lists_no_gap_that_the_summary_does_not_know(floor_walk):
+    spoil(floor_walk)
+    cleaned = jobs.run(clean_feet(floor_walk))
+    notes = nla_layer.notes_of(floor_walk.softground.characters[0].armature)
+    listed = max((abs(gap) for _, gap, _ in response_job.worst_gaps_in(notes)), default=0.0)
+    assert listed < cleaned.feet["after"]["Walker"]["float"]["max"] + 0.1
+
+
 def test_clear_bake_gives_the_bytes_back(floor_walk):
     spoil(floor_walk)
     before = fingerprints.of_file()

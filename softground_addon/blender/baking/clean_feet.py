@@ -15,6 +15,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
 from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds
+from ...core.response.foot_lock import rim
 from ...core.response.grounding import leg_soles, responding
 from ...core.response.response import at_scene_frames, gaps
 from ...core.settings import BakeSettings
@@ -109,8 +110,8 @@ def _cleaned(
         for when, moved in (("before", motion), ("after", after)):
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain))
             feet[when][motion.name] = _statistics(faults)
-        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, ()))
-        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, ()))
+        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), rim))
+        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), rim))
         found.append(CharacterResponse(motion, response, made, left, 0.0))
     return found, feet, missed
 

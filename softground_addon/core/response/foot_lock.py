@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..motion.motion import Sole, SoleMotion, SolePatch
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
-from .foot_placement import PressedGround, between_contacts, posed_points
+from .foot_placement import Pieces, PressedGround, between_contacts, posed_points
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,7 +31,7 @@ STILL = 0.004
 """A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
 
 
-def rim(sole: Sole) -> list[tuple[int, Array]]:
+def rim(sole: Sole) -> Pieces:
     """Points around each patch of a sole, and its lowest: patch and positions (K, 3) in the patch's frame [m].
 
     A convex sole that is tilted stands on one of its rim. The landmarks where the sole has no patches.

@@ -35,6 +35,10 @@ CLEAR_TIME = 0.10
 """Half the time over which a swinging foot is lifted over what is in its way [s], for an adult."""
 
 
+Pieces = Sequence[tuple[int, Array]]
+"""Points of a sole: patch and positions (K, 3) in the patch's frame [m]."""
+
+
 class PressedGround(Protocol):
     """The ground over time, as `ground_history.GroundHistory`."""
 
@@ -65,7 +69,7 @@ class Placement:
     room: Array
 
 
-def underside(sole: Sole, edge: float = EDGE) -> list[tuple[int, Array]]:
+def underside(sole: Sole, edge: float = EDGE) -> Pieces:
     """Points spread over a sole, inside its edge: patch and positions (K, 3) in the patch's frame [m].
 
     The landmarks where the sole has no patches.
@@ -88,7 +92,7 @@ def _inside(patch: SolePatch, length: float, edge: float) -> Array:
     return np.stack([x, y, patch.heights[rows, columns]], axis=-1)
 
 
-def posed_points(motion: SoleMotion, pieces: Sequence[tuple[int, Array]] | None = None) -> Array:
+def posed_points(motion: SoleMotion, pieces: Pieces | None = None) -> Array:
     """World positions of points in the frames of a sole's patches, or of its `underside`, (F, Q, 3) [m]."""
     poses = motion.transforms
     return np.concatenate(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import FlatTerrain, Terrain
 from ..loads.contacts import Contacts, detect_contacts
-from ..motion.motion import CharacterMotion, SoleMotion
+from ..motion.motion import CharacterMotion, Sole, SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
 from .foot_lock import moved
-from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
+from .foot_placement import Pieces, Placement, lowest_clearance, place_sole, posed_points, underside
 from .grounding import Response, heel_rises, leg_soles, responding, settle, with_sole
 from .moved_steps import Followed
 from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
@@ -227,14 +227,20 @@ def _heading(motion: CharacterMotion) -> Array:
 
 
 @sliced
-def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: Sequence[Footprint]) -> Slices[Gaps]:
-    """Distance of each standing sole's lowest point from the ground as it is at that frame."""
+def gaps(
+    motion: CharacterMotion,
+    touching: Mask,
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    points: Callable[[Sole], Pieces] = underside,
+) -> Slices[Gaps]:
+    """Distance of each standing sole's lowest point from the ground as it is at that frame; of those points of it."""
     history = GroundHistory(terrain, footprints)
     frames, soles, heights = [], [], []
     for index, sole in enumerate(motion.soles):
         yield
         stands = np.flatnonzero(touching[:, index])
-        clearance = _clearance(sole, stands, motion.frames[stands], history)
+        clearance = _clearance(sole, points(sole.sole), stands, motion.frames[stands], history)
         known = np.isfinite(clearance)
         frames.append(motion.frames[stands][known])
         soles.append(np.full(int(known.sum()), index))
@@ -242,11 +248,13 @@ def gaps(motion: CharacterMotion, touching: Mask, terrain: Terrain, footprints: 
     return Gaps(np.concatenate(frames), np.concatenate(soles), np.concatenate(heights))
 
 
-def _clearance(sole: SoleMotion, samples: NDArray[np.intp], frames: Array, history: GroundHistory) -> Array:
+def _clearance(
+    sole: SoleMotion, pieces: Pieces, samples: NDArray[np.intp], frames: Array, history: GroundHistory
+) -> Array:
     """Height of a sole's lowest point above the ground at some of its samples, which are at these frames, (K,) [m]."""
 
     def during(part: slice) -> Array:
-        points = posed_points(replace(sole, transforms=sole.transforms[samples[part]]))
+        points = posed_points(replace(sole, transforms=sole.transforms[samples[part]]), pieces)
         return lowest_clearance(points, history, frames[part])
 
     return in_stretches(during, len(samples))

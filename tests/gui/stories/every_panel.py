@@ -16,7 +16,7 @@ COLUMNS = (
     ("soles", "joints"),
     ("material", "layers"),
     ("painted", "mesh", "overlay"),
-    ("response", "output"),
+    ("response", "foot_locks", "output"),
     ("weather", "steps"),
 )
 """The panels as the docs show them, from left to right."""
@@ -38,6 +38,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     with_viewport(hand, bpy.ops.softground.add_weather, preset="NONE")
     yield from hand.wait_for(lambda: not session().is_baking, 120)
     with_viewport(hand, bpy.ops.softground.choose_step, step=steps()[1].name)
+    with_viewport(hand, bpy.ops.softground.add_foot_lock)
     facts["width"] = hand.region().width
     columns = []
     for number, names in enumerate(COLUMNS):
