@@ -11,6 +11,10 @@ REACH = 0.05
 """What may rest lies at most this far over the lowest skin, in body heights."""
 BIN = 0.004
 """Step of the levels that are tried, in body heights."""
+OFTEN = 20.0
+"""Percentile of the lowest skin at which some is on the ground: a runner has a foot there a third of the time."""
+AROUND = 0.5
+"""Time to either side over which that is looked for [s]: a stride of a run."""
 FURTHER_PART = 0.15
 """How much a further part that rests at a level adds to a moment's vote for it."""
 BELOW = 0.03
@@ -32,9 +36,13 @@ _SLICE = 200_000
 def drift_of(tracks: PartTracks) -> Array:
     """Horizontal velocity that most calm low skin has, (2,) [H/s]: 0 where the character travels.
 
-    The belt's in a walk on the spot, backward: minus the travel that root motion would have.
+    What is high over the ground of the moments around does not count: feet that hang in flight are calm, too. It is the
+    belt's in a walk on the spot, backward: minus the travel that root motion would have.
     """
-    weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH)
+    reach = max(round(AROUND * tracks.rate), 1)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(tracks.lowest, reach, mode="symmetric"), 2 * reach + 1)
+    over = tracks.low - np.percentile(around, OFTEN, axis=1)[:, None]
+    weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH) * np.clip(1.0 - over / REACH, 0.0, 1.0)
     frame, part = np.nonzero(weight)
     if not len(frame):
         return np.zeros(2)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.skin.bearing import bearing, without_glimpses
 from softground_addon.core.skin.contacts import SkinContacts, find_contacts
+from softground_addon.core.skin.ground_level import drift_of
 from softground_addon.core.skin.skin_motion import PartTracks, SkinMotion, track_parts
 
 RATE, PERIOD, FRAMES = 30.0, 30, 90
@@ -208,6 +209,17 @@ def test_the_last_two_frames_show_a_contact_where_the_foot_rests_in_them(pace: f
     assert without_glimpses(bears, tracks)[[9, 19, 28, 29], 0].tolist() == [True, True, pace < 0.15, pace < 0.15]
     only = bears & (np.arange(30) > 20)[:, None]  # of a foot that shows nothing else
     assert (without_glimpses(only, tracks) == only).all()
+
+
+@pytest.mark.parametrize("base", [0.0, -0.3])
+def test_the_ground_moves_as_feet_do_that_stand_on_it_not_as_those_of_a_flight(base: float) -> None:
+    stands = np.arange(60) % 10 < 3  # a run on the spot; between two steps, feet hang calmly 5 % of the height up
+    low = np.where(stands, 0.0, 0.054)
+    low[40:] += base  # and goes on lower down
+    ways = np.zeros((2, 60, 1, 2))
+    ways[..., 0, 0] = np.where(stands, 2.0, -0.6)
+    still = np.zeros((60, 1))
+    assert drift_of(PartTracks(low[:, None], ways[0], still, ways, 0.3, 24.0)).tolist() == pytest.approx([2.0, 0.0])
 
 
 def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
