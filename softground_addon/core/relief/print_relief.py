@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..record.footprints import Footprint
 from .amounts import Amounts, Chunks
+from .drag import Drag, drags_of
 from .lattice_noise import cells, noise, rise, uniform
 from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
@@ -65,6 +67,8 @@ class PrintRelief:
         That the sole has; nothing of it is shown where its grooves are too narrow for that.
     tread_strength : float
         Its height over that of the amounts.
+    drags : sequence of Drag
+        Where the sole slid.
     """
 
     def __init__(
@@ -75,12 +79,14 @@ class PrintRelief:
         finest: float,
         tread: SoleTread | None = None,
         tread_strength: float = 1.0,
+        drags: Sequence[Drag] = (),
     ) -> None:
         self._shape, self._amounts, self._seed = shape, amounts, seed
         self._finest = finest * NEARLY
         self._size = (shape.along[1] - shape.along[0]) / LENGTH
         self._tread = tread if GROOVE * self._size > 1.5 * finest else None
         self._tread_strength = tread_strength
+        self._drags = drags
         self._wider, self._deeper, self._level = 0.0, 0.0, -np.inf
         x, y = (place.ravel() for place in np.meshgrid(*shape.window.centres(shape.cell_size)))
         places = self._look_up(x, y)
@@ -169,7 +175,8 @@ class PrintRelief:
             self._seed, places.x, places.y, places.foot_x, places.foot_y, places.inward + self._wider, pressed,
             self._finest, self._shape.fineness,
         )  # fmt: skip
-        layers = sum((layer.heights(around) for layer in self._amounts.layers), np.zeros(len(places.x)))
+        made_of = (*self._amounts.layers, *self._drags)
+        layers = sum((layer.heights(around) for layer in made_of), np.zeros(len(places.x)))
         layers = share * (layers + self._standing(places, around))
         deeper = self._deeper * pressed * places.floor * places.fade
         height = height + layers * places.fade - deeper
@@ -199,6 +206,8 @@ class PrintRelief:
             (shape.across[1] - shape.across[0]) / self._size,
         )
         ridges = self._tread(under) - MEAN_TREAD
+        for drag in self._drags:
+            ridges = ridges * drag.kept(around)
         if self._tread.is_flesh:
             return ridges * around.pressed * places.floor * FLESH * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
@@ -239,4 +248,5 @@ def relief_of_print(
     shape = shape_of(footprint, blur_sigma)
     if shape is None or not shape.depth > 0:
         return None
-    return PrintRelief(shape, amounts, seed, finest, tread, tread_strength)
+    drags = drags_of(footprint, shape.along[1] - shape.along[0], shape.depth)
+    return PrintRelief(shape, amounts, seed, finest, tread, tread_strength, drags)

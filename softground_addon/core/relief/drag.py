@@ -1,0 +1,119 @@
+"""Marks of soles that slide as they land or leave: scratches along the way, a gap in the wall, a heap before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record.footprints import Footprint
+from .lattice_noise import noise, rise
+from .layers import Around
+
+Array = NDArray[np.float64]
+
+LEAST, WHOLE = 0.01, 0.04
+"""Ways that leave a first mark, and a whole one [m]: a planted sole gives way by some millimetres as it rolls."""
+LOADED = 0.05
+"""Part of the peak force from which a sole presses."""
+PART = 1 / 3
+"""Of a contact, in which a sole lands; and as much in which it leaves."""
+BREADTH = 0.16
+"""Half the breadth of a mark over the length of the print."""
+SCRATCH, RAMP, HEAP = 0.12, 0.45, 0.2
+"""Heights over the depth of the print: of scratches, of what is missing from the wall ahead, of what lies before it."""
+FINE, LONG = 7.0, 12.0
+"""Breadth of scratches [mm], and how many times longer they are."""
+
+
+@dataclass(frozen=True)
+class Drag:
+    """The mark of one slide.
+
+    Attributes
+    ----------
+    start, way : (2,) float arrays
+        Where the pressure was as it began, and how far the sole slid [m].
+    radius : float
+        Half its breadth [m].
+    depth : float
+        Of the print [m].
+    is_last : bool
+        Whether the sole left with it, and wiped its tread out; where it landed, it stood still on it afterwards.
+    """
+
+    start: Array
+    way: Array
+    radius: float
+    depth: float
+    is_last: bool = True
+
+    @property
+    def length(self) -> float:
+        """Of the way [m]."""
+        return float(np.hypot(*self.way))
+
+    @property
+    def share(self) -> float:
+        """How much of a whole mark it is, from 0 to 1."""
+        return float(rise(np.asarray((self.length - LEAST) / (WHOLE - LEAST))))
+
+    def kept(self, around: Around) -> Array:
+        """Part of a tread that it leaves."""
+        along, across = self._places(around)
+        return np.asarray(1.0 - self.is_last * self.share * self._within(along, across))
+
+    def _places(self, around: Around) -> tuple[Array, Array]:
+        """How far along the way and to its left places are [m]."""
+        x, y = around.x - self.start[0], around.y - self.start[1]
+        cos, sin = self.way / self.length
+        return x * cos + y * sin, y * cos - x * sin
+
+    def _within(self, along: Array, across: Array) -> Array:
+        """1 on the way, 0 beside it."""
+        beside = np.hypot(across, along - np.clip(along, 0.0, self.length))
+        return rise(2.0 - 2.0 * beside / self.radius)
+
+    def heights(self, around: Around) -> Array:
+        """Heights [m]."""
+        length = self.length
+        along, across = self._places(around)
+        within = self._within(along, across)
+        to_end = along - length - 1.4 * self.radius
+        size = around.length(FINE)
+        lines = noise(around.seed + 191, size, across, along / LONG) if size >= around.finest else 0.0 * along
+        ramp = rise(along / length) * (1.0 - around.pressed)
+        before = np.maximum(1.0 - (to_end**2 + across**2) / self.radius**2, 0.0) * rise(to_end / self.radius + 0.5)
+        heights = within * (SCRATCH * lines - RAMP * ramp) + HEAP * before * (1.0 - around.pressed)
+        return np.asarray(self.share * self.depth * heights)
+
+
+def drags_of(footprint: Footprint, length: float, depth: float) -> list[Drag]:
+    """The marks of a footprint that slid as it landed or left; none of one that did not, or whose poses are not known.
+
+    Parameters
+    ----------
+    footprint : Footprint
+    length, depth : float
+        Of the print [m].
+    """
+    if footprint.pressed_by is None or footprint.pressed_by.pressing.sole.prop is not None:
+        return []
+    steps = footprint.pressed_by.steps(footprint.load_frames)
+    force = np.linalg.norm(steps.forces, axis=-1)
+    pressing = np.flatnonzero(force > LOADED * force.max(initial=0.0))
+    count = int(PART * len(pressing))
+    if not count:
+        return []
+    found = []
+    for part, patch in ((pressing[:count], 0), (pressing[-count - 1 : -1], -1)):
+        poses, centre = steps.poses[:, patch], steps.centres[part]
+        local = np.linalg.solve(poses[part, :3, :3], (centre - poses[part, :3, 3])[..., None])
+        moved = (poses[part + 1, :3, :3] @ local)[..., 0] + poses[part + 1, :3, 3] - centre
+        way = moved[:, :2].sum(axis=0)
+        slid, radius = float(np.hypot(*way)), BREADTH * length
+        if slid > LEAST:
+            behind = way / slid * radius if patch == 0 else 0.0  # what lands goes on to cover what it slid over
+            found.append(Drag(centre[0, :2] - behind, way, radius, depth, patch != 0))
+    return found
