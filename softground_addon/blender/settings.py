@@ -9,6 +9,8 @@ from typing import Any, cast
 
 import bpy
 
+from ..core.after.felt_weather import FeltWeather
+from ..core.after.weather import span_of
 from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
@@ -171,7 +173,16 @@ def snapshot(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettings:
         keep_forces=options.keep_forces,
         longest_bake_s=60.0 * typed(options.longest_bake),
         debris=options.debris,
+        weather=_calm(options, units_of(scene)) if options.steps_feel_weather else None,
     )
+
+
+def _calm(options: Any, units: SceneUnits) -> FeltWeather:
+    """No weather, for steps that would feel it."""
+    stretch = units.time_stretch
+    span = span_of(options.frame_start * stretch, options.frame_end * stretch)
+    first, last = span.first / stretch, span.last / stretch
+    return FeltWeather(surface=options.material.surface, first=first, last=last, frame_rate=units.frame_rate)
 
 
 def is_prop(character: Any) -> bool:

@@ -40,6 +40,8 @@ MOST_CELLS = 2**26
 """Most cells that one step is pressed in: 40 m along each side, where they suit a foot."""
 _DAMAGE = (ArithmeticError, IndexError, MemoryError, ValueError, np.linalg.LinAlgError)
 """What pressing steps may raise that a stranger's file says: soles of no area, poses that are none."""
+_SAME_TIME = 1e-3
+"""Scene frames."""
 SLIDING = 0.25
 """How far around a step ground may slide into it, where the material has an angle of repose [m]."""
 
@@ -79,8 +81,12 @@ class EditedSteps:
 
     def __init__(self, footprints: Sequence[Footprint], ground: SoftGround, cell_size: float) -> None:
         self._footprints, self._ground, self._cell_size = footprints, ground, cell_size
-        undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
-        self._solver = GroundSolver(ground, HeightField(cell_size), undisturbed)
+        self._undisturbed = UndisturbedCells(ground.terrain, ground.variation, cell_size)
+        self._solver = GroundSolver(ground, HeightField(cell_size), self._undisturbed)
+        self._weather_reach = int(ground.weathering.reach / cell_size) if ground.weathering else 0
+        """How many cells around a step what weather leaves there depends on."""
+        sliding = int(SLIDING / cell_size) if ground.material.repose_angle else 0
+        self._margin = max(sliding, self._weather_reach)
         self._points: dict[int, SolePoints] = {}
         self._feet = feet(footprints)
         self._scaled: dict[tuple[int, float], PressingSole] = {}
@@ -162,7 +168,7 @@ class EditedSteps:
         kept = {n: footprint for n, footprint in prints.items() if n in dict(edits) or len(changed[n])}
         windows = [footprint.window for footprint in kept.values() if footprint]
         window = _union([*windows, *(self._baked(n).window for n in kept)])
-        return _Group(edits, kept, {n: changed[n] for n in kept}, window)
+        return _Group(edits, kept, {n: changed[n] for n in kept}, window.expanded(self._weather_reach))
 
     def _start(self, number: int, edit: StepEdit) -> float:
         """The first scene frame at which a step presses, or pressed."""
@@ -187,7 +193,7 @@ class EditedSteps:
         """Steps that press cells at a frame or later."""
         if not len(cells):
             return []
-        column, row, columns, rows = _window_of(cells)
+        column, row, columns, rows = _window_of(cells).expanded(self._weather_reach)
         low, size = self._windows[:, :2], self._windows[:, 2:]
         near = (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
         near &= self._frames[:, 1] >= since
@@ -197,15 +203,20 @@ class EditedSteps:
         """Whether a step, as it was baked or as it is now, presses some cells."""
         prints = (self._before(number), footprint)
         return any(
-            bool(among(cells, pressed).any())
-            for one in prints
-            if one is not None
-            for pressed in [_cells(one, _all_of(one) if self._ground.material.repose_angle else one.contact_cells)]
+            bool(among(cells, pressed).any()) for one in prints if one is not None for pressed in [self._read_by(one)]
         )
+
+    def _read_by(self, footprint: Footprint) -> Keys:
+        """The cells that a print depends on."""
+        if self._ground.weathering or self._ground.material.repose_angle:
+            window = footprint.window.expanded(self._weather_reach)
+            return _keys(window, np.arange(window.cells))
+        return _keys(footprint.window, footprint.contact_cells[:])
 
     def _changed_cells(self, number: int, after: Footprint | None) -> Keys:
         """Cells in which the print of a step differs visibly from that of the bake."""
-        quantities = ("compression", "rim") if self._ground.material.repose_angle else ("compression",)
+        either = self._ground.material.repose_angle or self._ground.weathering
+        quantities = ("compression", "rim") if either else ("compression",)
         before, window = self._before(number), self._baked(number).window
         window = window.union(after.window) if after else window
         differs = np.zeros((window.rows, window.columns), bool)
@@ -215,6 +226,10 @@ class EditedSteps:
                 if one is not None:
                     difference[window.slices(one.window)] += sign * one.tile(getattr(one, quantity))
             differs |= np.abs(difference) > VISIBLE
+        if self._ground.weathering and not _at_once(before, after):  # of other age, whatever its depth
+            for one in (before, after):
+                if one is not None:
+                    differs[window.slices(one.window)] |= _changed_by(one)
         return _keys(window, np.flatnonzero(differs))
 
     def _press(self, members: Mapping[int, StepEdit]) -> dict[int, Footprint | None]:
@@ -233,15 +248,21 @@ class EditedSteps:
         end = max(layout.end for layout in layouts.values())
         others = self._others(layouts, members, grid.frame(grid.number(end - 1)))
         first = grid.number(start)
-        self._solver.state = HeightField(self._cell_size)
+        self._solver = GroundSolver(self._ground, HeightField(self._cell_size), self._undisturbed)
+        weathered = self._solver.weathered
         for other in others:
             _add(self._solver.state, other.until(grid.frame(first - 1)))
+        if weathered:
+            for one in self._footprints:
+                weathered.ended(one.end_frame, one.compressed_m3, one.area_m2)
         contacts = {n: OpenContact(one.layout, laid_out=one.imprints) for n, one in laid.items()}
         prints: dict[int, Footprint | None] = {}
         for number in range(first, grid.number(end - 1) + 1):
             frame, steps = grid.frame(number), grid.steps(number)
             for other in others:
                 _add(self._solver.state, other.at(frame))
+                if weathered:
+                    weathered.note(*other.known(frame))
             under_way = [
                 one for one in contacts.values() if one.layout.first < steps.stop and one.layout.end > steps.start
             ]
@@ -256,8 +277,7 @@ class EditedSteps:
         self, layouts: Mapping[int, ContactLayout], members: Mapping[int, StepEdit], end: float
     ) -> list[_Baked]:
         """The prints around some steps that stay as they were baked."""
-        margin = int(SLIDING / self._cell_size) if self._ground.material.repose_angle else 0
-        windows = [layout.window(self._solver.cells).expanded(margin) for layout in layouts.values()]
+        windows = [layout.window(self._solver.cells).expanded(self._margin) for layout in layouts.values()]
         low, size = self._windows[:, :2], self._windows[:, 2:]
         near = np.zeros(len(low), bool)
         for column, row, columns, rows in windows:
@@ -386,6 +406,21 @@ class _Baked:
             ]
         )
 
+    def known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
+        """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""
+        footprint, window = self._footprint, self._footprint.window
+        last, touched = np.full(window.cells, -np.inf), np.zeros(window.cells, bool)
+        for frames, first, cells, _ in self._changes:
+            count = int(np.searchsorted(frames, frame + 1e-6))
+            np.maximum.at(last, cells[: first[count]], np.repeat(frames[:count], np.diff(first[: count + 1])))
+            if count:
+                touched[footprint.contact_cells[:]] = True
+        cells, start, end = footprint.contact_cells[:], footprint.contact_start[:], footprint.contact_end[:]
+        by_now = start <= frame + 1e-6
+        last[cells[by_now]] = np.maximum(last[cells[by_now]], np.minimum(end[by_now], frame))
+        shape = (window.rows, window.columns)
+        return window, last.reshape(shape), touched.reshape(shape)
+
     def _sum(self, during: Sequence[slice]) -> tuple[Window, Array] | None:
         if all(part.start == part.stop for part in during):
             return None
@@ -419,12 +454,20 @@ def _within(changes: frozenset[Change], edits: Mapping[int, StepEdit]) -> bool:
     return all(edits.get(number) == edit for number, edit in changes)
 
 
-def _all_of(footprint: Footprint) -> NDArray[np.intp]:
-    return np.arange(footprint.window.cells)
+def _at_once(one: Footprint | None, other: Footprint | None) -> bool:
+    """Whether two prints were made at the same time."""
+    if one is None or other is None:
+        return False
+    return abs(one.start_frame - other.start_frame) + abs(one.end_frame - other.end_frame) < _SAME_TIME
 
 
-def _cells(footprint: Footprint, cells: NDArray[np.integer]) -> Keys:
-    return _keys(footprint.window, cells)
+def _changed_by(footprint: Footprint) -> NDArray[np.bool_]:
+    """The cells that a print changed or touched, (rows, columns) of its window."""
+    window = footprint.window
+    changed = np.zeros(window.cells, bool)
+    for cells in (footprint.contact_cells, footprint.compression.cells, footprint.rim.cells):
+        changed[cells[:]] = True
+    return changed.reshape(window.rows, window.columns)
 
 
 def _keys(window: Window, cells: NDArray[np.integer]) -> Keys:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from enum import IntEnum
 from typing import Any
 
+from .after.felt_weather import FeltWeather
 from .ground.material import GroundMaterial, Pressure
 from .loads.estimate import ForceModel
 from .response.foot_holds import FootHold
@@ -195,6 +196,8 @@ class BakeSettings(SceneUnits):
         Whether steps throw what physics says, which is then missing from their rims.
     shoe_treads : tuple of (str, str, str)
         Character, name of a sole, and its `relief.tread_map` as text, as a bake has read them from its meshes.
+    weather : FeltWeather or None
+        What steps find of earlier ones follows from it; None where they feel none.
     """
 
     file: str = field(metadata=_on(Acts.OUTPUT))
@@ -226,6 +229,7 @@ class BakeSettings(SceneUnits):
     longest_bake_s: float = field(metadata=_on(Acts.OUTPUT))
     debris: bool = field(default=False, metadata=_on(Acts.RESPONDING))
     shoe_treads: tuple[tuple[str, str, str], ...] = field(default=(), metadata=_on(Acts.OUTPUT))
+    weather: FeltWeather | None = field(default=None, metadata=_on(Acts.PRESSING))
 
     @property
     def spacing_m(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import compat
-from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_keys, weather_modifier
+from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
@@ -130,7 +130,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
                 said,
                 matter,
                 frame=frame,
-                span=weather_keys.span_of(*about["inputs"]["frames"], 24.0),
+                span=weather.span_of(*about["inputs"]["frames"], 24.0),
             )
             now = shown(scene, frame)
             moved = (read(now, "position", 3) - before[frame])[:, 2]
@@ -194,7 +194,7 @@ def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_a
         key(scene, name, values, "CONSTANT" if name == "Wind" else "LINEAR")
     mesh = carrier(scene).data
     footprints, about = baked_ground.load(scene.softground.ground)
-    span = weather_keys.span_of(about["inputs"]["frames"][0], 400, 24.0)
+    span = weather.span_of(about["inputs"]["frames"][0], 400, 24.0)
     assert span.step == 2.0
     frames = np.arange(span.first, span.last + 1)
     parts = (frames[:-1] + 0.5).reshape(-1, 2)
@@ -411,6 +411,7 @@ def test_the_panel_says_that_steps_do_not_feel_the_weather_where_there_is_some(o
     for there in (False, True):
         weather_panel.SOFTGROUND_PT_weather.draw(panel, bpy.context)
         assert ("Steps do not feel the weather" in str(panel.mock_calls)) == there
+        assert ("steps_feel_weather" in str(panel.mock_calls)) == there
         bpy.ops.softground.add_weather()
 
 

@@ -7,15 +7,22 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from softground_addon.core.after import weather as w
-from softground_addon.core.after.felt_weather import FeltWeather, PrintsInWeather
+from softground_addon.core.after.felt_weather import FeltWeather, PrintsInWeather, weathering_of
 from softground_addon.core.after.weather import PARTS, Span
 from softground_addon.core.after.weather_course import course_of
-from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, Window
+from softground_addon.core.after.weather_places import section_of, weather_places
+from softground_addon.core.edited_steps import EditedSteps, with_edits
+from softground_addon.core.ground.display_blur import blurred_window
+from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, SparseGrid, Window
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.motion.motion import steps_per_frame
+from softground_addon.core.record import record
+from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.record import BakeRecord
 from softground_addon.core.simulation import simulate
+from tests.core.after.weathered_ground import weathered
 from tests.core.walkers import box_sole, loads_of, pose, walk
 
 RATE, CELL, LAYER = 24.0, 0.02, 0.4
@@ -33,12 +40,12 @@ SECONDS = BETWEEN.sum() / RATE
 WHERE = Window(-40, -40, 80, 80)
 
 
-def two_steps(second=1.0):
-    """A flat sole that stands twice in one place; the second time under a part of the force."""
+def two_steps(second=1.0, first=1.0, later=0):
+    """A flat sole that stands twice in one place, under parts of the force; the first time so many frames later."""
     count = 240 * steps_per_frame(RATE) + 1
     frames = 1.0 + np.arange(count) / steps_per_frame(RATE)
     force = np.zeros((count, 1))
-    for (start, end), part in ((FIRST, 1.0), (SECOND, second)):
+    for (start, end), part in (((FIRST[0] + later, FIRST[1] + later), first), (SECOND, second)):
         force[(frames > start) & (frames <= end)] = part * FORCE
     poses = np.tile(pose([0.0, 0.0, 0.0]), (count, 1, 1, 1))
     return loads_of([box_sole(SIDE, SIDE)], [poses], force, force > 0, RATE)
@@ -47,11 +54,12 @@ def two_steps(second=1.0):
 def between(**rates):
     """Weather while nobody stands."""
     time_scale = rates.pop("time_scale", 1.0)
-    return FeltWeather(time_scale=tuple(np.where(BETWEEN, time_scale, 0.0).tolist()), **rates)
+    rates["time_scale"] = tuple(np.where(BETWEEN, time_scale, 0.0).tolist())
+    return FeltWeather(first=SPAN.first, last=SPAN.last, **rates)
 
 
 def prints(weather, second=1.0, material=MATERIAL, loads=None):
-    weathering = PrintsInWeather(weather, SPAN, LAYER) if weather else None
+    weathering = weathering_of(weather, LAYER)
     ground = SoftGround(FlatTerrain(), material, weathering=weathering)
     found = [one for result in simulate([loads or two_steps(second)], ground, CELL) for one in result.footprints]
     return sorted(found, key=lambda one: one.start_frame)
@@ -60,6 +68,11 @@ def prints(weather, second=1.0, material=MATERIAL, loads=None):
 def cells(footprints):
     """Compression and rim that the record has, over `WHERE`."""
     return recompose(footprints, cell_size=CELL).read(WHERE)
+
+
+def gaussian(values, sigma):
+    """As the display blurs."""
+    return gaussian_filter(values, sigma / CELL, mode="constant", truncate=4.0) if sigma else values
 
 
 def middle(footprints):
@@ -158,12 +171,125 @@ def test_new_snow_on_sand_is_trodden_down_to_the_sand():
 
 def test_wind_takes_of_a_print_what_it_fills_and_no_more():
     weather = replace(between(wind=8.0, time_scale=600.0), surface="sand")
-    in_weather, ground = PrintsInWeather(weather, SPAN, LAYER), HeightField(CELL)
+    in_weather, ground = PrintsInWeather(weather, LAYER), HeightField(CELL)
     made = np.zeros((2, 80, 80))
     made[:, 35:45, 30:50] = np.random.default_rng(1).random((2, 10, 20)) * 0.05
     ground.write(WHERE, made)
-    known = {"trodden": made[0] > 0, "frame": 145.0, "section": 0.05}
+    trodden = SparseGrid(CELL, channels=1)
+    trodden.write(WHERE, made[:1] > 0)
+    known = {"trodden": trodden, "frame": 145.0, "section": 0.05}
     left = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
     kept = np.exp(-w.fill_rate(w.blown_flux(8.0, w.SAND), 0.05, w.SAND) * 600.0 * SECONDS)
     assert left.sum(axis=(1, 2)) == pytest.approx(kept * made.sum(axis=(1, 2)), rel=1e-4)
     assert np.array_equal(in_weather.aged(ground, WHERE, since=np.full((80, 80), 145.0), **known), made)
+
+
+def seen(footprints, weather, frame, *, felt, blur=0.01):
+    """The surface that bake and weather show at the cells of `WHERE` [m]."""
+    weathering = weathering_of(weather, LAYER) if felt else None
+    x, y = WHERE.centres(CELL)
+    position = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))], axis=-1).reshape(-1, 3)
+    compression, rim = blurred_window(recompose(footprints), WHERE, blur)
+    relief = (rim - compression).ravel()
+    start, end = np.full((2, len(relief)), [[1e9], [-1e9]])
+    for one in footprints:
+        for changes in (one.compression, one.rim):
+            for number, at in enumerate(changes.frames):
+                changed = changes.cells[changes.first[number] : changes.first[number + 1]]
+                row, column = np.divmod(changed, one.window.columns)
+                where = (row + one.window.row - WHERE.row) * WHERE.columns + column + one.window.column - WHERE.column
+                start[where], end[where] = np.minimum(start[where], at - 1.0), np.maximum(end[where], at)
+    places = weather_places(
+        footprints,
+        position,
+        relief,
+        start,
+        end,
+        cell_size=CELL,
+        blur_sigma=blur,
+        layer_depth=LAYER,
+        weathering=weathering,
+    )
+    matter = w.matter_of(weather.surface, LAYER, section_of(footprints[:1]))
+    now = weathered(places, relief, weather, matter, frame=frame, span=SPAN)
+    return (relief + now.height - now.water).reshape(len(y), len(x))
+
+
+@pytest.mark.parametrize("blur", [0.0, 0.01, 0.03])
+def test_a_step_on_new_snow_is_shown_without_a_seam_around_it(blur):
+    weather = replace(between(snowfall=0.1 / SECONDS, temperature=-5.0), surface="snow")
+    loads = two_steps()
+    loads.contacts.touching[: 100 * steps_per_frame(RATE)] = False
+    (only,) = prints(weather, loads=loads)
+    level = weathering_of(weather, LAYER).level(SECOND[1])
+    compression, rim = cells([only])
+    below = compression + level * (compression < -level / 2)
+    wanted = level + gaussian(rim - below, blur)
+    assert np.abs(seen([only], weather, SECOND[1], felt=True, blur=blur) - wanted).max() < 1e-6
+
+
+@pytest.mark.parametrize("surface", ["snow", "sand", "soil"])
+@pytest.mark.parametrize(
+    "rates",
+    [
+        {"snowfall": 0.05 / SECONDS, "temperature": -5.0},
+        {"temperature": 4.0, "time_scale": 30_000.0},
+        {"wind": 8.0, "time_scale": 300.0},
+        {"rain": 0.03 / SECONDS},
+        {"snowfall": 2e-5, "temperature": -3.0, "wind": 8.0, "rain": 2e-6, "time_scale": 300.0},
+    ],
+)
+def test_a_step_that_hardly_presses_leaves_what_was_seen_before_it(surface, rates):
+    """What the bake takes in of the weather is what is shown of it: nothing twice, nothing lost."""
+    weather = replace(between(**rates), surface=surface)
+    first, second = prints(weather, second=1e-6)
+    before = seen([first], weather, SECOND[0], felt=True, blur=0.0)
+    after = seen([first, second], weather, SECOND[1], felt=True, blur=0.0)
+    inner = (slice(32, 48),) * 2
+    if surface == "snow" or "snowfall" not in rates:
+        assert after[inner] == pytest.approx(before[inner], abs=1e-7)
+    else:
+        assert (after[inner] < before[inner] - 0.01).all()  # trodden down to the ground
+    plain = seen([first], weather, SECOND[0], felt=False, blur=0.0)
+    assert before[inner] == pytest.approx(plain[inner], abs=1e-9)
+
+
+ALL_AT_ONCE = {"snowfall": 0.03 / SECONDS, "temperature": 1.0, "wind": 8.0, "rain": 0.01 / SECONDS}
+SURFACES = ["snow", "sand", "soil"]
+
+
+def ground_in(weather):
+    return SoftGround(FlatTerrain(), MATERIAL, weathering=weathering_of(weather, LAYER))
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize(
+    ("edit", "as_if"),
+    [
+        (StepEdit(strength=0.5), {"first": 0.5}),
+        (StepEdit(mute=True), {"first": 0.0}),
+        (StepEdit(shift_frames=40), {"later": 40}),
+    ],
+)
+def test_an_edited_step_changes_the_later_one_as_if_it_had_been_so(surface, edit, as_if):
+    # But for the wind: how fast it fills prints is always what those of the bake say.
+    weather = replace(between(**(ALL_AT_ONCE | {"wind": 0.0})), surface=surface)
+    left = BakeRecord(tuple(prints(weather, second=0.4)), {})
+    after = with_edits(left, {step_id(left.footprints[0]): edit}, ground_in(weather), CELL)
+    assert sorted(after.pressed_again) == [0, 1]
+    whole = prints(weather, loads=two_steps(second=0.4, **as_if))
+    assert np.abs(cells(after.edited) - cells(whole)).max() < 6e-5
+    assert np.abs(cells(left.footprints) - cells(whole)).max() > 1e-3
+
+
+def test_edits_one_after_the_other_end_where_all_at_once_do():
+    weather = replace(between(**ALL_AT_ONCE), surface="snow")
+    left = BakeRecord(tuple(prints(weather, second=0.4)), {})
+    first, second = map(step_id, left.footprints)
+    wanted = {first: StepEdit(strength=0.8), second: StepEdit(turn_deg=30.0)}
+    steps = EditedSteps(left.footprints, ground_in(weather), CELL)
+    now = left
+    for edits in ({second: StepEdit(mute=True)}, {first: StepEdit(shift_frames=9)}, {}, wanted):
+        now = steps.left_with(now, edits)
+    assert record.dump(now) == record.dump(with_edits(left, wanted, ground_in(weather), CELL))
+    assert not steps.left_with(now, {}).pressed_again

@@ -16,7 +16,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.record.typical_depth import typical_of
 from .. import settings
-from ..ground import ground_mesh, still_ground
+from ..ground import ground_mesh, still_ground, weather
 from ..jobs import STAGES
 from ..reading import staleness
 from ..response import response_job
@@ -105,7 +105,7 @@ def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
 
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
-    return staleness.reasons(scene, settings.snapshot(scene))
+    return staleness.reasons(scene, weather.felt(settings.snapshot(scene)))
 
 
 def force_table(

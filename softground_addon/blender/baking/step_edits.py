@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.felt_weather import felt_in
 from ...core.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
@@ -113,6 +114,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             gravity_m_s2=units["gravity_m_s2"],
             unit_scale_m=units["unit_scale_m"],
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs.get("shoe_treads", ())),
+            weather=felt_in(inputs),
         )
     except (KeyError, TypeError, ValueError):
         raise InputError(

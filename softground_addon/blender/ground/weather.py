@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.weather import matter_of
+from ...core.after.felt_weather import felt_in, weathering_of
+from ...core.after.weather import matter_of, span_of
 from ...core.after.weather_places import NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
-from .. import compat
+from ...core.settings import BakeSettings
+from .. import compat, settings
 from . import baked_ground, ground_mesh, own_data, weather_keys, weather_modifier
 from . import playback_nodes as played
 from . import weather_nodes as nodes
@@ -95,6 +98,16 @@ def _check_names(display_mesh: bpy.types.Object) -> None:
         raise InputError(f"'{display_mesh.name}' has an attribute '{taken[0]}' of yours: rename it, weather needs it.")
 
 
+def felt(wanted: BakeSettings) -> BakeSettings:
+    """Settings with the weather that is on their ground, where steps feel it."""
+    ground = settings.find(wanted.ground) if wanted.weather and wanted.ground else None
+    modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground)) if ground else None
+    if wanted.weather is None or modifier is None or modifier.node_group is None:
+        return wanted
+    first, last = (frame * wanted.time_stretch for frame in wanted.frames)
+    return replace(wanted, weather=replace(wanted.weather, **weather_keys.rates(modifier, span_of(first, last))))
+
+
 def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) -> None:
     """Write what the group reads, and fill it."""
     footprints, about = baked_ground.load(ground)
@@ -114,15 +127,20 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     if matter.soaking is None:  # no water stands there
         own_data.remove(mesh, nodes.OF_HOLLOWS)
     since = places.times[:, 1]
-    span = weather_keys.span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
+    span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
     nodes.build(tree, matter=matter, up=up.tolist(), span=span, soaking=soaking_shares(places))
     tree[weather_keys.LAST] = span.last
 
 
-def of_bake(inputs: Mapping[str, Any]) -> dict[str, float]:
+def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """What `weather_places` takes of a bake's inputs."""
     material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
-    return {"cell_size": float(inputs["cell_size_m"]), "time_stretch": float(inputs["time_stretch"]), **material}
+    return {
+        "cell_size": float(inputs["cell_size_m"]),
+        "time_stretch": float(inputs["time_stretch"]),
+        "weathering": weathering_of(felt_in(inputs), material["layer_depth"]),
+        **material,
+    }
 
 
 def _places(
@@ -130,7 +148,7 @@ def _places(
     footprints: list[Footprint],
     up: Array,
     unit_scale: float,
-    known: Mapping[str, float],
+    known: Mapping[str, Any],
 ) -> WeatherPlaces:
     """What weather needs to know of the vertices."""
     mesh = ground_mesh.mesh_of(display_mesh)

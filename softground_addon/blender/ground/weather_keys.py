@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,18 +9,31 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.weather import PARTS, Span
+from ...core.after.weather import PARTS, Span, span_of
 from .. import compat
+from ..settings import typed
 from . import weather_modifier
-from .weather_course_nodes import FIRST, KEYED, STEP, SUMMED, keys_of, switch_of
+from .weather_course_nodes import (
+    CENTIMETRES_AN_HOUR,
+    FIRST,
+    KEYED,
+    MILLIMETRES_AN_HOUR,
+    STEP,
+    SUMMED,
+    keys_of,
+    switch_of,
+)
 
+ON_PRINTS = {
+    "Snowfall": CENTIMETRES_AN_HOUR,
+    "Temperature": 1.0,
+    "Wind": 1.0,
+    "Rain": MILLIMETRES_AN_HOUR,
+    "Time Scale": 1.0,
+}
+"""The inputs of which prints are others, and their units."""
 LAST = "softground_weather_last"
 """Custom property of the group: the frame up to which it tells moments apart, keys or none."""
-
-
-def span_of(first: float, last: float, frame_rate: float = 1.0) -> Span:
-    """A span of parts of whole frames."""
-    return Span(first, first + PARTS * max(math.ceil((last - first) / PARTS), 1), frame_rate)
 
 
 def follow(display_mesh: bpy.types.Object) -> None:
@@ -44,6 +56,17 @@ def follow(display_mesh: bpy.types.Object) -> None:
             changed |= _write(nodes[keys_of(name)].mapping, _means(curve, span))
     if changed:
         tree.update_tag()
+
+
+def rates(modifier: Any, span: Span) -> dict[str, Any]:
+    """What acts on prints, as `core.after.weather_course.Weather` has it: numbers, or means over each part if keyed."""
+    keyed, values = _keyed(modifier), dict(compat.node_inputs(modifier))
+    found = {}
+    for name, key in weather_modifier.inputs_of(modifier).items():
+        if name in ON_PRINTS:
+            means = _means(keyed[name], span) if name in keyed else np.float64(typed(values[key]))
+            found[name.lower().replace(" ", "_")] = (means.astype(np.float64) * ON_PRINTS[name]).tolist()
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
 
 
 def _keyed(modifier: Any) -> Mapping[str, bpy.types.FCurve]:

@@ -141,14 +141,16 @@ def build(
     begun = 1.0 - pressed.above(course.frame)
     inside = graph.number(graph.dot(trodden, graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0)))).within_one() * begun
 
+    lower = inside * aged["kept"] if matter.blown else inside  # what is blown full lies as high as open ground
+
     graph.next_row()
-    cover = (course.around["cover"] + (aged["cover"] - course.around["cover"]) * inside).where(snow)
+    cover = (course.around["cover"] + (aged["cover"] - course.around["cover"]) * lower).where(snow)
     height = (soft - relief).where(snow, warmth, wind, rain) + cover
     if matter.snow_depth:
         left = (soft + matter.snow_depth).at_least(0.0)
         ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
         around, within = course.around["thawed"].at_most(left), (aged["thawed"] * ratio * ratio).at_most(left)
-        height = (height - around - (within - around) * inside).where(warmth, otherwise=height)
+        height = (height - around - (within - around) * lower).where(warmth, otherwise=height)
     wetness = course.around["wet"]
     if matter.wet:
         wetness = (wetness + (aged["wet"] - wetness) * inside).where(drying, otherwise=1.0)

@@ -41,9 +41,12 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         for name, identifier in weather_modifier.inputs_of(modifier).items():
             holder, path = compat.input_field(modifier, identifier)
             column.prop(holder, path, text=name)
-        note = layout.column()
-        note.active = False
-        note.label(text="Steps do not feel the weather", icon="INFO")
+        options = settings.scene_of(context).softground
+        layout.prop(options, "steps_feel_weather")
+        if not options.steps_feel_weather:
+            note = layout.column()
+            note.active = False
+            note.label(text="Steps do not feel the weather", icon="INFO")
 
 
 CLASSES = (SOFTGROUND_MT_weather, SOFTGROUND_PT_weather)

@@ -245,6 +245,7 @@ class LiveMode:
             shape_keys=now.shape_keys,
             dense_shape_keys=now.dense_shape_keys,
             tread_m=now.tread_m,
+            weather=None,  # which live mode does not follow
         )
         with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
             made_with = with_shoe_treads(made_with, self._analysis.shot.motions)

@@ -246,6 +246,13 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         "is missing from the rims",
         default=False,
     )
+    steps_feel_weather: BoolProperty(
+        name="Steps Feel Weather",
+        description="Bake with the weather that is on the ground: a step into an earlier print presses what snow, "
+        "rain, wind and warmth have left of it, and feet stand on new snow. The bake then "
+        "depends on the weather's sliders and their keys. If off, weather only covers what is baked",
+        default=False,
+    )
     keep_forces: BoolProperty(
         name="Forces in Report",
         description="Write the force under each sole at each frame into the report",

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.felt_weather import weathering_of
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
@@ -26,7 +27,7 @@ from ..characters.import_fixes import size_of
 from ..characters.prop_extraction import check_props
 from ..characters.rig_mapping import RigMapping
 from ..characters.rig_sampling import sample_character, sample_prop
-from ..ground import ground_checks, ground_mesh, painted_ground
+from ..ground import ground_checks, ground_mesh, painted_ground, weather
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
 from ..response.character_keys import ReadRig, controls_of
@@ -85,7 +86,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
                 f"'{character.name}' from the characters."
             )
     tread_images.forget()
-    wanted = settings.snapshot(scene, grounded=grounded)
+    wanted = weather.felt(settings.snapshot(scene, grounded=grounded))
     if wanted.tread_pattern == IMAGE and wanted.relief_look and wanted.tread_m > 0:
         tread_images.check(scene.softground.tread_image)
     if not wanted.characters:
@@ -130,7 +131,8 @@ def read_shot(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[Shot]:
 
 def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     """The ground of a shot, with the material and the spread of pressure that are wanted."""
-    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation)
+    weathering = weathering_of(wanted.weather, wanted.material.layer_depth)
+    return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation, weathering)
 
 
 def estimate_shot(

@@ -7,14 +7,16 @@ down to the ground.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.display_blur import CUT_OFF, blurred_window
-from ..ground.heightfield import HeightField, Window
-from .weather import Span, matter_of
+from ..ground.heightfield import HeightField, SparseGrid, Window
+from .weather import PARTS, Span, matter_of
 from .weather_course import Course, Weather, course_of
 from .weather_places import SIGMAS, shares
 
@@ -23,15 +25,42 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FeltWeather(Weather):
-    """Weather that a bake depends on: its rates, and on what ground.
+    """Weather that a bake depends on: its rates over time, and on what ground.
 
     Attributes
     ----------
     surface : str
         See `core.ground.presets.SURFACES`.
+    first, last : float
+        The scene frames that it is known in parts of.
+    frame_rate : float
+        Scene frames per second [Hz].
     """
 
     surface: str = ""
+    first: float = 0.0
+    last: float = float(PARTS)
+    frame_rate: float = 24.0
+
+
+def felt_in(inputs: Mapping[str, Any]) -> FeltWeather | None:
+    """The weather that a bake felt, from the inputs that its record has; None if it felt none.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If they are damaged.
+    """
+    known = inputs.get("weather")
+    if known is None:
+        return None
+    values: Any = {name: tuple(map(float, one)) if isinstance(one, list) else one for name, one in known.items()}
+    return FeltWeather(**values)
+
+
+def weathering_of(weather: FeltWeather | None, layer_depth: float) -> PrintsInWeather | None:
+    """What weather leaves of prints; None where steps feel none."""
+    return PrintsInWeather(weather, layer_depth) if weather else None
 
 
 class PrintsInWeather:
@@ -40,8 +69,6 @@ class PrintsInWeather:
     Parameters
     ----------
     weather : FeltWeather
-    span : Span
-        In scene frames.
     layer_depth : float
         Of the loose layer [m].
 
@@ -49,13 +76,13 @@ class PrintsInWeather:
     --------
     Ten hours at 3 cm of new snow an hour, which settles:
 
-    >>> snowfall = FeltWeather(snowfall=3e-2 / 3600, temperature=-5.0, time_scale=3600.0, surface="snow")
-    >>> round(PrintsInWeather(snowfall, Span(0, 240, 24.0), 0.5).level(240), 3)
+    >>> snowfall = FeltWeather(snowfall=3e-2 / 3600, temperature=-5.0, time_scale=3600.0, surface="snow", last=256)
+    >>> round(PrintsInWeather(snowfall, 0.5).level(240), 3)
     0.289
     """
 
-    def __init__(self, weather: FeltWeather, span: Span, layer_depth: float) -> None:
-        self._weather, self._span = weather, span
+    def __init__(self, weather: FeltWeather, layer_depth: float) -> None:
+        self._weather, self._span = weather, Span(weather.first, weather.last, weather.frame_rate)
         self._matter = matter_of(weather.surface, layer_depth, 0.0)
         self._levels: dict[float, float] = {}
 
@@ -79,32 +106,39 @@ class PrintsInWeather:
         window: Window,
         *,
         since: Array,
-        trodden: NDArray[np.bool_],
+        trodden: SparseGrid,
         frame: float,
         section: float | None,
     ) -> Array:
         """Compression and rim of cells, as weather has left them by a frame; see `ground.soft_ground.Weathering`."""
         course = self._course(frame, section)
-        share = shares(course.since(since, course.variance))
-        left = before = ground.read(window)
-        compression = before[0]
-        for sigma, part in zip(SIGMAS, np.moveaxis(share, -1, 0), strict=True):
-            if not part.any():
-                break
-            wider = blurred_window(ground, window, sigma)
-            left, before = left + part * (wider - before), wider
-        left = left * course.since(since, course.kept)
+        share = np.moveaxis(shares(course.since(since, course.variance)), -1, 0)
+        kept = course.since(since, course.kept)
+        left = _rounded(ground, window, SIGMAS, share) * kept
         layer = self._matter.snow_depth
         if layer:
-            frames, which = np.unique(since[trodden], return_inverse=True)
-            stepped_on = np.zeros_like(since)
-            stepped_on[trodden] = np.array([self.level(one) for one in frames.tolist()])[which]
-            ratio = np.maximum(1.0 - (compression + stepped_on) / layer, 0.0)
+            compression, contact = ground.read(window)[0], trodden.read(window)[0]
+            frames, which = np.unique(since, return_inverse=True)
+            stepped_on = np.array([self.level(one) for one in frames.tolist()])[which].reshape(since.shape)
+            ratio = np.maximum(1.0 - (compression + contact * stepped_on) / layer, 0.0)
             deep = np.maximum(layer + left[1] - left[0], 0.0)
             thawed = np.minimum(course.since(since, course.thawed) * ratio**2, deep)
-            left[0] -= trodden * (course.since(since, course.cover) - thawed)
+            lower = self.level(frame) - (course.since(since, course.cover) - thawed)
+            inside = _rounded(trodden, window, SIGMAS[1:], share[1:])[0]
+            left[0] += kept * inside * lower - contact * self.level(frame)
         return left
 
     def _course(self, frame: float, section: float | None) -> Course:
         matter = replace(self._matter, section=section) if section else replace(self._matter, blown=None)
         return course_of(self._weather, matter, frame=frame, span=self._span)
+
+
+def _rounded(grid: SparseGrid, window: Window, sigmas: Sequence[float], share: Array) -> Array:
+    """Values of a window that have gone so far to each of the blurs, (K, rows, columns) 0 to 1."""
+    left = before = grid.read(window)
+    for sigma, part in zip(sigmas, share, strict=True):
+        if not part.any():
+            break
+        wider = blurred_window(grid, window, sigma)
+        left, before = left + part * (wider - before), wider
+    return left

@@ -25,6 +25,7 @@ doi:10.1029/WR008i005p01204: drying in two stages.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,6 +83,11 @@ class Span:
     def step(self) -> float:
         """Length of a part in frames."""
         return (self.last - self.first) / PARTS
+
+
+def span_of(first: float, last: float, frame_rate: float = 1.0) -> Span:
+    """A span of parts of whole frames."""
+    return Span(first, first + PARTS * max(math.ceil((last - first) / PARTS), 1), frame_rate)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .heightfield import HeightField, Terrain, Window
+from .heightfield import HeightField, SparseGrid, Terrain, Window
 from .material import GroundMaterial, Pressure
 from .variation import Variation
 
@@ -33,7 +33,7 @@ class Weathering(Protocol):
         window: Window,
         *,
         since: Array,
-        trodden: NDArray[np.bool_],
+        trodden: SparseGrid,
         frame: float,
         section: float | None,
     ) -> Array:
@@ -46,8 +46,8 @@ class Weathering(Protocol):
         window : Window
         since : (rows, columns) float array
             Frame at which each cell changed last.
-        trodden : (rows, columns) bool array
-            Cells that were ever in contact.
+        trodden : SparseGrid
+            1 in cells that were ever in contact, else 0.
         frame : float
         section : float or None
             Volume of a print over its width [m²], None where it is not known yet.

@@ -179,7 +179,7 @@ class GroundSolver:
     ) -> None:
         recorder.add(frame, window, change, touched)
         if self.weathered:
-            self.weathered.note(window, change.any(axis=0), touched, frame)
+            self.weathered.note(window, np.where(change.any(axis=0) | touched, frame, -np.inf), touched)
 
     def _compacted_before(self, contact: OpenContact, window: Window, state: Array) -> Array:
         """Compression of a window that a contact met when it began: all but its own (rows, columns) [m]."""

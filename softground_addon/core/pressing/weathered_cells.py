@@ -33,8 +33,10 @@ class WeatheredCells:
 
     def __init__(self, weathering: Weathering, layer_depth: float, cell_size: float) -> None:
         self._weathering, self._layer_depth = weathering, layer_depth
-        self._last = SparseGrid(cell_size, channels=2, fill=-np.inf)
-        """Scene frame at which each cell changed last; 0 where it was ever in contact."""
+        self._last = SparseGrid(cell_size, channels=1, fill=-np.inf)
+        """Scene frame at which each cell changed last."""
+        self._trodden = SparseGrid(cell_size, channels=1)
+        """1 where it was ever in contact."""
         self._sections: list[tuple[float, float]] = []
 
     def ended(self, frame: float, compressed: float, area: float) -> None:
@@ -42,16 +44,14 @@ class WeatheredCells:
         if area > 0:
             self._sections.append((frame, compressed / np.sqrt(area)))
 
-    def note(self, window: Window, changed: Mask, touched: Mask, frame: float) -> None:
-        """Cells of a window (rows, columns) changed or were in contact at a scene frame."""
-        values = self._last.read(window)
-        values[0][changed | touched] = frame
-        values[1][touched] = 0.0
-        self._last.write(window, values)
+    def note(self, window: Window, changed: Array, touched: Mask) -> None:
+        """Cells of a window (rows, columns) changed at scene frames, -inf where none did, and some were in contact."""
+        self._last.write(window, np.maximum(self._last.read(window), changed))
+        self._trodden.write(window, np.maximum(self._trodden.read(window), touched))
 
     def trodden(self, window: Window) -> Mask:
         """Cells of a window that were ever in contact, (rows, columns)."""
-        return self._last.read(window)[1] == 0.0
+        return self._trodden.read(window)[0] > 0
 
     def level(self, frame: float) -> float:
         """Height of open ground [m]."""
@@ -74,8 +74,7 @@ class WeatheredCells:
         """
         window, pressing = imprints.window, imprints.pressing
         pressed = imprints.contact[pressing].any(axis=0)
-        last, was_trodden = self._last.read(window)
-        trodden = was_trodden == 0.0
+        last = self._last.read(window)[0]
         # What changes all along has no age.
         stale = (pressed | (imprints.rim[pressing] > 0).any(axis=0)) & (last > -np.inf)
         stale &= last < frame - 1.5 * frame_step
@@ -83,12 +82,12 @@ class WeatheredCells:
         if stale.any():
             section = self._section(frame - frame_step)
             aged = self._weathering.aged(
-                ground, window, since=np.where(stale, last, frame), trodden=trodden, frame=frame, section=section
+                ground, window, since=np.where(stale, last, frame), trodden=self._trodden, frame=frame, section=section
             )
             state = np.where(stale, aged, state)
-        new = pressed & ~trodden
+        new = pressed & ~self.trodden(window)
         state[0] -= new * self.level(frame)
-        self.note(window, new, new, frame)
+        self.note(window, np.where(new, frame, -np.inf), new)
         return state
 
     def _section(self, frame: float) -> float | None:

@@ -60,7 +60,8 @@ def weathered(
 
     inside = places.trodden[:, 0] + (places.trodden[:, 1:] * share[:, 1:]).sum(axis=-1)
     inside = np.where(frame >= pressed, np.clip(inside, 0.0, 1.0), 0.0)
-    cover = course.cover[0] + inside * (course.since(since, course.cover) - course.cover[0])
+    lower = inside * kept  # what is blown full lies as high as open ground
+    cover = course.cover[0] + lower * (course.since(since, course.cover) - course.cover[0])
     change = soft - relief + cover
     if matter.snow_depth:
         # Trodden snow melts the less the denser it is, as fewer of its grains are open to the air, and stands up in
@@ -69,7 +70,7 @@ def weathered(
         left = np.maximum(matter.snow_depth + soft, 0.0)
         around = np.minimum(course.thawed[0], left)
         within = np.minimum(course.since(since, course.thawed) * ratio**2, left)
-        change = change - around - inside * (within - around)
+        change = change - around - lower * (within - around)
 
     water = _standing(places, change, weather, matter, course)
     looks = course.wet[0] + inside * (course.since(since, course.wet) - course.wet[0])
