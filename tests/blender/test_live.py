@@ -162,6 +162,28 @@ def test_kept_prints_show_the_tread_as_baked_ones_do(live_shot):
     assert marks.reshape(-1, 3)[:, 2].max() == pytest.approx(0.003, rel=1e-6)
 
 
+def test_weather_acts_on_kept_prints_as_on_baked_ones_and_waits_for_them(live_shot):
+    live_shot.frame_set(live_shot.softground.frame_end)
+    with pytest.raises(RuntimeError, match="press Keep, then add weather"):
+        bpy.ops.softground.add_weather(preset="SNOWFALL")
+    live_shot.softground.steps_feel_weather = True
+    bpy.ops.softground.live(keep=True)
+    assert baked_ground.load(live_shot.softground.ground)[1]["inputs"]["weather"] is None
+    live_shot.softground.steps_feel_weather = False
+    shown = {}
+    for again in (False, True):
+        if again:
+            bpy.ops.softground.clear_bake()
+            bpy.ops.softground.bake()
+        bpy.ops.softground.add_weather(preset="SNOWFALL")
+        for frame in (20, 48, 200):
+            live_shot.frame_set(frame)
+            shown[again, frame] = heights(live_shot)
+    assert np.ptp(shown[True, 48]) > 0.03
+    for frame in (20, 48, 200):
+        assert np.array_equal(shown[False, frame], shown[True, frame])
+
+
 def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     live_shot.frame_set(live_shot.softground.frame_end)
     bpy.ops.softground.live(keep=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
-from .. import settings
+from ...core.errors import InputError
+from .. import session, settings
 from ..ground import baked_ground, ground_checks, weather, weather_modifier
 from ..operator_base import OnBake, reports_errors
 
@@ -28,6 +29,8 @@ class SOFTGROUND_OT_add_weather(OnBake, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if session.current().is_live:
+            raise InputError("Live mode is on, and weather acts on prints that stay: press Keep, then add weather.")
         ground = settings.scene_of(context).softground.ground
         display_mesh = baked_ground.display_mesh_of(ground)
         ground_checks.check_playable(display_mesh)
