@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes heroes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
+.PHONY: ready blenders demo scenes assets heroes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -30,6 +30,10 @@ demo: $(READY)
 # The scenes of docs/figures.md and the smaller of docs/gallery.md with their pictures, from nothing, into build/scenes.
 scenes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all
+
+# An asset library of what the add-on and its scenes make: materials, debris, weather, characters; in build/assets.
+assets: $(READY)
+	$(BIN)/python -m sample_scenes.asset_library
 
 # The large pictures of docs/gallery.md.
 heroes: $(READY)
