@@ -32,7 +32,7 @@ def twins(points: Array, part: Indices, count: int) -> Indices:
         Number of parts.
     """
     best = own = np.arange(count)
-    mirrored = 0
+    mirrored = 0.0
     size = np.bincount(part, minlength=count)
     middle = np.stack([np.bincount(part, along, count) for along in points.T], axis=-1) / np.maximum(size, 1)[:, None]
     most = np.maximum.outer(size, size)
@@ -46,7 +46,7 @@ def twins(points: Array, part: Indices, count: int) -> Indices:
         gap = np.linalg.norm((middle - 2 * np.outer(off, across))[:, None] - middle, axis=-1)
         gap[unlike] = np.inf
         twin = gap.argmin(axis=1)
-        fits = (gap.min(axis=1) < near) & (twin[twin] == own)  # what lies in the mirror is its own image
-        if size[fits].sum() > mirrored:
-            best, mirrored = np.where(fits, twin, own), size[fits].sum()
+        fit = np.clip(1 - gap.min(axis=1) / near, 0.0, None) * (twin[twin] == own)  # in the mirror lies its own image
+        if fit @ size > mirrored:
+            best, mirrored = np.where(fit > 0, twin, own), fit @ size
     return best
