@@ -19,6 +19,9 @@ SLIP_SHARES = 0.15, 0.4
 """... between these shares of the part's fast slip, ..."""
 LEAST_SLIP = 0.15
 """... and never less than this, in H/s."""
+STILL = 0.08
+"""What lies calm and low and still for longer stands, though the ground moves at other times: a jump on the spot begins
+and ends standing [s]."""
 BLIP = 0.05
 """What bears no longer than this does not bear [s]; of shots of at most `FEW` samples it is all that is known."""
 FEW = 4
@@ -52,8 +55,11 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     near = height < TOUCH
     touches = near & (speed < tracks.calm) & (slip < limit)
     touches |= near & (speed < HARD_RISE * tracks.calm) & (slip < np.maximum(HARD_SLIP * fast, LEAST_SLIP))
+    still = near & (speed < tracks.calm) & (tracks.slip(np.zeros(2)) < LEAST_SLIP)
+    still = _lasting(still, round(STILL * tracks.rate))
+    touches |= still
     leaves = (height > LEAVE) | (speed > np.maximum(LEAVE_RISE, HARD_RISE * touches) * tracks.calm)
-    leaves |= slip > LEAVE_SLIP * limit
+    leaves |= (slip > LEAVE_SLIP * limit) & ~still
     bears = hysteresis(touches, leaves)
     bears |= hysteresis(touches[::-1], leaves[::-1])[::-1]  # a landing is as soft as a lift-off
     # The only calm skin on the ground bears, even where it slides.
@@ -61,6 +67,15 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     bears |= sliding & ~bears.any(axis=1, keepdims=True)
     bears = _dragged(bears, (np.abs(height) < DRAGS) & (speed < tracks.calm))
     return _landed(_without_blips(bears, round(BLIP * tracks.rate)), height) if len(bears) > FEW else bears
+
+
+def _lasting(state: Mask, longest: int) -> Mask:
+    """Without the runs of at most `longest` samples."""
+    lasting = state.copy()
+    for part in np.flatnonzero(state.any(axis=0)):
+        for first, last in zip(*runs(state[:, part]), strict=True):
+            lasting[first:last, part] = last - first > longest
+    return lasting
 
 
 def _without_blips(bears: Mask, longest: int) -> Mask:

@@ -222,6 +222,21 @@ def test_the_ground_moves_as_feet_do_that_stand_on_it_not_as_those_of_a_flight(b
     assert drift_of(PartTracks(low[:, None], ways[0], still, ways, 0.3, 24.0)).tolist() == pytest.approx([2.0, 0.0])
 
 
+@pytest.mark.parametrize("seconds", [0.04, 0.2])
+def test_what_stands_still_bears_though_the_ground_moves_at_other_times(seconds: float) -> None:
+    time = np.arange(72) / 48
+    stands, walks = time < seconds, (time > 0.5) & (time < 1.2)
+    low = np.stack([np.where(stands | walks, 0.0, 0.1), np.where(walks, 0.1, 0.0)], axis=-1)
+    ways = np.zeros((2, 72, 2, 2))
+    ways[..., 0] = np.where(low > 0, -2.0, 2.0)  # the other foot walks while this one does not
+    ways[:, stands, 0, 0] = 0.0
+    tracks = PartTracks(low, ways[0], np.where(low > 0, 1.0, 0.0), ways, 0.3, 48.0)
+    bears = bearing(tracks, 0.0, np.array([2.0, 0.0]))[:, 0]
+    assert bears[walks].all()
+    assert bears[stands].all() == (seconds > 0.1)
+    assert not bears[~stands & ~walks].any()
+
+
 def test_a_toe_that_dips_through_the_ground_in_swing_leaves_the_ground_where_it_is() -> None:
     skin, stands = animal(2, duty=0.6, stride=0.6)
     positions = skin.positions.copy()
