@@ -107,7 +107,7 @@ def test_the_gait_of_an_animal_is_found_in_its_skin(
 
 @given(
     legs=st.integers(2, 8),
-    duty=st.floats(0.5, 0.7),
+    duty=st.floats(0.3, 0.7),
     on_the_spot=st.booleans(),
     every=st.sampled_from([1, 2]),
     first=st.integers(0, 40),
