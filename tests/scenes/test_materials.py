@@ -48,6 +48,41 @@ def test_textures_are_laid_out_in_the_world(ensure_material, surface):
         assert any(node.type == "NEW_GEOMETRY" for node in upstream(texture.inputs["Vector"]))
 
 
+@pytest.mark.parametrize("surface", SURFACES)
+def test_open_ground_has_three_octaves_apart_and_none_of_them_repeats(ensure_material, surface):
+    nodes = ensure_material(surface).node_tree.nodes
+    assert not {node.type for node in nodes} & {"TEX_IMAGE", "TEX_WAVE", "TEX_CHECKER", "TEX_BRICK"}
+    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    textures = [node for node in upstream(output.inputs["Displacement"]) if node.type in ("TEX_NOISE", "TEX_VORONOI")]
+    sizes = [1.0 / node.inputs["Scale"].default_value for node in textures]
+    assert min(sizes) < 0.01  # seen at 0.3 m
+    assert any(0.01 < size < 0.2 for size in sizes)  # at 2 m
+    assert max(sizes) > 2.0  # at 20 m
+
+
+def test_only_dry_sand_has_ripples_and_prints_bury_them(ensure_material):
+    for surface in SURFACES:
+        nodes = ensure_material(surface).node_tree.nodes
+        winds = [node for node in nodes if node.type == "VECT_MATH" and node.operation == "DOT_PRODUCT"]
+        assert bool(winds) == (surface == "sand")
+
+
+@pytest.mark.slow
+def test_ripples_end_where_a_foot_was(spot, ensure_material):
+    """Two pictures of the same pressed ground under other winds differ on open ground alone."""
+    ground, seen = spot
+    material = ensure_material("sand")
+    ground.data.materials.append(material)
+    before = seen()
+    wind = next(
+        node for node in material.node_tree.nodes if node.type == "VECT_MATH" and node.operation == "DOT_PRODUCT"
+    )
+    wind.inputs[1].default_value = (0.0, 1.0, 0.0)
+    change = np.abs(seen() - before).mean(axis=(0, 2))
+    assert change[:14].mean() > 0.004
+    assert change[-10:].mean() < 0.25 * change[:14].mean()
+
+
 def test_a_surface_has_one_material_however_often_it_is_asked_for(ensure_material):
     first = ensure_material("snow")
     first.node_tree.nodes.clear()  # the user is free to change it

@@ -33,6 +33,12 @@ EDGE = "ground_edge"
 BLEND = "surface_blend"
 """Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
+WIDE = 5.0
+"""Size of the largest shades and swells of open ground [m]; seven octaves are in them."""
+
+RIPPLE, RIPPLE_HEIGHT, LEE = 0.085, 0.0055, 0.68
+"""From crest to crest of wind ripples, their height [m], and the part of a wave that faces the wind."""
+
 Colour = tuple[float, float, float]
 
 
@@ -234,7 +240,7 @@ def ensure_over(theirs: bpy.types.Material, surface: str) -> bpy.types.Material:
     output: Any = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
     graph = Graph(tree)
     ground = _ground(graph)
-    shader, height = _shaded(graph, _look(graph, surface, ground))
+    shader, height = _shaded(graph, _look(graph, surface, ground, is_open=False))
     share = graph.math("MAXIMUM", graph.math("MAXIMUM", ground.pressed, ground.risen), graph.attribute(FRESH))
     mixed = graph.node("ShaderNodeMixShader", {0: share, 2: shader})
     relief = graph.node("ShaderNodeDisplacement", {"Height": height * share, "Midlevel": 0.0, "Scale": 1.0})
@@ -277,11 +283,19 @@ def _material(
     return material
 
 
-def _look(graph: Graph, surface: str, ground: Ground) -> Look:
-    """What a surface hands to the shader, with what weather has made of it."""
+def _look(graph: Graph, surface: str, ground: Ground, *, is_open: bool = True) -> Look:
+    """What a surface hands to the shader, with what weather has made of it; open ground has shades and swells."""
     look = _looks(surface)[0](graph, ground)
-    inputs, relief = under_weather(graph, surface, look.inputs, look.relief)
-    return Look(relief, inputs)
+    if not is_open:
+        inputs, relief = under_weather(graph, surface, look.inputs, look.relief)
+        return Look(relief, inputs)
+    wide = graph.noise(ground.place, WIDE, 7.0, 0.65)
+    dark, light, uneven = _WIDE[surface]
+    shade = graph.ramp(wide, 0.30, 0.70, dark, light)
+    colour = graph.node("ShaderNodeVectorMath", {0: look.inputs["Base Color"], "Scale": shade}, operation="SCALE")
+    shaded = {**look.inputs, "Base Color": graph.out(colour)}
+    inputs, relief = under_weather(graph, surface, shaded, look.relief)
+    return Look(relief + (wide + -0.5) * uneven, inputs)
 
 
 def _ground(graph: Graph) -> Ground:
@@ -354,9 +368,21 @@ def _grains(graph: Graph, ground: Ground) -> tuple[Socket, Socket]:
     return relief + loose * 0.0040 + ground.tread * 0.5, tint
 
 
+def _ripples(graph: Graph, ground: Ground) -> Socket:
+    """Wind ripples [m] with a steep side in the lee, in patches, until a foot or its rim buries them."""
+    wind = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: (0.90, 0.44, 0.0)}, operation="DOT_PRODUCT")
+    along = graph.out(wind, 1) * (1.0 / RIPPLE) + graph.noise(ground.place, 0.35, 2.0, 0.5) * 3.5
+    phase = graph.math("FRACT", along, 0.0)
+    wave = graph.ramp(phase, 0.0, LEE) * graph.ramp(phase, LEE, 1.0, 1.0, 0.0)
+    there = graph.ramp(graph.noise(ground.place, 2.5, 2.0), 0.38, 0.58, 0.25, 1.0)
+    left = graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", ground.pressed, ground.risen))
+    return wave * there * left * RIPPLE_HEIGHT
+
+
 def _dry_sand(graph: Graph, ground: Ground) -> Look:
     """Fine grains of several colours; nothing shines."""
     relief, tint = _grains(graph, ground)
+    relief = relief + _ripples(graph, ground)
     patches = graph.noise(ground.place, 0.25, 3.0)
     colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))
     colour = graph.mix(graph.ramp(patches, 0.35, 0.75, 0.0, 0.35), colour, (0.60, 0.37, 0.18))
@@ -437,6 +463,15 @@ def _soil(graph: Graph, ground: Ground) -> Look:
     colour = graph.mix(ground.pressed * 0.7, colour, (0.060, 0.036, 0.022))
     return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
 
+
+_WIDE: dict[str, tuple[float, float, float]] = {
+    "snow": (0.92, 1.0, 0.50),
+    "sand": (0.84, 1.10, 0.20),
+    "wet_sand": (0.74, 1.18, 0.14),
+    "mud": (0.70, 1.25, 0.16),
+    "soil": (0.70, 1.25, 0.16),
+}
+"""Brightness of the darkest and the lightest parts of open ground, and the height of its swells [m]."""
 
 _SURFACES: dict[str, tuple[Callable[[Graph, Ground], Look], Colour]] = {
     "snow": (_snow, (0.85, 0.89, 0.95)),
