@@ -119,9 +119,19 @@ def test_a_step_on_untrodden_new_snow_is_that_deep_too():
     (only,) = prints(weather, loads=loads)
     level = float(course(weather, "snow", SECOND[0]).cover[0])
     assert middle([only]) == pytest.approx(DEPTH * (1 + level / LAYER) - level, abs=1e-5)
-    # The volumes are those that the step displaced, and not the snow's.
+    # Depth and volumes are those that the step pressed, and not the snow's.
+    assert only.max_depth_m == pytest.approx(DEPTH * (1 + level / LAYER), rel=1e-3)
+    assert len(only.pressing.frames) == len(only.compression.frames) - 1
     assert only.compressed_m3 == pytest.approx(DEPTH * (1 + level / LAYER) * SIDE**2, rel=0.02)
     assert only.rim_m3 == pytest.approx(2 * 0.1 * only.compressed_m3, rel=1e-9)
+
+
+def test_a_crust_on_new_snow_carries_what_it_carries_while_it_snows():
+    weather = FeltWeather(surface="snow", snowfall=0.1 / SECONDS, temperature=-5.0, first=SPAN.first, last=SPAN.last)
+    pressure = FORCE / SIDE**2
+    for strength in (1.01, 0.99):
+        first, _ = prints(weather, material=replace(MATERIAL, crust_stress=strength * pressure))
+        assert (first.max_depth_m > 0.02) == (strength < 1)
 
 
 def test_a_print_that_rain_rounded_is_pressed_as_the_blur_left_it():

@@ -255,7 +255,7 @@ def _radius(loads: CharacterLoads, phase: Phase, footprint: Footprint) -> float:
 
 def _landing_part(footprint: Footprint, loads: CharacterLoads, phase: Phase) -> float:
     """Share of what a step compacts that it compacts as it lands."""
-    changes = footprint.compression
+    changes = footprint.pressing
     total = np.concatenate([[0.0], np.cumsum(np.asarray(changes.amounts), dtype=np.float64)])
     volumes = np.maximum(np.diff(total[np.asarray(changes.first)]), 0.0)
     until = loads.motion.frames[phase.at] + LANDING_TIME * loads.motion.adult_second

@@ -111,7 +111,7 @@ def steps_of(
     heard = []
     for name, one in footprints.items():
         volumes = _volumes(one)
-        ends = np.asarray(one.compression.frames)
+        ends = np.asarray(one.pressing.frames)
         compacted = np.stack([seconds(ends - one.frame_step), seconds(ends), volumes], axis=1)
         time, force = seconds(one.load_frames), np.asarray(one.load_n, float)
         marks = moment(struck.get(name)), moment(left.get(name))
@@ -175,7 +175,7 @@ def _random(step: SoundStep) -> np.random.Generator:
 
 def _volumes(footprint: Footprint) -> Array:
     """What is newly compacted at each recorded frame [m³]."""
-    changes = footprint.compression
+    changes = footprint.pressing
     total = np.concatenate([[0], np.cumsum(np.asarray(changes.amounts), dtype=np.int64)])
     volumes = np.diff(total[np.asarray(changes.first)]) * (QUANTUM * footprint.cell_size**2)
     return np.asarray(np.maximum(volumes, 0.0))

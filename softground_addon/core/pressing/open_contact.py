@@ -33,6 +33,8 @@ class OpenContact:
         What it compressed itself [m], kept where the ground hardens.
     met : Imprints or None
         Those of which it was last seen what weather had left there.
+    level : float
+        Height of the open ground as it began, over that without weather [m].
     compressed, raised, unplaced : float
         Volumes that it compressed and raised, and that found no place to rise [m³].
     """
@@ -48,6 +50,7 @@ class OpenContact:
         self.recorder: FootprintRecorder | None = None
         self.compression: SparseGrid | None = None
         self.met: Imprints | None = None
+        self.level = 0.0
         self.compressed = self.raised = self.unplaced = 0.0
         self._load = self._area = self._sinkage = 0.0
         self._moment = np.zeros(3)

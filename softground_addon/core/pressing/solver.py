@@ -43,7 +43,7 @@ class GroundSolver:
         self.weathered: WeatheredCells | None = None
         """What weather does between contacts, where steps feel it."""
         if ground.weathering:
-            self.weathered = WeatheredCells(ground.weathering, ground.material.layer_depth, state.cell_size)
+            self.weathered = WeatheredCells(ground.weathering, state.cell_size)
 
     @property
     def material(self) -> GroundMaterial:
@@ -88,7 +88,7 @@ class GroundSolver:
         window, surface = self._around(contact.recorder.window)
         state = self.state.read(window)
         before = quantised(state)
-        lowered = self._lowered(window, frame)
+        lowered = self._lowered(window, contact)
         state[0] += lowered
         state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
         state[0] -= lowered
@@ -106,6 +106,7 @@ class GroundSolver:
         steps = first + np.flatnonzero(imprints.pressing[first:last])
         if not len(steps):
             return []
+        self._meet(contact, imprints, frame, timing)
         material, window, surface = self.material, imprints.window, None
         if material.repose_angle:
             window, surface = self._around(imprints.window)
@@ -113,8 +114,7 @@ class GroundSolver:
         before = quantised(whole)
         inside = window.slices(imprints.window)
         state = whole[:, inside[0], inside[1]]
-        thicker = self._meet(contact, imprints, state, frame, timing)
-        lowered = self._lowered(window, frame)
+        lowered = self._lowered(window, contact)
         whole[0] += lowered
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
@@ -123,7 +123,7 @@ class GroundSolver:
             compression = compress(
                 state[0],
                 imprints.coverage[step],
-                imprints.target[step] * thicker,
+                imprints.target[step] * max(1.0 + contact.level / material.layer_depth, 0.0),
                 imprints.rate[step],
                 holds=False if imprints.holds is None else imprints.holds[step],
                 compacted=compacted,
@@ -161,18 +161,25 @@ class GroundSolver:
         self.contact.append((window, touched))
         return [window] if surface else []
 
-    def _meet(self, contact: OpenContact, imprints: Imprints, state: Array, frame: float, timing: Timing) -> float:
-        """Let a contact find under new imprints what weather has left; how much thicker the layer is."""
-        if not self.weathered:
-            return 1.0
-        if contact.met is not imprints:
-            contact.met = imprints
-            state[:] = self.weathered.met(self.state, imprints, frame, timing.frame_step)
-        return self.weathered.thicker(frame)
+    def _meet(self, contact: OpenContact, imprints: Imprints, frame: float, timing: Timing) -> None:
+        """Let a contact find under new imprints what weather has left by the frame before."""
+        if self.weathered is None or contact.met is imprints:
+            return
+        before = frame - timing.frame_step
+        if contact.met is None:
+            contact.level = self.weathered.level(before)
+        contact.met = imprints
+        found = self.weathered.met(self.state, imprints, contact.level, before, timing.frame_step)
+        change = quantised(found) - quantised(self.state.read(imprints.window))
+        self.state.write(imprints.window, found)
+        if change.any():
+            if contact.recorder is None:
+                contact.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
+            self._record(contact.recorder, before, imprints.window, change, np.zeros(change.shape[1:], bool))
 
-    def _lowered(self, window: Window, frame: float) -> Array | float:
+    def _lowered(self, window: Window, contact: OpenContact) -> Array | float:
         """How much less than its depth below open ground each trodden cell of a window is recorded as [m]."""
-        return self.weathered.trodden(window) * self.weathered.level(frame) if self.weathered else 0.0
+        return self.weathered.trodden(window) * contact.level if self.weathered else 0.0
 
     def _record(
         self, recorder: FootprintRecorder, frame: float, window: Window, change: NDArray[np.int64], touched: Mask

@@ -25,14 +25,12 @@ class WeatheredCells:
     Parameters
     ----------
     weathering : Weathering
-    layer_depth : float
-        Of the loose layer [m].
     cell_size : float
         Side of a cell [m].
     """
 
-    def __init__(self, weathering: Weathering, layer_depth: float, cell_size: float) -> None:
-        self._weathering, self._layer_depth = weathering, layer_depth
+    def __init__(self, weathering: Weathering, cell_size: float) -> None:
+        self._weathering = weathering
         self._last = SparseGrid(cell_size, channels=1, fill=-np.inf)
         """Scene frame at which each cell changed last."""
         self._trodden = SparseGrid(cell_size, channels=1)
@@ -57,11 +55,7 @@ class WeatheredCells:
         """Height of open ground [m]."""
         return self._weathering.level(frame)
 
-    def thicker(self, frame: float) -> float:
-        """Thickness of the loose layer over what it is without weather."""
-        return max(1.0 + self.level(frame) / self._layer_depth, 0.0)
-
-    def met(self, ground: HeightField, imprints: Imprints, frame: float, frame_step: float) -> Array:
+    def met(self, ground: HeightField, imprints: Imprints, level: float, frame: float, frame_step: float) -> Array:
         """What a contact finds as it begins: compression and rim, (2, rows, columns), as they are recorded [m].
 
         Parameters
@@ -69,24 +63,26 @@ class WeatheredCells:
         ground : HeightField
         imprints : Imprints
             Where it will press and raise the ground.
+        level : float
+            Height of open ground for what it has not touched yet [m].
         frame, frame_step : float
-            Scene frame, and how many are between those that are recorded.
+            Scene frame before it begins, and how many are between those that are recorded.
         """
         window, pressing = imprints.window, imprints.pressing
         pressed = imprints.contact[pressing].any(axis=0)
         last = self._last.read(window)[0]
         # What changes all along has no age.
         stale = (pressed | (imprints.rim[pressing] > 0).any(axis=0)) & (last > -np.inf)
-        stale &= last < frame - 1.5 * frame_step
+        stale &= last < frame - 0.5 * frame_step
         state = ground.read(window)
         if stale.any():
-            section = self._section(frame - frame_step)
+            section = self._section(frame)
             aged = self._weathering.aged(
                 ground, window, since=np.where(stale, last, frame), trodden=self._trodden, frame=frame, section=section
             )
             state = np.where(stale, aged, state)
         new = pressed & ~self.trodden(window)
-        state[0] -= new * self.level(frame)
+        state[0] -= new * level
         self.note(window, np.where(new, frame, -np.inf), new)
         return state
 

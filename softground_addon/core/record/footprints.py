@@ -138,9 +138,21 @@ class Footprint:
         return float(frames[-1] - frames[0]) / (len(frames) - 1) if len(frames) > 1 else self.frame_step
 
     @property
+    def pressing(self) -> Changes:
+        """What the contact itself compressed, without what weather had done there before."""
+        changes = self.compression
+        began = self.contact_start[:].min(initial=np.inf) - 0.5 * self.frame_step
+        count = int(np.searchsorted(changes.frames, began)) if len(self.contact_start) else 0
+        if not count:
+            return changes
+        begin = int(changes.first[count])
+        first = changes.first[count:] - changes.first[count]
+        return Changes(changes.frames[count:], first, changes.cells[begin:], changes.amounts[begin:])
+
+    @property
     def max_depth_m(self) -> float:
         """Deepest that this contact compressed a cell by [m], on top of what earlier ones had."""
-        return float(self.tile(self.compression).max(initial=0.0))
+        return float(self.tile(self.pressing).max(initial=0.0))
 
 
 def quantised(heights: Array) -> NDArray[np.int64]:

@@ -99,7 +99,7 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
     kernel = gaussian_kernel(blur_sigma / size)
     margin = len(kernel) // 2 + 2
     window = footprint.window.expanded(margin)
-    compression, rim = (np.pad(footprint.tile(changes), margin) for changes in (footprint.compression, footprint.rim))
+    compression, rim = (np.pad(footprint.tile(changes), margin) for changes in (footprint.pressing, footprint.rim))
     pressed = compression[compression > 0]
     if not len(pressed):
         return None
