@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from .bearing import bearing, without_glimpses
-from .ground_level import drift_of, level_of
+from .ground_level import ground_of
 from .merging import merged
 from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
 
@@ -59,9 +59,8 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
         The contact that each part belongs to, where that is known; -1 for parts that do not bear.
     """
     parts = tracks = yield from track_parts.slices(skin)
-    drift = drift_of(parts)
     yield
-    level = yield from level_of.slices(parts, drift)
+    level, drift = yield from ground_of.slices(parts)
     if groups is None:
         assert skin.links is not None, "without them no parts can be told to be one contact"
         parts = yield from track_parts.slices(skin, floor=level)

@@ -12,7 +12,7 @@ REACH = 0.05
 BIN = 0.004
 """Step of the levels that are tried, in body heights."""
 OFTEN = 20.0
-"""Percentile of the lowest skin at which some is on the ground: a runner has a foot there a third of the time."""
+"""Percentile of the lowest calm skin at which some is on the ground: a runner has a foot there a third of the time."""
 AROUND = 0.5
 """Time to either side over which that is looked for [s]: a stride of a run."""
 FURTHER_PART = 0.15
@@ -27,22 +27,46 @@ STANDS = 0.15
 """A ground that moves slower than this stands, in H/s."""
 STANDING_SHARE = 0.8
 """A ground that stands wins with this share of the votes of one that moves."""
+GROUNDED_SHARE = 0.8
+"""A velocity among what is low wins with this share of the votes that the ground has with that of all skin."""
 MOST_VOTES = 500
 """Moments of parts that are asked at most."""
 _SLICE = 200_000
 """Times levels that are asked in one slice."""
 
 
-def drift_of(tracks: PartTracks) -> Array:
+@sliced
+def ground_of(tracks: PartTracks) -> Slices[tuple[float, Array]]:
+    """Height of the ground [H] and its horizontal velocity, (2,) [H/s].
+
+    Velocity is looked for among what is low for the half second around, as feet that hang in flight are calm, too; and
+    among all low skin, as feet may dip deep through the ground in swing. What more skin rests on is the ground.
+    """
+    drift, other = drift_of(tracks, _on_ground(tracks)), drift_of(tracks)
+    level, votes = yield from level_of.slices(tracks, drift)
+    if np.linalg.norm(other - drift) > STANDS:
+        other_level, most = yield from level_of.slices(tracks, other)
+        if votes < GROUNDED_SHARE * most:
+            return other_level, other
+    return level, drift
+
+
+def _on_ground(tracks: PartTracks) -> Array:
+    """How near each part is to the lowest calm skin around, (F, P): 1 there, 0 where it is `REACH` over it."""
+    reach = max(round(AROUND * tracks.rate), 1)
+    lowest = np.pad(np.where(_calm(tracks) > 0, tracks.low, np.inf).min(axis=1), reach, mode="symmetric")
+    around = np.lib.stride_tricks.sliding_window_view(lowest, 2 * reach + 1)
+    over = tracks.low - np.percentile(around, OFTEN, axis=1, method="lower")[:, None]
+    return np.asarray(np.clip(1.0 - over / REACH, 0.0, 1.0))
+
+
+def drift_of(tracks: PartTracks, counts: Array | float = 1.0) -> Array:
     """Horizontal velocity that most calm low skin has, (2,) [H/s]: 0 where the character travels.
 
-    What is high over the ground of the moments around does not count: feet that hang in flight are calm, too. It is the
-    belt's in a walk on the spot, backward: minus the travel that root motion would have.
+    The belt's in a walk on the spot, backward: minus the travel that root motion would have. `counts` (F, P) is how
+    much each part counts at each moment.
     """
-    reach = max(round(AROUND * tracks.rate), 1)
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(tracks.lowest, reach, mode="symmetric"), 2 * reach + 1)
-    over = tracks.low - np.percentile(around, OFTEN, axis=1)[:, None]
-    weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH) * np.clip(1.0 - over / REACH, 0.0, 1.0)
+    weight = _calm(tracks) * (tracks.low < tracks.lowest[:, None] + REACH) * counts
     frame, part = np.nonzero(weight)
     if not len(frame):
         return np.zeros(2)
@@ -71,14 +95,14 @@ def _width(way: Array) -> Array:
 
 
 @sliced
-def level_of(tracks: PartTracks, drift: Array) -> Slices[float]:
-    """Height of the ground [H]: where calm skin that moves with the ground is most often."""
+def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
+    """Height of the ground [H], where calm skin that moves with the ground is most often, and the votes for it."""
     lowest = tracks.lowest
     speed = max(float(np.linalg.norm(drift)), 1.0)
     agrees = np.clip(1.5 - tracks.slip(drift) / (4 * SAME_WAY * speed), 0.1, 1.0)
     weight = _calm(tracks) * agrees * np.clip(1 - (tracks.low - lowest[:, None]) / REACH, 0.0, None)
     if not weight.any():
-        return float(np.percentile(lowest, 20))
+        return float(np.percentile(lowest, OFTEN)), 0.0
     levels = np.arange(lowest.min(), (tracks.low[weight > 0]).max() + BIN, BIN)
     score = np.empty(len(levels))
     count = max(_SLICE // weight.size, 1)
@@ -90,7 +114,7 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[float]:
         yield
     best = levels[int(score.argmax())]
     here = weight * (np.abs(tracks.low - best) < 1.5 * BIN)
-    return float((tracks.low * here).sum() / here.sum()) if here.any() else float(best)
+    return float((tracks.low * here).sum() / here.sum()) if here.any() else float(best), float(score.max())
 
 
 def _calm(tracks: PartTracks) -> Array:

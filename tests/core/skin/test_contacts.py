@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from softground_addon.core.skin.bearing import bearing, without_glimpses
 from softground_addon.core.skin.contacts import SkinContacts, find_contacts
-from softground_addon.core.skin.ground_level import drift_of
+from softground_addon.core.skin.ground_level import ground_of
 from softground_addon.core.skin.skin_motion import PartTracks, SkinMotion, track_parts
 
 RATE, PERIOD, FRAMES = 30.0, 30, 90
@@ -211,15 +211,32 @@ def test_the_last_two_frames_show_a_contact_where_the_foot_rests_in_them(pace: f
     assert (without_glimpses(only, tracks) == only).all()
 
 
+def run_on_the_spot(stance: int, rest: np.ndarray, pace: float, base: float = 0.0) -> PartTracks:
+    """One foot over 60 frames that stands `stance` of 10 on a belt of 2 H/s, and is `rest` high in the others, as calm.
+
+    From frame 40 on it is `base` higher.
+    """
+    stands = np.arange(60) % 10 < stance
+    low = np.tile(np.concatenate([np.zeros(stance), rest]), 6)[:, None]
+    low[40:] += base
+    ways = np.zeros((2, 60, 1, 2))
+    ways[..., 0, 0] = np.where(stands, 2.0, pace)
+    return PartTracks(low, ways[0], np.zeros((60, 1)), ways, 0.3, 24.0)
+
+
 @pytest.mark.parametrize("base", [0.0, -0.3])
 def test_the_ground_moves_as_feet_do_that_stand_on_it_not_as_those_of_a_flight(base: float) -> None:
-    stands = np.arange(60) % 10 < 3  # a run on the spot; between two steps, feet hang calmly 5 % of the height up
-    low = np.where(stands, 0.0, 0.054)
-    low[40:] += base  # and goes on lower down
-    ways = np.zeros((2, 60, 1, 2))
-    ways[..., 0, 0] = np.where(stands, 2.0, -0.6)
-    still = np.zeros((60, 1))
-    assert drift_of(PartTracks(low[:, None], ways[0], still, ways, 0.3, 24.0)).tolist() == pytest.approx([2.0, 0.0])
+    hangs = 0.04 + 0.04 * np.sin(np.linspace(0, np.pi, 7))
+    level, drift = ground_of(run_on_the_spot(3, hangs, -0.6, base))
+    assert min(abs(level), abs(level - base)) < 0.004
+    assert drift.tolist() == pytest.approx([2.0, 0.0])
+
+
+def test_the_ground_is_not_where_feet_dip_below_it_calmly_in_swing() -> None:
+    dips = -0.05 - 0.03 * np.sin(np.linspace(0, np.pi, 4))
+    level, drift = ground_of(run_on_the_spot(6, dips, -1.2))
+    assert level == pytest.approx(0.0, abs=0.004)
+    assert drift.tolist() == pytest.approx([2.0, 0.0])
 
 
 @pytest.mark.parametrize("seconds", [0.04, 0.2])
