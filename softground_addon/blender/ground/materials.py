@@ -34,7 +34,7 @@ BLEND = "surface_blend"
 """Float attribute of a mesh that says which of two surfaces is seen: the first at 0, the second at 1."""
 
 WIDE = 5.0
-"""Size of the largest shades and swells of open ground [m]; seven octaves are in them."""
+"""Size of the largest shades and swells of open ground [m]; five octaves are in them."""
 
 RIPPLE, RIPPLE_HEIGHT, LEE = 0.085, 0.0055, 0.68
 """From crest to crest of wind ripples, their height [m], and the part of a wave that faces the wind."""
@@ -289,7 +289,7 @@ def _look(graph: Graph, surface: str, ground: Ground, *, is_open: bool = True) -
     if not is_open:
         inputs, relief = under_weather(graph, surface, look.inputs, look.relief)
         return Look(relief, inputs)
-    wide = graph.noise(ground.place, WIDE, 7.0, 0.65)
+    wide = graph.noise(ground.place, WIDE, 5.0, 0.65)
     dark, light, uneven = _WIDE[surface]
     shade = graph.ramp(wide, 0.30, 0.70, dark, light)
     colour = graph.node("ShaderNodeVectorMath", {0: look.inputs["Base Color"], "Scale": shade}, operation="SCALE")

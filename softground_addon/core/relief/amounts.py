@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .layers import Apron, Cracks, Crumbs, Edge, Fans, Floor, Layer, Lip, Lumps, Streaks
+from .layers import Apron, Cracks, Crumbs, Edge, Fans, Fissures, Floor, Layer, Lip, Lumps, Streaks
 
 FOLDER = Path(__file__).parents[2] / "presets" / "relief"
 """Where the amounts of each look are, as `LOOK.json`."""
@@ -25,6 +25,7 @@ LAYERS: Mapping[str, type[Layer]] = {
     "fans": Fans,
     "lip": Lip,
     "cracks": Cracks,
+    "fissures": Fissures,
     "crumbs": Crumbs,
 }
 """The layers by the names that a table gives them; several of one kind are a list."""

@@ -228,6 +228,33 @@ class Cracks:
         return self.tilt * slope + around.length(self.lowest) + lift * around.length(self.highest - self.lowest)
 
 
+@dataclass(frozen=True)
+class Fissures:
+    """Cracks that run out from the outline, about a `spacing` apart, out to a `reach`, in `patches`.
+
+    The ring that is pushed outward and up is stretched along the outline, and opens across that.
+    """
+
+    spacing: float
+    reach: float
+    width: float
+    depth: float
+    patches: float
+
+    def heights(self, around: Around) -> Array:
+        """Heights [m]."""
+        out = -around.inward / around.length(self.reach)
+        lines = np.abs(around.across(201, 0.5 * self.spacing, LONG)) * around.length(0.5 * self.spacing)
+        width = self.width * MM * (1.0 - 0.7 * np.clip(out, 0.0, 1.0))
+        shown = np.maximum(width, 0.55 * around.finest)
+        open_ = np.maximum(1.0 - (lines / shown) ** 2, 0.0) ** 2 * np.sqrt(width / shown)
+        zone = rise(2.0 - 2.0 * out) * (1.0 - around.pressed) * around.patches(203, self.patches)
+        return -open_ * zone * around.length(self.depth)
+
+
+LONG = 20.0
+"""How many times longer than their spacing fissures would run."""
+
 _BENT = ((0, 16.0, 6.0), (1, 5.0, 1.8))
 """How the borders of plates are bent: number, size and amount of noise [mm]."""
 
@@ -255,4 +282,4 @@ class Crumbs:
         return dome * luck**2.5 * there * np.minimum(2.0 * near, 1.0) * around.length(self.height)
 
 
-Layer = Edge | Lumps | Floor | Apron | Streaks | Fans | Lip | Cracks | Crumbs
+Layer = Edge | Lumps | Floor | Apron | Streaks | Fans | Lip | Cracks | Fissures | Crumbs
