@@ -255,6 +255,8 @@ class EditedSteps:
         if weathered:
             for one in self._footprints:
                 weathered.ended(one.end_frame, one.compressed_m3, one.area_m2)
+            for other in others:
+                weathered.press(*other.pressed(-np.inf, grid.frame(first - 1)))
         contacts = {n: OpenContact(one.layout, laid_out=one.imprints) for n, one in laid.items()}
         prints: dict[int, Footprint | None] = {}
         for number in range(first, grid.number(end - 1) + 1):
@@ -263,6 +265,7 @@ class EditedSteps:
                 _add(self._solver.state, other.at(frame))
                 if weathered:
                     weathered.note(*other.known(frame))
+                    weathered.press(*other.pressed(grid.frame(number - 1), frame))
             under_way = [
                 one for one in contacts.values() if one.layout.first < steps.stop and one.layout.end > steps.start
             ]
@@ -389,7 +392,7 @@ class _Baked:
     """A print that stays as it was baked, frame by frame."""
 
     def __init__(self, footprint: Footprint) -> None:
-        self._footprint = footprint
+        self._footprint, self._pressing = footprint, footprint.pressing
         changes = (footprint.compression, footprint.rim)
         self._changes = [(one.frames, one.first, one.cells, one.amounts) for one in changes]
 
@@ -405,6 +408,12 @@ class _Baked:
                 for frames, *_ in self._changes
             ]
         )
+
+    def pressed(self, since: float, frame: float) -> tuple[Window, Array]:
+        """What it compressed itself from one recorded frame to another, as `WeatheredCells.press` takes it."""
+        both = (self._footprint.tile(self._pressing, one + 1e-6) for one in (frame, since))
+        after, before = both
+        return self._footprint.window, after - before
 
     def known(self, frame: float) -> tuple[Window, Array, NDArray[np.bool_]]:
         """When each cell of its window changed last by a frame, and which were in contact, as `WeatheredCells.note`."""

@@ -102,6 +102,15 @@ def test_steps_stand_on_the_snow_that_has_fallen(opened):
     assert np.median(surface[(far > 0.4) & (far < 0.6), 2]) == pytest.approx(fallen(opened, last.end_frame), rel=0.1)
     thicker = 1.0 + snow / opened.softground.material.layer_depth
     assert snow - floor == pytest.approx(depth * thicker, rel=0.25)
+    assert last.max_depth_m == pytest.approx(depth * thicker, rel=0.1)
+    # And materials see it as pressed.
+    mesh = (
+        baked_ground.display_mesh_of(opened.softground.ground).evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    )
+    compression = np.empty(len(mesh.vertices), np.float32)
+    mesh.attributes["softground_compression"].data.foreach_get("value", compression)
+    assert compression.min() > -1e-3
+    assert compression[far < 0.15].max() == pytest.approx(last.max_depth_m, rel=0.25)
 
 
 def test_a_slider_that_moves_makes_such_a_bake_outdated_and_no_other(opened):

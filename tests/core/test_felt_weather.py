@@ -187,7 +187,7 @@ def test_wind_takes_of_a_print_what_it_fills_and_no_more():
     ground.write(WHERE, made)
     trodden = SparseGrid(CELL, channels=1)
     trodden.write(WHERE, made[:1] > 0)
-    known = {"trodden": trodden, "frame": 145.0, "section": 0.05}
+    known = {"trodden": trodden, "pressed": made[0], "frame": 145.0, "section": 0.05}
     left = in_weather.aged(ground, WHERE, since=np.full((80, 80), 50.0), **known)
     kept = np.exp(-w.fill_rate(w.blown_flux(8.0, w.SAND), 0.05, w.SAND) * 600.0 * SECONDS)
     assert left.sum(axis=(1, 2)) == pytest.approx(kept * made.sum(axis=(1, 2)), rel=1e-4)
@@ -196,7 +196,6 @@ def test_wind_takes_of_a_print_what_it_fills_and_no_more():
 
 def seen(footprints, weather, frame, *, felt, blur=0.01):
     """The surface that bake and weather show at the cells of `WHERE` [m]."""
-    weathering = weathering_of(weather, LAYER) if felt else None
     x, y = WHERE.centres(CELL)
     position = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))], axis=-1).reshape(-1, 3)
     compression, rim = blurred_window(recompose(footprints), WHERE, blur)
@@ -218,7 +217,7 @@ def seen(footprints, weather, frame, *, felt, blur=0.01):
         cell_size=CELL,
         blur_sigma=blur,
         layer_depth=LAYER,
-        weathering=weathering,
+        felt=felt,
     )
     matter = w.matter_of(weather.surface, LAYER, section_of(footprints[:1]))
     now = weathered(places, relief, weather, matter, frame=frame, span=SPAN)

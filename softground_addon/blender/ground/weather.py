@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.felt_weather import felt_in, weathering_of
+from ...core.after.felt_weather import felt_in
 from ...core.after.weather import matter_of, span_of
 from ...core.after.weather_places import NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
 from ...core.errors import InputError
@@ -128,7 +128,8 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
         own_data.remove(mesh, nodes.OF_HOLLOWS)
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
-    nodes.build(tree, matter=matter, up=up.tolist(), span=span, soaking=soaking_shares(places))
+    given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
+    nodes.build(tree, **given, felt=known["felt"])
     tree[weather_keys.LAST] = span.last
 
 
@@ -138,7 +139,7 @@ def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "cell_size": float(inputs["cell_size_m"]),
         "time_stretch": float(inputs["time_stretch"]),
-        "weathering": weathering_of(felt_in(inputs), material["layer_depth"]),
+        "felt": felt_in(inputs) is not None,
         **material,
     }
 

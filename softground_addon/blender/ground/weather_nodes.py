@@ -38,7 +38,7 @@ standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 
 NOW = "softground_weather_now"
 """A vector that is there only while the group works."""
-HEIGHT, KEPT, PALE = "height", "kept", "pale"
+HEIGHT, KEPT, PALE, PRESSED = "height", "kept", "pale", "pressed"
 """Names of what is worked out with that, and not stored."""
 
 NEVER_FULL = 1e9
@@ -105,7 +105,13 @@ def is_weather(tree: bpy.types.NodeTree) -> bool:
 
 
 def build(
-    tree: Any, *, matter: Matter, up: Sequence[float], span: Span, soaking: tuple[float, float] = (1.0, 1.0)
+    tree: Any,
+    *,
+    matter: Matter,
+    up: Sequence[float],
+    span: Span,
+    soaking: tuple[float, float] = (1.0, 1.0),
+    felt: bool = False,
 ) -> None:
     """Fill a group, in place of what is in it; its inputs stay.
 
@@ -121,6 +127,8 @@ def build(
         In frames of the scene.
     soaking : (float, float)
         Of the hollows; see `core.after.weather_places.soaking_shares`.
+    felt : bool
+        Whether steps felt the weather: how deep they are below new snow is then not what the record has.
     """
     tree.nodes.clear()
     graph = NodeGraph(tree)
@@ -161,6 +169,8 @@ def build(
         seen |= {HEIGHT: height + water, WETNESS: wetness.at_least(water.above(0.0)), WATER: water}
     if matter.blown:
         seen[KEPT] = aged["kept"]
+    if felt and matter.snow_depth:
+        seen[PRESSED] = compression * begun
     if matter.pales:
         near = graph.number(graph.dot(trodden, (NEAR,) * 3)).within_one() * begun
         seen[PALE] = (said["Halo"] * near * aged["pale"]).where(halo)
@@ -190,6 +200,9 @@ def _changed(
     if matter.soaking:  # the bake's own water stays
         water = graph.number(graph.attribute(WATER)).at_least(seen[WATER])
         geometry = _with(graph, geometry, {WATER: water}, acts["Rain"], acts["Water Table"])
+    if PRESSED in seen:
+        deep = graph.number(graph.attribute(COMPRESSION)).at_least(seen[PRESSED])
+        geometry = _with(graph, geometry, {COMPRESSION: deep}, acts["Snowfall"])
     if matter.blown:  # what is blown full looks trodden no more
         blown = {name: graph.number(graph.attribute(name)) * seen[KEPT] for name in (COMPRESSION, RIM)}
         geometry = _with(graph, geometry, blown, acts["Wind"])

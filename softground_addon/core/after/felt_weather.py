@@ -107,6 +107,7 @@ class PrintsInWeather:
         *,
         since: Array,
         trodden: SparseGrid,
+        pressed: Array,
         frame: float,
         section: float | None,
     ) -> Array:
@@ -117,10 +118,8 @@ class PrintsInWeather:
         left = _rounded(ground, window, SIGMAS, share) * kept
         layer = self._matter.snow_depth
         if layer:
-            compression, contact = ground.read(window)[0], trodden.read(window)[0]
-            frames, which = np.unique(since, return_inverse=True)
-            stepped_on = np.array([self.level(one) for one in frames.tolist()])[which].reshape(since.shape)
-            ratio = np.maximum(1.0 - (compression + contact * stepped_on) / layer, 0.0)
+            contact = trodden.read(window)[0]
+            ratio = np.maximum(1.0 - pressed / layer, 0.0)
             deep = np.maximum(layer + left[1] - left[0], 0.0)
             thawed = np.minimum(course.since(since, course.thawed) * ratio**2, deep)
             lower = self.level(frame) - (course.since(since, course.cover) - thawed)

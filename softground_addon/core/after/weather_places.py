@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..ground.display_blur import blurred, blurred_window
 from ..ground.heightfield import HeightField, SparseGrid
-from ..ground.soft_ground import Weathering
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
@@ -30,8 +29,6 @@ COVERED = 0.01
 """New snow that hides what is below [m]."""
 NOT_YET = 1e9
 """Frame of what never comes."""
-MOMENTS = 65
-"""At which the level of open ground is looked up; in between, linear."""
 LEAST_SHARE = 1e-6
 """Contact that is blurred to less than this counts for nothing."""
 
@@ -48,7 +45,7 @@ class WeatherPlaces:
         Share of ground in contact at the first of them, and its changes to the next.
     times : (K, 3) float array
         First frame of the first contact there, and last frame that something happened, both from the contacts around
-        where there was none; compression at the first of the sigmas [m].
+        where there was none; what steps compressed, at the first of the sigmas [m].
     pool : (K, 3) float array
         What the hollow there holds as a depth of water on it [m], 0 where there is none; height above its bottom [m];
         how much of its soaking is left.
@@ -81,7 +78,7 @@ def weather_places(
     blur_sigma: float,
     layer_depth: float,
     time_stretch: float = 1.0,
-    weathering: Weathering | None = None,
+    felt: bool = False,
 ) -> WeatherPlaces:
     """What weather needs to know of places.
 
@@ -99,8 +96,8 @@ def weather_places(
         [m].
     time_stretch : float
         Frames of the animation for each frame of the footprints.
-    weathering : Weathering, optional
-        What the steps felt: their record then has in it how high the open ground was.
+    felt : bool
+        Whether steps felt the weather: their record then has in it how high the open ground was.
     """
     places = position[:, :2].T
     ground, trodden = recompose(footprints, cell_size=cell_size), _contacts(footprints, cell_size)
@@ -108,14 +105,16 @@ def weather_places(
     at_sigma = [blurred(ground, float(np.hypot(sigma, blur_sigma))).sample(*places) for sigma in SIGMAS]
     heights = [relief, *(rim - compression for compression, rim in at_sigma)]
     # What the record has of the level of open ground ends where its display does.
-    narrowest = blur_sigma if weathering else SIGMAS[0]
+    narrowest = blur_sigma if felt else SIGMAS[0]
     bounds = [blurred(trodden, sigma).sample(*places) for sigma in (narrowest, *SIGMAS[1:])]
     inside = [share for share, *_ in bounds]
     first, last = (_mean_frame([(one[0], one[k] * time_stretch) for one in bounds]) for k in (1, 2))
     last, compression = np.maximum(last, ended), at_sigma[0][0]
-    if weathering:
+    if felt:
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
-        compression = compression + inside[0] * _levels(weathering, last / time_stretch)
+        compression = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma))).sample(*places)[
+            0
+        ]
     pool, levels = _pools(footprints, ground, position, relief, blur_sigma, layer_depth, time_stretch)
     return WeatherPlaces(
         blur=np.diff(heights, axis=0).T,
@@ -130,15 +129,6 @@ def shares(variance: Array) -> Array:
     """How far a variance (K,) [m²] is through each of the spans between `BOUNDS`, (K, 3), 0 to 1."""
     low, high = np.array(BOUNDS[:-1]), np.array(BOUNDS[1:])
     return np.asarray(np.clip((np.asarray(variance)[..., None] - low) / (high - low), 0.0, 1.0))
-
-
-def _levels(weathering: Weathering, frames: Array) -> Array:
-    """How much higher open ground was at frames (K,), of which some are never [m]."""
-    known = frames[np.abs(frames) < NOT_YET / 2]
-    if not len(known):
-        return np.zeros_like(frames)
-    moments = np.linspace(known.min(), known.max(), MOMENTS)
-    return np.interp(frames, moments, [weathering.level(moment) for moment in moments.tolist()])
 
 
 def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
@@ -163,6 +153,14 @@ def _contacts(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
         last.reshape(-1)[cells] = np.where(known, np.maximum(last.reshape(-1)[cells], end), end)
         touched.reshape(-1)[cells] = 1.0
         grid.write(footprint.window, values)
+    return grid
+
+
+def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
+    """How far steps compressed each cell, all together, without what weather did [m]."""
+    grid = SparseGrid(cell_size, channels=1)
+    for footprint in footprints:
+        grid.write(footprint.window, grid.read(footprint.window) + footprint.tile(footprint.pressing))
     return grid
 
 

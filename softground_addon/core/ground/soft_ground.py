@@ -34,6 +34,7 @@ class Weathering(Protocol):
         *,
         since: Array,
         trodden: SparseGrid,
+        pressed: Array,
         frame: float,
         section: float | None,
     ) -> Array:
@@ -48,6 +49,8 @@ class Weathering(Protocol):
             Frame at which each cell changed last.
         trodden : SparseGrid
             1 in cells that were ever in contact, else 0.
+        pressed : (rows, columns) float array
+            How far steps compressed each cell, all together [m].
         frame : float
         section : float or None
             Volume of a print over its width [m²], None where it is not known yet.

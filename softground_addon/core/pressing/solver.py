@@ -130,6 +130,8 @@ class GroundSolver:
                 hardening=material.hardening,
             )
             newly = compression - state[0]
+            if self.weathered:
+                self.weathered.press(imprints.window, newly)
             heights[k] = newly.sum()
             if imprints.factors is None:
                 displaced[k] = displaced_volume(heights[k], material)

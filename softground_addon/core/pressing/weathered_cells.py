@@ -35,6 +35,8 @@ class WeatheredCells:
         """Scene frame at which each cell changed last."""
         self._trodden = SparseGrid(cell_size, channels=1)
         """1 where it was ever in contact."""
+        self._pressed = SparseGrid(cell_size, channels=1)
+        """How far steps compressed it, all together [m]."""
         self._sections: list[tuple[float, float]] = []
 
     def ended(self, frame: float, compressed: float, area: float) -> None:
@@ -46,6 +48,10 @@ class WeatheredCells:
         """Cells of a window (rows, columns) changed at scene frames, -inf where none did, and some were in contact."""
         self._last.write(window, np.maximum(self._last.read(window), changed))
         self._trodden.write(window, np.maximum(self._trodden.read(window), touched))
+
+    def press(self, window: Window, newly: Array) -> None:
+        """Steps compressed the cells of a window (rows, columns) by so much [m]."""
+        self._pressed.write(window, self._pressed.read(window) + newly)
 
     def trodden(self, window: Window) -> Mask:
         """Cells of a window that were ever in contact, (rows, columns)."""
@@ -78,7 +84,13 @@ class WeatheredCells:
         if stale.any():
             section = self._section(frame)
             aged = self._weathering.aged(
-                ground, window, since=np.where(stale, last, frame), trodden=self._trodden, frame=frame, section=section
+                ground,
+                window,
+                since=np.where(stale, last, frame),
+                trodden=self._trodden,
+                pressed=self._pressed.read(window)[0],
+                frame=frame,
+                section=section,
             )
             state = np.where(stale, aged, state)
         new = pressed & ~self.trodden(window)
