@@ -33,6 +33,8 @@ NARROW = 1.0
 SHARP = 0.02
 """Half the width of a print from which lengths of the ground's grain are whole; in smaller ones they are less [m]."""
 
+LEVEL = 0.995
+"""Length of a sole seen from above, in parts of the greatest, from which it lies flat."""
 
 MOVED = 1e-5
 """Ground that moves less has no relief [m]; and none beside such cells: what has relief moves anyway."""
@@ -62,7 +64,8 @@ class PrintShape:
     heading : (2,) float array
         Direction of the toes.
     along, across : (float, float)
-        Where heel and toes end along it, and where its right and left side do, from the middle of the pressure [m].
+        Where heel and toes of the sole end along it, and where its right and left side do, from the middle of the
+        pressure [m]; of the print where the sole is not known.
     """
 
     window: Window
@@ -123,7 +126,7 @@ def shape_of(footprint: Footprint, blur_sigma: float) -> PrintShape | None:
         fineness,
         footprint.position[:2],
         heading,
-        *_ends(window, size, inside, footprint.position[:2], heading),
+        *_ends(footprint, window, inside, heading),
     )
 
 
@@ -144,11 +147,26 @@ def _displayed(
     return displayed, risen, continued, np.clip((to_end - 1.5) * size / FADING, 0.0, 1.0)
 
 
+def _outline_on_ground(footprint: Footprint) -> Array | None:
+    """Outline of a sole where it lay flattest, (2, N) [m]; None of a prop, and where it is not known."""
+    pressed_by = footprint.pressed_by
+    if pressed_by is None or pressed_by.pressing.sole.prop is not None:
+        return None
+    poses = pressed_by.steps(footprint.load_frames).poses[:, 0]
+    flatness = np.hypot(poses[:, 0, 0], poses[:, 1, 0])
+    flat = np.flatnonzero(flatness > LEVEL * flatness.max())
+    lay = poses[flat[len(flat) // 2]]
+    return np.asarray(lay[:2, :2] @ pressed_by.pressing.sole.outline.T + lay[:2, 3:])
+
+
 def _ends(
-    window: Window, size: float, inside: Mask, position: Array, heading: Array
+    footprint: Footprint, window: Window, inside: Mask, heading: Array
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """See `PrintShape.along` and `across`."""
-    x, y = (place[inside] - at for place, at in zip(np.meshgrid(*window.centres(size)), position, strict=True))
+    position, size = footprint.position[:2], footprint.cell_size
+    outline = _outline_on_ground(footprint)
+    places = np.stack(np.meshgrid(*window.centres(size)))[:, inside] if outline is None else outline
+    x, y = places - position[:, None]
     along, across = x * heading[0] + y * heading[1], y * heading[0] - x * heading[1]
     return (float(along.min()), float(along.max())), (float(across.min()), float(across.max()))
 

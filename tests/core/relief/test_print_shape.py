@@ -6,7 +6,7 @@ from scipy.ndimage import distance_transform_edt
 
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.relief.print_shape import nearest, shape_of
-from tests.core.walkers import pressed, sphere_sole, standing, walk
+from tests.core.walkers import box_sole, loads_of, pose, pressed, sphere_sole, standing, walk
 
 SNOW = GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005)
 
@@ -44,3 +44,24 @@ def test_balls_have_a_shape_down_to_a_few_cells(radius, has_shape):
     if shape:
         assert np.isfinite(shape.fields).all()
         assert 0 < shape.fineness <= 1
+
+
+@pytest.mark.parametrize("pitch", [0.0, -0.25])
+def test_heel_and_toes_are_those_of_the_sole_however_little_of_it_pressed(pitch):
+    """A box on its front edge, as a runner on the ball of the foot: a tread is as large there as under a whole sole."""
+    count, length = 61, 0.27
+    place = pose((0.3, 0.1, length / 2 * np.sin(-pitch)), 0.7, pitch)
+    loads = loads_of([box_sole(length, 0.1)], [np.tile(place, (count, 1, 1, 1))], np.full((count, 1), 500.0),
+                     np.ones((count, 1), bool), 30.0)  # fmt: skip
+    (step,) = pressed(loads, SNOW, 0.005)[1]
+    shape = shape_of(step, SNOW.blur_sigma)
+    x, y = np.meshgrid(*shape.window.centres(shape.cell_size))
+    inside = shape.fields[0] > 0
+    printed = np.ptp(shape.under_sole(x[inside], y[inside])[0])
+    assert np.ptp(shape.along) == pytest.approx(length * np.cos(pitch), abs=1e-4)
+    assert np.ptp(shape.across) == pytest.approx(0.1, abs=1e-4)
+    assert printed < (0.75 if pitch else 1.05) * length
+    middle = np.array([0.3, 0.1])
+    along, across = shape.under_sole(*middle[:, None])
+    assert sum(shape.along) / 2 == pytest.approx(along[0], abs=1e-4)
+    assert sum(shape.across) / 2 == pytest.approx(across[0], abs=1e-4)
