@@ -1,0 +1,121 @@
+"""Tracks under weather: snowfall, thaw, wind on a dune, a drying beach, each as a sheet and as a moving picture.
+
+One bake each; only the weather's sliders act afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from sample_scenes import production, stage
+from sample_scenes.body import Body
+from sample_scenes.character import create_character
+from sample_scenes.gait import Gait, walk
+from sample_scenes.keys import write_action
+from sample_scenes.moving_picture import animate
+from sample_scenes.production import Bake, Claim, Options, Walker
+from softground_addon.blender.ground import weather
+from softground_addon.core.record.footprints import Footprint
+
+CELL_SIZE: float | None = None
+"""Fitted to the soles."""
+
+WEATHER = {"SNOWFALL": "Snow", "THAW": "Snow", "WINDY_DUNES": "Dry Sand", "DRYING_BEACH": "Wet Sand"}
+"""Presets of weather, and the ground that each goes over."""
+
+FRAMES = 60
+LASTS = 264
+"""Frames from the last step to the last picture: eleven seconds."""
+MOMENTS, COLUMNS = 12, 4
+PICTURE = (360, 240)
+APART = 30.0
+"""Distance of the tracks [m]."""
+PAUSE = 220
+"""What each picture of the moving one takes [ms]."""
+
+
+@dataclass(frozen=True)
+class TimeLapse:
+    """A track on each ground, by the preset of its weather."""
+
+    bakes: dict[str, Bake]
+
+
+def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> TimeLapse:
+    """The same walk on each ground, far from the others."""
+    body, bakes = Body(), {}
+    scene.frame_start, scene.frame_end = 1, FRAMES
+    for number, (preset, ground) in enumerate(WEATHER.items()):
+        walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
+        walker.location = (APART * number, 0.0, 0.0)
+        write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
+        chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"} | dict(options or {})
+        bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], ground, cell_size, options=chosen)
+        weather.set_preset(weather.add(bakes[preset].ground), preset)
+        stage.hide(walker)
+    return TimeLapse(bakes)
+
+
+def claims(built: TimeLapse) -> list[Claim]:
+    """What the weather does to the hollow of a step, from the end of the walk to the last picture."""
+    shown = [(preset, _hollow(bake, FRAMES), _hollow(bake, FRAMES + LASTS)) for preset, bake in built.bakes.items()]
+    kept = {preset: after / before for preset, before, after in shown}
+    return [
+        Claim("Hollow left by a night of snow", kept["SNOWFALL"], 0.0, 0.7),
+        Claim("Hollow left by a thaw: trodden snow melts last and stands up", kept["THAW"], -3.0, 0.7),
+        Claim("Hollow left by ten minutes of wind", kept["WINDY_DUNES"], 0.0, 0.9),
+        Claim("Hollow left by a drying beach", kept["DRYING_BEACH"], 0.5, 1.01),
+    ]
+
+
+def _step(bake: Bake) -> Footprint:
+    return bake.footprints[len(bake.footprints) // 2]
+
+
+def _hollow(bake: Bake, frame: int) -> float:
+    """How much lower the middle of a step lies than the ground a foot away, in a frame [m]."""
+    scene = bpy.context.scene
+    scene.frame_set(frame)
+    shown = bake.display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    places = np.empty(3 * len(shown.vertices), np.float32)
+    shown.attributes["position"].data.foreach_get("vector", places)
+    places = places.reshape(-1, 3) + np.array(bake.display_mesh.matrix_world.translation)
+    away = np.linalg.norm(places[:, :2] - _step(bake).position[:2], axis=1)
+    return float(np.median(places[(away > 0.3) & (away < 0.6), 2]) - np.median(places[away < 0.04, 2]))
+
+
+def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
+    """Twelve moments of each, low over a step."""
+    scene = bpy.context.scene
+    stage.add_sun(scene, radians(40), radians(22))
+    camera = stage.add_camera(scene, "Over a Step", lens=45.0)
+    made = []
+    for preset, bake in built.bakes.items():
+        step = np.array(_step(bake).position)
+        moments = []
+        for number, frame in enumerate(np.linspace(FRAMES, FRAMES + LASTS, MOMENTS).round().astype(int)):
+            scene.frame_set(int(frame))
+            level = _level(bake)
+            stage.aim(camera, (step[0] + 0.75, step[1] + 1.25, level + 0.85), (step[0] - 0.02, step[1] + 0.10, level))
+            moments.append(folder / f"time_lapse_{preset.lower()}_{number:02d}.png")
+            stage.render(scene, camera, moments[-1], PICTURE, samples)
+        made.append(stage.contact_sheet(moments, COLUMNS, folder / f"time_lapse_{preset.lower()}.jpg"))
+        made.append(animate(moments, PAUSE, folder / f"time_lapse_{preset.lower()}.webp"))
+    return made
+
+
+def _level(bake: Bake) -> float:
+    """Height of the open ground in this frame [m]."""
+    shown = bake.display_mesh.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    places = np.empty(3 * len(shown.vertices), np.float32)
+    shown.attributes["position"].data.foreach_get("vector", places)
+    return float(np.median(places[2::3]))
+
+
+if __name__ == "__main__":
+    production.main(__name__)
