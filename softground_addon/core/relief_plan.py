@@ -22,6 +22,8 @@ from .settings import BakeSettings
 
 Array = NDArray[np.float64]
 
+BARE = "BARE"
+"""The pattern of those in no shoes."""
 IMAGE, SHOES = "IMAGE", "SHOES"
 """Patterns that are read: from an image that is the same under all soles, and from the undersides of each."""
 

@@ -56,6 +56,12 @@ def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scen
     assert own_data.SOLE not in ground.data.attributes
 
 
+def test_bare_feet_are_not_shown_with_the_bars_of_shoes(ground, scene):
+    scene.softground.tread_pattern = "BARE"
+    bake(scene)
+    assert own_data.SOLE not in ground.data.attributes
+
+
 def picture(values, name="Sole"):
     """An image of grey values (rows, columns), the first row at the bottom."""
     rows, columns = values.shape
