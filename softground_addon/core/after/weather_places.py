@@ -112,9 +112,8 @@ def weather_places(
     last, compression = np.maximum(last, ended), at_sigma[0][0]
     if felt:
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
-        compression = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma))).sample(*places)[
-            0
-        ]
+        pressed = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma)))
+        (compression,) = pressed.sample(*places)
     pool, levels = _pools(footprints, ground, position, relief, blur_sigma, layer_depth, time_stretch)
     return WeatherPlaces(
         blur=np.diff(heights, axis=0).T,

@@ -118,6 +118,7 @@ class GroundSolver:
         whole[0] += lowered
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
+        found = state[0].copy()
         rim = imprints.rim[steps].reshape(len(steps), -1)
         for k, step in enumerate(steps):
             compression = compress(
@@ -130,8 +131,6 @@ class GroundSolver:
                 hardening=material.hardening,
             )
             newly = compression - state[0]
-            if self.weathered:
-                self.weathered.press(imprints.window, newly)
             heights[k] = newly.sum()
             if imprints.factors is None:
                 displaced[k] = displaced_volume(heights[k], material)
@@ -148,6 +147,8 @@ class GroundSolver:
             state[1] += rise.reshape(state[1].shape)
         if contact.compression is not None and compacted is not None:
             contact.compression.write(imprints.window, (state[0] - compacted)[None])
+        if self.weathered:
+            self.weathered.press(imprints.window, state[0] - found)
         whole[0] -= lowered
         self.state.write(window, whole)
         contact.add_loads(imprints, first, last)
