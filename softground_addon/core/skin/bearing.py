@@ -25,6 +25,8 @@ and ends standing [s]."""
 BLIP = 0.05
 """What bears no longer than this does not bear [s]; of shots of at most `FEW` samples it is all that is known."""
 FEW = 4
+GLIMPSE = 0.08
+"""What bears no longer than this at an end of the shot, two frames at 24 Hz, shows little more than one step [s]."""
 LANDED = TOUCH / 2
 """What bears has landed when it is no higher than this over the ground, and over how it mostly stands."""
 DRAGS = 0.004
@@ -111,15 +113,16 @@ def _landed(bears: Mask, height: Array) -> Mask:
 
 
 def without_glimpses(bears: Mask, tracks: PartTracks) -> Mask:
-    """Without the two frames at an end of the shot of what bears at other times and does not rest there.
+    """Without the glimpses at an end of the shot of what bears at other times and does not rest there.
 
-    Between two frames lies one step: that of a foot at rest, or of one about to land or just lifted.
+    Such a foot is about to land, or has just lifted.
     """
+    longest = max(round(GLIMPSE * tracks.rate), 2)
     seen = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         intervals = list(zip(*runs(bears[:, part]), strict=True))
         for first, last in intervals if len(intervals) > 1 else ():
-            at_end = last - first == 2 and (first == 0 or last == len(bears))
+            at_end = last - first <= longest and (first == 0 or last == len(bears))
             rests = tracks.rise[first:last, part].min() < CALM_SPEED
             seen[first:last, part] = rests or not at_end
         if not seen[:, part].any():
