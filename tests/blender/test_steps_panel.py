@@ -184,6 +184,20 @@ def test_an_edit_gives_the_bytes_of_a_bake_with_the_same_edits(baked):
     assert not record.load(stored(baked)).edits
 
 
+def test_an_edit_keeps_the_look_that_the_bake_was_made_with(baked):
+    options = baked.softground
+    options.relief, options.cell_size = "FINE", 0.01
+    bpy.ops.softground.bake()
+    step = baked_steps.of(baked)[2]
+    bpy.ops.softground.mute_step(step=step.name)
+    muted = heights(options.ground, DISPLAY_KEY)
+    bpy.ops.softground.mute_step(step=step.name)
+    options.relief_strength, options.tread = 2.0, 0.0
+    bpy.ops.softground.mute_step(step=step.name)
+    np.testing.assert_array_equal(heights(options.ground, DISPLAY_KEY), muted)
+    assert bake_report.stale_reasons(baked)
+
+
 def test_a_preview_shows_the_edited_ground_and_leaves_no_trace(baked):
     ground = baked.softground.ground
     bpy.context.view_layer.update()

@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy
-from ...core.settings import BakeSettings
+from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..after import debris_object
 from ..ground import baked_ground, ground_mesh, painted_ground
@@ -97,13 +97,20 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
 
 
 def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
-    """The scene's settings, with what the prints were pressed with."""
+    """The scene's settings, with those that the prints were pressed and put on the ground with."""
+    now = settings.snapshot(scene)
     try:
         inputs = left.about["inputs"]
+        on_ground = {
+            name: type(value)(inputs[name])
+            for name, value in now.between(Acts.WRITING, Acts.WRITING).items()
+            if name in inputs
+        }
         units = {key: float(inputs[key]) for key in ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m")}
         first, last = map(int, inputs["frames"])
         return replace(
-            settings.snapshot(scene),
+            now,
+            **on_ground,
             material=GroundMaterial(**inputs["material"]),
             pressure=inputs["pressure"],
             painted=tuple(inputs["painted"]),
