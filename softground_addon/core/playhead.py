@@ -157,10 +157,13 @@ class Playhead:
         """The cells (rows, columns) of some windows that were in contact since the frame before the shown one."""
         return self._changes[self._shown].contact
 
+    def loads_by_now(self) -> list[CharacterLoads]:
+        """What has pressed the ground that is shown."""
+        return [_until(self.frame, character) for character in self._loads]
+
     def footprints(self) -> list[Footprint]:
         """The record of the ground that is shown, with the contacts that are under way as they are by now."""
-        until_now = [_until(self.frame, character) for character in self._loads]
-        footprints = [footprint for result in self._press(until_now) for footprint in result.footprints]
+        footprints = [footprint for result in self._press(self.loads_by_now()) for footprint in result.footprints]
         return sorted(footprints, key=lambda footprint: (footprint.start_frame, footprint.character, footprint.sole))
 
     def _taken_over(self, result: FrameResult) -> _Change:

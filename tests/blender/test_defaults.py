@@ -63,6 +63,16 @@ def test_two_clicks_the_demo_and_the_gallery_bake_the_same_ground(scene, walker,
         assert shown == inputs
 
 
+def test_steps_throw_in_new_scenes_and_not_on_the_papers_grounds(scene, walker):
+    options = scene.softground
+    assert not options.debris
+    bpy.ops.softground.add_character()
+    assert options.debris
+    for preset, throws in (("Paper Snow", False), ("Dry Sand", True), ("Paper Mud", False)):
+        bpy.ops.softground.load_preset(name=preset)
+        assert options.debris == throws
+
+
 def test_what_was_set_before_the_first_character_stays(scene, walker):
     options = scene.softground
     options.cell_size, options.pressure, options.material.youngs_modulus = 0.03, "UNIFORM", 1e6
@@ -82,6 +92,7 @@ def test_a_scene_of_version_0_1_keeps_its_values(scene, walker, tmp_path):
         (options, "pressure"),
         (options, "tread"),
         (options, "cell_size"),
+        (options, "debris"),
         (options.material, "preset"),
     ):
         group.property_unset(field)
@@ -90,18 +101,20 @@ def test_a_scene_of_version_0_1_keeps_its_values(scene, walker, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "old.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "old.blend"))
     options = bpy.context.scene.softground
-    assert (options.pressure, options.tread, options.cell_size) == ("UNIFORM", 0.0, pytest.approx(0.01))
+    older = ("UNIFORM", 0.0, pytest.approx(0.01), False)
+    assert (options.pressure, options.tread, options.cell_size, options.debris) == older
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
     bpy.ops.softground.add_character()
-    assert (options.pressure, options.tread, options.cell_size) == ("UNIFORM", 0.0, pytest.approx(0.01))
+    assert (options.pressure, options.tread, options.cell_size, options.debris) == older
 
 
 def test_a_preset_of_version_0_1_sets_the_material_alone(scene, walker, tmp_path):
     bpy.ops.softground.add_character()
     old = dataclasses.replace(presets.find("mud"), pressure=None, tread=None, cells_along_sole=None, debris=None)
     (tmp_path / "bog.json").write_text(presets.dump(old))
-    scene.softground.pressure = "UNIFORM"
+    scene.softground.pressure, scene.softground.debris = "UNIFORM", False
     bpy.ops.softground.load_preset(filepath=str(tmp_path / "bog.json"))
+    assert not scene.softground.debris
     assert scene.softground.material.youngs_modulus == old.material.youngs_modulus
     assert scene.softground.pressure == "UNIFORM"
     assert scene.softground.tread == pytest.approx(0.003)

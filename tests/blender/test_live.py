@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import handlers
+from softground_addon.blender.after import debris_object
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
 from softground_addon.blender.live import live
@@ -194,6 +195,24 @@ def test_kept_prints_are_a_bake_like_any_other(live_shot, tmp_path):
     bpy.ops.softground.bake()
     baked = ground_mesh.summary_of(ground)
     assert kept == {key: pytest.approx(baked[key]) for key in kept}
+
+
+def test_kept_prints_throw_what_those_of_a_bake_throw(live_shot):
+    live_shot.frame_set(live_shot.softground.frame_end)
+    ground = live_shot.softground.ground
+    live_shot.softground.debris = True  # at the last moment, as live mode shows none
+    assert debris_object.of(ground) is None
+    bpy.ops.softground.live(keep=True)
+    kept, pieces = baked_ground.load(ground)[0], fingerprints.of_mesh(debris_object.of(ground).data)
+    assert bake_report.stale_reasons(live_shot) == ()
+    bpy.ops.softground.bake()
+    baked = baked_ground.load(ground)[0]
+    assert [one.rim_m3 for one in kept] == [one.rim_m3 for one in baked]
+    assert fingerprints.of_mesh(debris_object.of(ground).data) == pieces
+    live_shot.softground.debris = False
+    bpy.ops.softground.bake()
+    full = baked_ground.load(ground)[0]
+    assert sum(one.rim_m3 for one in full) > 1.02 * sum(one.rim_m3 for one in baked)
 
 
 def lowest(scene):

@@ -28,7 +28,7 @@ from ...core.record.pressed_ground import PressedGround
 from ...core.relief_plan import with_shoe_treads
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
-from ..baking import bake_report
+from ..baking import bake_report, debris_job
 from ..baking.bake_checks import coverage, shortest_sole, wants_detail
 from ..baking.publish import at_the_end, publish, sign
 from ..ground import baked_ground, ground_mesh, trail_detail
@@ -245,6 +245,7 @@ class LiveMode:
             shape_keys=now.shape_keys,
             dense_shape_keys=now.dense_shape_keys,
             tread_m=now.tread_m,
+            debris=now.debris,
             weather=None,  # which live mode does not follow
         )
         with suppress(InputError):  # of soles that are flat; the prints are kept without a tread
@@ -254,13 +255,16 @@ class LiveMode:
         shown = PressedGround.at(footprints, **at_the_end(made_with))
         place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
         left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
+        left, debris = debris_job.thrown(made_with, self._analysis.shot.terrain, self._playhead.loads_by_now(), left)
         published = jobs.run(publish(left, place, made_with))
+        owner = settings.found(self._owner)
+        debris_job.put(owner, debris, made_with)
         sign(
             published.display_mesh,
-            settings.found(self._owner),
+            owner,
             made_with.inputs(Acts.WRITING),
             staleness.of_movers(scene, made_with),
-            summary=bake_report.summary_of_prints(footprints),
+            summary=bake_report.summary_of_prints(left.footprints),
         )
 
     def discard(self) -> None:
