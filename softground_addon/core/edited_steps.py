@@ -26,8 +26,9 @@ from .pressing.sole_layout import SoleLayout
 from .pressing.sole_points import SolePoints, sole_points
 from .pressing.solver import GroundSolver
 from .record.contact_steps import PressingSole, Steps
-from .record.edits import UNCHANGED, StepEdit, edits_by_number, feet
+from .record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
 from .record.footprints import QUANTUM, Footprint
+from .record.mesh_sole import MeshSole
 from .record.record import BakeRecord
 
 Array = NDArray[np.float64]
@@ -89,6 +90,7 @@ class EditedSteps:
         self._margin = max(sliding, self._weather_reach)
         self._points: dict[int, SolePoints] = {}
         self._feet = feet(footprints)
+        self._meshes: dict[MeshSole, PressingSole] = {}
         self._scaled: dict[tuple[int, float], PressingSole] = {}
         self._layouts: dict[Change, _Layout] = {}
         """Of the group that was pressed last: they take memory."""
@@ -303,7 +305,7 @@ class EditedSteps:
                 "or give the mesh fewer vertices."
             )
         steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
-        other = kept.pressing if kept.pressing.sole.prop else self._feet.get(edit.sole, kept.pressing)
+        other = self._shared(sole_of(edit, kept.pressing, self._feet), edit)
         pressing, steps = edited_contact(kept.pressing, steps, other, edit, footprint.position, self._ground.terrain)
         if pressing is not other:  # scaled, of which there is one
             pressing = self._scaled.setdefault((id(other), edit.scale), pressing)
@@ -319,6 +321,12 @@ class EditedSteps:
                 f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."
             )
         return layout
+
+    def _shared(self, pressing: PressingSole, edit: StepEdit) -> PressingSole:
+        """A sole, of a mesh the one that all edits with it share."""
+        if edit.mesh is None or pressing is not edit.mesh.pressing:
+            return pressing
+        return self._meshes.setdefault(edit.mesh, pressing)
 
     def _points_of(self, pressing: PressingSole) -> SolePoints:
         if id(pressing) not in self._points:

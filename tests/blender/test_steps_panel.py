@@ -12,15 +12,16 @@ import pytest
 from mathutils import Matrix
 
 from softground_addon.blender import session
-from softground_addon.blender.baking import bake_report, step_edits
+from softground_addon.blender.baking import bake_report, step_edits, step_soles
 from softground_addon.blender.baking.step_preview import StepPreview
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
-from softground_addon.blender.interface import baked_steps, step_dragging, steps_panel
+from softground_addon.blender.interface import baked_steps, step_dragging, step_editing, steps_panel
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import heights, rest
+from tests.blender.test_edited_steps import plate
 
 
 def bake_again(scene):
@@ -228,6 +229,72 @@ def test_a_step_takes_the_sole_of_another_foot(baked):
     assert np.abs(changed.outline()[:, None] - before).sum(axis=-1).min(axis=1).max() > 2e-3
     bpy.ops.softground.reset_step(step=step.name)
     np.testing.assert_array_equal(baked_steps.of(baked)[2].outline(), before)
+
+
+def test_a_step_takes_the_sole_of_a_mesh(baked):
+    before, shoe = stored(baked), plate(baked)
+    one, two = baked_steps.of(baked)[1:3]
+    bpy.ops.softground.change_step(step=one.name, sole="Shoe")
+    shod = baked_steps.of(baked)[1]
+    assert np.ptp(shod.outline()[:, :2], axis=0) == pytest.approx((0.1, 0.4), abs=0.05)  # it walks along -y
+    assert shod.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
+    assert not bake_report.stale_reasons(baked)
+    shoe.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert not bake_report.stale_reasons(baked)
+    shoe.scale = (1.0, 0.5, 1.0)
+    bpy.context.view_layer.update()
+    assert bake_report.stale_reasons(baked) == ("The mesh of 'Shoe', whose sole presses steps, has changed",)
+    bpy.ops.softground.mute_step(step=two.name)
+    assert baked_steps.of(baked)[1].left.area_m2 == shod.left.area_m2
+    assert bake_report.stale_reasons(baked)
+    bpy.ops.softground.change_step(step=two.name, sole="Shoe")  # as it is now, also for the other step
+    assert baked_steps.of(baked)[1].left.area_m2 == pytest.approx(0.1 * 0.2, rel=0.25)
+    assert not bake_report.stale_reasons(baked)
+    shoe.hide_set(True)
+    shoe.hide_viewport = True
+    edited = stored(baked)
+    bpy.ops.softground.bake()
+    assert record.dump(record.load(stored(baked))) == record.dump(record.load(edited))
+    bpy.ops.softground.reset_steps()
+    assert stored(baked) == before
+    assert not bake_report.stale_reasons(baked)
+
+
+def test_a_step_is_added_in_the_sole_of_a_mesh(baked):
+    plate(baked)
+    step = baked_steps.of(baked)[1]
+    bpy.ops.softground.choose_step(step=step.name)
+    baked.cursor.location = (0.35, -0.8, 0.3)
+    bpy.ops.softground.add_step(sole="Shoe")
+    added = baked_steps.active(baked)
+    assert (added.is_copy, added.edit.sole) == (True, "Shoe")
+    assert added.left.area_m2 == pytest.approx(0.1 * 0.4, rel=0.15)
+    np.testing.assert_allclose(added.left.position[:2], (0.35, -0.8), atol=0.03)
+
+
+def test_a_mesh_points_its_toes_along_y_and_its_left_along_x(baked):
+    shoe = plate(baked)
+    shoe.data.clear_geometry()
+    corners = [(-0.05, 0.2), (0.05, 0.2), (0.05, -0.2)]  # a heel 10 cm wide, and the tip of the toes at the left
+    shoe.data.from_pydata([(x, y, z) for z in (0.0, 0.1) for x, y in corners], [], [(0, 1, 2), (3, 4, 5)])
+    outline = step_soles.read(shoe, baked.softground.ground, 1.0).pressing.sole.outline
+    toes = outline[outline[:, 0] > outline[:, 0].max() - 0.02]
+    heel = outline[outline[:, 0] < outline[:, 0].min() + 0.02]
+    assert np.ptp(toes[:, 1]) < 0.03
+    assert np.ptp(heel[:, 1]) > 0.08
+    assert toes[:, 1].mean() > heel[:, 1].mean() + 0.03
+
+
+def test_soles_are_offered_by_name(baked):
+    plate(baked)
+    offered = step_editing._soles(None, bpy.context, "")
+    assert offered[-2:] == ["Shoe", "Walker Figure"]
+    assert baked.softground.ground.name not in offered
+    assert set(baked_steps.of(baked)[0].feet) < set(offered)
+    assert step_editing._soles(None, bpy.context, "shO") == ["Shoe"]
+    with pytest.raises(RuntimeError, match="is the ground and cannot print on itself"):
+        bpy.ops.softground.change_step(step=baked_steps.of(baked)[1].name, sole=baked.softground.ground.name)
 
 
 def test_the_panel_lists_the_steps_around_the_chosen_one(baked):

@@ -1,5 +1,6 @@
 """Edited steps are pressed again, as a simulation of the whole edited motion would press them."""
 
+import json
 import time
 from dataclasses import replace
 from functools import cache
@@ -15,9 +16,11 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record import record
-from softground_addon.core.record.edits import StepEdit, step_id, without_sole
+from softground_addon.core.record.edits import StepEdit, from_json, step_id, to_json, without_sole
 from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.mesh_sole import MeshSole
 from softground_addon.core.record.record import BakeRecord
+from softground_addon.core.soles.soles import sole_from_underside
 from tests.core.walkers import FOOT_LENGTH, box_sole, foot_sole, pose, pressed, standing, walk
 
 SOIL = GroundMaterial(0.3e6, 0.35, 0.15)
@@ -177,6 +180,62 @@ def test_a_step_in_another_sole_is_pressed_as_a_simulation_of_that_sole():
     assert after.area_m2 > 1.5 * left.footprints[0].area_m2
 
 
+def mesh_sole(name="Shoe", length=0.4, width=0.15):
+    """The sole of a box that stands level, with its mesh."""
+    corners = np.array([(x, y, z) for x in (0, length) for y in (0, width) for z in (0, 0.1)], float)
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([[face[k] for k in half] for face in faces for half in ((0, 1, 2), (0, 2, 3))])
+    placed = sole_from_underside(corners - [length / 2, width / 2, 0.0], triangles, name=name, side="")
+    return MeshSole.of(placed.sole, placed.placements)
+
+
+def test_a_step_in_the_sole_of_a_mesh_is_pressed_as_a_simulation_of_that_sole():
+    place, heading, mesh = np.array([0.5, 0.2, 0.0]), 0.4, mesh_sole()
+    foot = standing(foot_sole("foot.L", "L"), place, 600.0, heading=heading)
+    left = BakeRecord(tuple(pressed(foot, SOIL, CELL)[1]), {})
+    outlines = foot.motion.soles[0].sole.outline, mesh.pressing.sole.outline
+    middles = [(one.min(axis=0) + one.max(axis=0)) / 2 for one in outlines]
+    there = pose(place, heading)[:3, :3] @ [*(middles[0] - middles[1]), 0.0] + place
+    _, (expected,) = pressed(standing(mesh.pressing.sole, there, 600.0, heading=heading), SOIL, CELL)
+    after = edited(left, {0: StepEdit(sole="Shoe", mesh=mesh)}).pressed_again[0]
+    assert difference(recompose([expected]), recompose([after])) < 1e-6
+    assert after.area_m2 == pytest.approx(0.4 * 0.15, rel=0.05)
+
+
+def test_the_sole_of_a_mesh_is_kept_with_the_edits():
+    _, left = baked()
+    mesh = mesh_sole()
+    after = edited(left, {1: StepEdit(sole="Shoe", mesh=mesh), 2: StepEdit(sole="Shoe", mesh=mesh, mute=True)})
+    assert without_sole(left.footprints, after.edits) == []
+    assert from_json(json.loads(json.dumps(to_json(after.edits))), "It") == after.edits
+    stored = record.load(record.dump(after))
+    assert stored.edits == after.edits
+    again = with_edits(BakeRecord(left.footprints, {}), stored.edits, ground_of(), CELL)
+    assert record.dump(again) == record.dump(after)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda sole: sole.pop("coded"), "'numbers' and 'coded'"),
+        (lambda sole: sole["coded"].pop(), "cut short"),
+        (lambda sole: sole["numbers"].append(1.0), "more than"),
+        (lambda sole: sole["numbers"].__setitem__(3, float("nan")), "no number of its kind"),
+        (lambda sole: sole["numbers"].__setitem__(3, "1"), "what is no number"),
+        (lambda sole: sole["coded"].__setitem__(0, 0.5), "no whole number"),
+        (lambda sole: sole.update(numbers=[1e3 * value for value in sole["numbers"]]), "this is no sole of a mesh"),
+    ],
+)
+def test_a_kept_sole_that_is_none_is_named(change, said):
+    edits = {"Walker/foot.L@7.0": StepEdit(sole="Shoe", mesh=mesh_sole())}
+    content = json.loads(json.dumps(to_json(edits)))
+    change(content["soles"]["Shoe"])
+    with pytest.raises(InputError, match="Leave it out: a bake cuts it from the object") as caught:
+        from_json(content, "The edits")
+    assert str(caught.value).startswith("The edits, sole 'Shoe': ")
+    assert said in str(caught.value)
+
+
 def test_a_foot_of_the_same_shape_leaves_the_same_print():
     twin = walk(steps=3, origin=(0.0, 2.0, 0.0), heading=0.7, name="twin")
     one = walk(steps=3, origin=(0.0037, 0.0021, 0.0))  # nothing lies on the border of a cell
@@ -234,15 +293,19 @@ def test_a_step_off_the_ground_leaves_nothing():
     assert record.dump(record.load(record.dump(gone))) == record.dump(gone)
 
 
+SOLES = [StepEdit(sole=name) for name in ("", "walker/foot.L", "walker/foot.R", "fox/paw.L")] + [
+    StepEdit(sole="Shoe", mesh=mesh_sole()),
+    StepEdit(sole="Cane", mesh=mesh_sole("Cane", 0.05, 0.05)),
+]
 CHANGES = st.builds(
-    StepEdit,
+    replace,
+    st.sampled_from(SOLES),
     mute=st.booleans(),
     strength=st.floats(0.0, 3.0),
     move_m=st.tuples(st.floats(-1.5, 1.5), st.floats(-0.3, 0.3)),
     turn_deg=st.floats(-180.0, 180.0),
     scale=st.floats(0.5, 1.5),
     shift_frames=st.integers(-30, 30),
-    sole=st.sampled_from(["", "walker/foot.L", "walker/foot.R", "fox/paw.L"]),
 )
 
 

@@ -27,7 +27,7 @@ from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
 from ...core.record import record
-from ...core.record.edits import StepEdit
+from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.relief_plan import with_shoe_treads
@@ -43,7 +43,7 @@ from ..jobs import Job, Progress, meanwhile
 from ..reading import staleness
 from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_of
 from ..response import response_job
-from . import bake_report, debris_job
+from . import bake_report, debris_job, step_soles
 from .bake_checks import check_volumes, copy_findings, coverage, coverage_findings, shortest_sole, wants_detail
 from .publish import at_the_end, publish, sign
 
@@ -106,8 +106,8 @@ def bake(
     )
     sampled = time.perf_counter()
 
-    if edits is None:
-        edits = baked_ground.edits_of(settings.found(wanted.ground)) if wanted.ground else {}
+    edits = step_soles.edits_with_soles(scene, wanted, edits)
+    movers |= staleness.of_soles(scene, mesh_soles(edits))
     loads, left, forces, responses = yield from _press(wanted, shot, edits)
     left, debris = debris_job.thrown(wanted, shot.terrain, loads, left)
     footprints = left.footprints

@@ -64,9 +64,9 @@ def edit_findings(left: BakeRecord) -> list[Finding]:
         Finding(
             "edit_without_sole",
             "warning",
-            f"Step '{name}' is to be pressed by the sole '{left.edits[name].sole}', which no foot in this bake has: "
-            "its own sole pressed it.",
-            "It is kept for when that foot makes a step; choose another sole, or reset the step.",
+            f"Step '{name}' is to be pressed by the sole '{left.edits[name].sole}', which no foot in this bake and no "
+            "mesh of this scene has: its own sole pressed it.",
+            "It is kept for when that foot or mesh is there; choose another sole, or reset the step.",
         )
         for name in without_sole(left.footprints, left.edits)
     ]

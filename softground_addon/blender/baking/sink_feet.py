@@ -8,6 +8,7 @@ from dataclasses import replace
 import bpy
 
 from ...core.errors import InputError
+from ...core.record.edits import mesh_soles
 from ...core.settings import Acts, BakeSettings
 from .. import settings
 from ..characters.character_setup import characters_of
@@ -31,6 +32,9 @@ def sink_feet(scene: bpy.types.Scene) -> Job[BakeResult]:
         raise InputError("No character here has feet to lower: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     hashes = {} if bake_report.stale_reasons(scene) else staleness.of_movers(scene, wanted)
+    if hashes and wanted.ground:
+        edits = baked_ground.edits_of(settings.found(wanted.ground))
+        hashes |= staleness.of_soles(scene, mesh_soles(edits))
     result = yield from bake(scene, wanted=wanted)
     options = scene.softground
     options.grounding.by_button |= not options.grounding.use

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from ...core.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record
-from ...core.record.edits import UNCHANGED, StepEdit, is_copy
+from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..after import debris_object
@@ -93,7 +94,20 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
     renewed = summary | bake_report.summary_of_prints(left.edited)
     ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
     ground_mesh.note_warnings(written.display_mesh, warnings)
-    staleness.store_again(scene.softground.ground, stamp, bake.made_with.painted)
+    staleness.store_again(
+        scene.softground.ground, stamp, bake.made_with.painted, _sole_hashes(scene, stamp, bake, edits)
+    )
+
+
+def _sole_hashes(
+    scene: bpy.types.Scene, stamp: str, bake: EditableBake, edits: Mapping[str, StepEdit]
+) -> dict[str, str]:
+    """Hashes of the meshes whose soles press steps, of those that were not read again as they were noted."""
+    soles, before = mesh_soles(edits), mesh_soles(bake.left.edits)
+    noted: dict[str, str] = json.loads(stamp) if stamp else {}
+    now = staleness.of_soles(scene, soles)
+    same = {f"{staleness.SOLE}:{name}" for name, sole in soles.items() if before.get(name) == sole}
+    return {key: noted.get(key, value) if key in same else value for key, value in now.items()}
 
 
 def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:

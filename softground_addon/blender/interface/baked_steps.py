@@ -15,7 +15,7 @@ from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record
 from ...core.record.contact_steps import PressingSole, Steps
-from ...core.record.edits import UNCHANGED, StepEdit, feet
+from ...core.record.edits import UNCHANGED, StepEdit, feet, sole_of
 from ...core.record.footprints import Footprint
 from .. import session
 from ..ground import baked_ground
@@ -73,7 +73,7 @@ class BakedStep(record.EditableStep):
         edit = edit or self.edit
         turn = rotation(np.array([0.0, 0.0, np.radians(edit.turn_deg)]))[:2, :2]
         middle = self.baked.position[:2]
-        outline = edit.scale * (self._outline_of(edit.sole) - middle) @ turn.T + middle + edit.move_m
+        outline = edit.scale * (self._outline_of(edit) - middle) @ turn.T + middle + edit.move_m
         return np.column_stack([outline, np.full(len(outline), self.height)])
 
     def ahead(self) -> tuple[float, float]:
@@ -89,13 +89,13 @@ class BakedStep(record.EditableStep):
         made_by = self.baked.pressed_by
         return made_by is not None and made_by.pressing.sole.prop is None
 
-    def _outline_of(self, sole: str) -> Array:
+    def _outline_of(self, edit: StepEdit) -> Array:
         """Seen from above, in the place of the bake, (N, 2) [m]: of a foot a sole, of a prop what it touched."""
-        return self._sole_outline(sole) if self.has_foot else self._touched
+        return self._sole_outline(edit) if self.has_foot else self._touched
 
-    def _sole_outline(self, sole: str) -> Array:
+    def _sole_outline(self, edit: StepEdit) -> Array:
         steps, own = self._at_peak
-        other = self.feet.get(sole, own)
+        other = sole_of(edit, own, self.feet)
         pose = swapped(steps, own, other).poses[0, 0]
         return np.asarray(other.sole.outline @ pose[:2, :2].T + pose[:2, 3])
 

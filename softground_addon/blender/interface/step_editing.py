@@ -12,9 +12,21 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ...core.errors import InputError
-from ...core.record.edits import FARTHEST, LARGEST, LONGEST_SHIFT, SMALLEST, STRONGEST, StepEdit, new_copy, with_edit
+from ...core.record.edits import (
+    FARTHEST,
+    LARGEST,
+    LONGEST_SHIFT,
+    SMALLEST,
+    STRONGEST,
+    StepEdit,
+    mesh_soles,
+    new_copy,
+    with_edit,
+    with_meshes,
+)
+from ...core.record.mesh_sole import MeshSole
 from .. import session, settings
-from ..baking import step_edits
+from ..baking import step_edits, step_soles
 from ..ground import baked_ground
 from ..live import live
 from ..operator_base import OnBake, reports_errors
@@ -77,6 +89,8 @@ def copied(scene: bpy.types.Scene, copies: Iterable[tuple[BakedStep, StepEdit]])
     for step, edit in copies:
         names.append(new_copy(edits, step.baked))
         edits[names[-1]] = edit
+        if edit.mesh is not None:
+            edits = with_meshes(edits, {edit.sole: edit.mesh})
     show(scene, edits)
     session.choose_steps(names[0], names)
 
@@ -135,10 +149,22 @@ class SOFTGROUND_OT_mute_step(OnStep, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _feet(_: object, context: bpy.types.Context, text: str) -> list[str]:
-    """Names of soles in the bake, as far as they contain a text."""
-    steps = baked_steps.of(settings.scene_of(context))
-    return sorted(name for name in (steps[0].feet if steps else ()) if text.lower() in name.lower())
+def _soles(_: object, context: bpy.types.Context, text: str) -> list[str]:
+    """Names of soles in the bake, and below them of meshes in the scene, as far as they contain a text."""
+    scene = settings.scene_of(context)
+    steps = baked_steps.of(scene)
+    meshes = {*step_soles.names(scene), *mesh_soles({step.name: step.edit for step in steps})}
+    names = [*sorted(steps[0].feet if steps else ()), *sorted(meshes)]
+    return [name for name in names if text.lower() in name.lower()]
+
+
+def _sole_property() -> Any:
+    return StringProperty(
+        name="Sole",
+        description="What presses the step: a foot of this bake, also of another character, or a mesh as it stands in "
+        "the scene, with its toes along -Y. Its own sole if empty",
+        search=_soles,
+    )
 
 
 class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
@@ -174,12 +200,7 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
         min=SMALLEST,
         max=LARGEST,
     )
-    sole: StringProperty(
-        name="Sole",
-        description="Contact of this bake whose sole presses the step, such as a foot of another character; its own "
-        "where empty",
-        search=_feet,
-    )
+    sole: _sole_property()
     shift: IntProperty(
         name="Later", description="Number of frames by which the step is later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
     )
@@ -208,19 +229,37 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
         }
         # of several steps, only what was changed of the first
         new = {key: value for key, value in wanted.items() if value != getattr(steps[0].edit, key)}
-        if new.get("sole"):
-            _check_sole(steps, self.sole)
-        show(scene, changed(scene, [(step, replace(step.edit, **new)) for step in steps]))
+        mesh = None
+        if "sole" in new:
+            new["mesh"] = mesh = _mesh(scene, steps, self.sole)
+        edits = changed(scene, [(step, replace(step.edit, **new)) for step in steps])
+        show(scene, with_meshes(edits, {self.sole: mesh}) if mesh else edits)
         return {"FINISHED"}
 
 
-def _check_sole(steps: Sequence[BakedStep], sole: str) -> None:
-    """Raise InputError where a sole cannot press some steps."""
-    if sole not in steps[0].feet:
-        raise InputError(f"The bake has no sole '{sole}': choose one of {', '.join(sorted(steps[0].feet)) or 'none'}.")
+def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> MeshSole | None:
+    """The sole of the mesh that is to press some steps; None for a foot of the bake, and for their own.
+
+    Raises
+    ------
+    InputError
+        If it cannot press them.
+    """
+    if not sole:
+        return None
     for step in steps:
         if not step.has_foot:
             raise InputError(f"No foot made step '{step.name}': change the sole of steps that feet made.")
+    if sole in steps[0].feet:
+        return None
+    obj = step_soles.object_of(scene, sole)
+    kept = mesh_soles(baked_ground.edits_of(scene.softground.ground))
+    if obj is None and sole not in kept:
+        feet = ", ".join(sorted(steps[0].feet)) or "none"
+        raise InputError(f"The bake has no sole '{sole}': choose one of {feet}; or a mesh object of this scene.")
+    if obj is None:
+        return kept[sole]
+    return step_soles.read(obj, scene.softground.ground, scene.unit_settings.scale_length)
 
 
 class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
@@ -238,11 +277,17 @@ class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
-    """Press the sole of this step at the 3D cursor too, starting at the current frame"""
+    """Press this step at the 3D cursor too, starting at the current frame. Adjust Last Operation has its sole"""
 
     bl_idname = "softground.add_step"
     bl_label = "Add at Cursor"
     bl_options = {"REGISTER", "UNDO"}
+
+    sole: _sole_property()
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.sole = ""  # that of the step, and not what was chosen for the one before
+        return self.execute(context)
 
     @reports_errors
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -256,6 +301,8 @@ class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
                 f"Step '{step.name}' is {abs(shift)} frames away; a copy comes at most {LONGEST_SHIFT} earlier or "
                 "later: go nearer to it, or choose another step."
             )
+        if self.sole:
+            edit = replace(edit, sole=self.sole, mesh=_mesh(scene, [step], self.sole))
         copied(scene, [(step, replace(edit, mute=False, shift_frames=shift))])
         return {"FINISHED"}
 

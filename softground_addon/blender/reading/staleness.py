@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -24,11 +24,11 @@ from ..ground.own_data import FINGERPRINTS
 from . import input_hashes
 
 SETTINGS, GROUND, SURFACE, PRINTS = "settings", "ground", "surface", "prints"
-ANIMATION, PLACE, MOVEMENT, BODY = "animation", "place", "movement", "body"
+ANIMATION, PLACE, MOVEMENT, BODY, SOLE = "animation", "place", "movement", "body", "sole"
 VERSION = "version"
 _WRITING = "writing"
 """Of version 0.1: how its prints were put on the ground."""
-_OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY)
+_OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY, SOLE)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
 _UNKNOWN = "The bake does not say what it was made from"
@@ -49,7 +49,7 @@ def store(inputs: Mapping[str, Any], ground: bpy.types.Object, hashes: Mapping[s
         Settings that it was made with, as `BakeSettings.inputs` has them.
     ground : bpy.types.Object
     hashes : mapping of str to str
-        From `of_movers`, as they were when they were read.
+        From `of_movers` and `of_soles`, as they were when they were read.
     """
     painted = inputs["painted"]
     stamp = {VERSION: SERIES, **_of_settings(inputs), **_of_bake(ground, painted), **hashes}
@@ -61,10 +61,15 @@ def stamp_of(ground: bpy.types.Object) -> str:
     return str(ground_mesh.mesh_of(display_mesh_of(ground)).get(FINGERPRINTS, ""))
 
 
-def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str]) -> None:
-    """Note with a ground's bake what an earlier one of the same inputs was made from, from `stamp_of`."""
+def store_again(ground: bpy.types.Object, stamp: str, painted: Sequence[str], soles: Mapping[str, str]) -> None:
+    """Note with a ground's bake what an earlier one of the same inputs was made from, from `stamp_of`.
+
+    `soles` are of the meshes whose soles press steps now, from `of_soles`.
+    """
     if stamp:
-        renewed = json.loads(stamp) | _of_bake(ground, painted)
+        noted: dict[str, str] = json.loads(stamp)
+        others = {key: value for key, value in noted.items() if not key.startswith(f"{SOLE}:")}
+        renewed = others | dict(soles) | _of_bake(ground, painted)
         ground_mesh.mesh_of(display_mesh_of(ground))[FINGERPRINTS] = json.dumps(renewed)
 
 
@@ -91,6 +96,8 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         inputs = wanted.inputs(Acts.WRITING)
         now = {**_of_settings(inputs), **_of_bake(ground, wanted.painted), **of_movers(scene, wanted)}
+        soles = {key: value for key, value in then.items() if key.startswith(f"{SOLE}:")}
+        now |= soles | of_soles(scene, [key.removeprefix(f"{SOLE}:") for key in soles])  # those that are gone last
         if SETTINGS in then:
             now |= _as_in_0_1(inputs)
         left_out = (VERSION,) if then.get(VERSION) == SERIES else _OF_VERSION
@@ -110,6 +117,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
         PLACE: "'{}' or a parent of it was moved",
         MOVEMENT: "The rig of '{}', or what it follows, has changed",
         BODY: "The mesh of '{}' that prints has changed",
+        SOLE: "The mesh of '{}', whose sole presses steps, has changed",
     }
     kinds = (key.partition(":") for key in changed)
     return tuple(
@@ -127,6 +135,20 @@ def of_movers(scene: bpy.types.Scene, wanted: BakeSettings) -> dict[str, str]:
         **{f"{MOVEMENT}:{mover.name}": _of_movement(mover, ground) for mover in movers},
         **{f"{BODY}:{one.name}": _of_body(scene, one) for one in wanted.characters},
     }
+
+
+def of_soles(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, str]:
+    """Hashes of the meshes whose soles press edited steps, of those that are there; where they stand does not count."""
+    wanted = set(names)
+    objects = [obj for obj in scene.objects if obj.name_full in wanted and obj.type == "MESH"] if wanted else []
+    return {f"{SOLE}:{obj.name_full}": _of_sole(obj) for obj in objects}
+
+
+def _of_sole(obj: bpy.types.Object) -> str:
+    matrix = ground_mesh.placed_by_parents(obj)
+    turned = np.round(np.array(obj.matrix_world if matrix is None else matrix)[:3, :3], 5) + 0.0
+    modifiers = (text for modifier in obj.modifiers for text in input_hashes.of_settings(modifier))
+    return input_hashes.joined([_of_mesh(obj), *modifiers, f"{zlib.crc32(turned.tobytes()):08x}"])
 
 
 def of_ground(wanted: BakeSettings) -> dict[str, str]:

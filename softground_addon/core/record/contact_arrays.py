@@ -43,7 +43,7 @@ def to_columns(contacts: Sequence[ContactSteps | None]) -> tuple[list[dict[str, 
             values[4:7], values[7], values[8] = one.origin, one.peak, one.count
         numbers.append(values)
     kept = [pressing for _, pressing in soles.values()]
-    flat, maps = zip(*map(_of_sole, kept), strict=True) if kept else ((), ())
+    flat, maps = zip(*map(sole_to_arrays, kept), strict=True) if kept else ((), ())
     columns: Columns = {
         "contact.numbers": list(numbers),
         "contact.coded": [one.coded for one in contacts if one is not None],
@@ -75,6 +75,15 @@ def from_columns(
     return contacts
 
 
+def sole_from_arrays(name: str, numbers: Array, maps: NDArray[np.int32]) -> PressingSole:
+    """One sole from what `sole_to_arrays` gave; ValueError where the parts do not fit each other."""
+    readers = _Reader(numbers), _Reader(maps)
+    pressing = _sole({"name": name, "side": ""}, *readers)
+    for reader in readers:
+        reader.check_all_read()
+    return pressing
+
+
 def _contact(row: Array, soles: Sequence[PressingSole], steps: _Reader) -> ContactSteps | None:
     if row[0] < 0:
         return None
@@ -88,8 +97,8 @@ def _contact(row: Array, soles: Sequence[PressingSole], steps: _Reader) -> Conta
     return ContactSteps(pressing, first, approach, float(row[3]), row[4:7].copy(), float(row[7]), coded_steps)
 
 
-def _of_sole(pressing: PressingSole) -> tuple[Array, NDArray[np.int32]]:
-    """The numbers of a sole, and what is coded of it."""
+def sole_to_arrays(pressing: PressingSole) -> tuple[Array, NDArray[np.int32]]:
+    """The numbers of a sole [m], and what is coded of it in units of `LENGTH`."""
     sole, prop = pressing.sole, pressing.sole.prop
     numbers: list[Any] = [len(pressing.flat), pressing.flat, len(sole.landmarks), sole.landmarks, sole.landmark_patch]
     numbers += [len(sole.outline), sole.outline, len(sole.patches)]

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..errors import InputError
+from . import mesh_sole
 from .contact_steps import PressingSole
 from .footprints import Footprint
+from .mesh_sole import MeshSole
 
 SCHEMA_VERSION = 1
 
@@ -49,7 +51,10 @@ class StepEdit:
     shift_frames : int
         How many frames later it presses.
     sole : str
-        Character and contact whose sole presses it, such as `Fox/paw.L`; its own where empty, or not in the bake.
+        Character and contact whose sole presses it, such as `Fox/paw.L`, or the name of a mesh object; its own where
+        empty, or not known.
+    mesh : MeshSole or None
+        Of that object, as it was when it was read last; None for a foot of the bake.
     """
 
     mute: bool = False
@@ -59,10 +64,11 @@ class StepEdit:
     scale: float = 1.0
     shift_frames: int = 0
     sole: str = ""
+    mesh: MeshSole | None = None
 
 
 UNCHANGED = StepEdit()
-_FIELDS = tuple(field.name for field in fields(StepEdit))
+_FIELDS = tuple(field.name for field in fields(StepEdit) if field.name != "mesh")
 
 
 def step_id(footprint: Footprint, copy: int = 0) -> str:
@@ -128,9 +134,35 @@ def without_step(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit])
 
 
 def without_sole(footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]) -> list[str]:
-    """Ids of edits whose sole is that of no foot in the bake."""
+    """Ids of edits whose sole is that of no foot in the bake and of no mesh."""
     known = {"", *feet(footprints)}
-    return [name for name, edit in edits.items() if edit.sole not in known]
+    return [name for name, edit in edits.items() if edit.sole not in known and edit.mesh is None]
+
+
+def sole_of(edit: StepEdit, own: PressingSole, known: Mapping[str, PressingSole]) -> PressingSole:
+    """The sole that presses a step.
+
+    Parameters
+    ----------
+    edit : StepEdit
+    own : PressingSole
+        That made the step: a foot may be swapped, a prop may not.
+    known : mapping of str to PressingSole
+        From `feet`.
+    """
+    if own.sole.prop is not None:
+        return own
+    return known.get(edit.sole) or (edit.mesh.pressing if edit.mesh else own)
+
+
+def mesh_soles(edits: Mapping[str, StepEdit]) -> dict[str, MeshSole]:
+    """The soles of meshes that edits keep, by the names of the objects."""
+    return {edit.sole: edit.mesh for edit in edits.values() if edit.mesh is not None}
+
+
+def with_meshes(edits: Mapping[str, StepEdit], meshes: Mapping[str, MeshSole]) -> dict[str, StepEdit]:
+    """Edits with other soles of the meshes that they name; where none is known, with what they keep."""
+    return {name: replace(edit, mesh=meshes.get(edit.sole, edit.mesh)) for name, edit in edits.items()}
 
 
 def feet(footprints: Sequence[Footprint]) -> dict[str, PressingSole]:
@@ -173,21 +205,23 @@ def _parts(name: str) -> tuple[str, float, int]:
 
 
 def to_json(edits: Mapping[str, StepEdit]) -> dict[str, Any]:
-    """The edits for JSON; what is unchanged is left out.
+    """The edits for JSON, with the soles of meshes that they need; what is unchanged is left out.
 
     Examples
     --------
     >>> to_json({"Walker/foot.L@36.5": StepEdit(mute=True)})
     {'schema_version': 1, 'steps': {'Walker/foot.L@36.5': {'mute': True}}}
     """
+    soles = {name: mesh.to_json() for name, mesh in mesh_soles(edits).items()}
     return {
         "schema_version": SCHEMA_VERSION,
         "steps": {name: edit_as_json(edit) for name, edit in edits.items()},
+        **({"soles": soles} if soles else {}),
     }
 
 
 def edit_as_json(edit: StepEdit) -> dict[str, Any]:
-    """What one edit changes, for JSON.
+    """What one edit changes, for JSON; of a mesh, its name.
 
     Examples
     --------
@@ -222,8 +256,13 @@ def from_json(content: object, origin: str) -> dict[str, StepEdit]:
         raise InputError(
             f"{origin} is of version {content.get('schema_version')!r}; this SoftGround reads version {SCHEMA_VERSION}."
         )
-    _check_fields(content, ("schema_version", "steps"), origin)
-    return {name: _edit(name, change, origin) for name, change in steps.items()}
+    _check_fields(content, ("schema_version", "steps", "soles"), origin)
+    if not isinstance(soles := content.get("soles", {}), dict):
+        raise InputError(f"{origin}: 'soles' must be a table by the names of objects.")
+    edits = {name: _edit(name, change, origin) for name, change in steps.items()}
+    named = {edit.sole for edit in edits.values()} & soles.keys()
+    read = {name: mesh_sole.from_json(name, soles[name], f"{origin}, sole {name!r}") for name in sorted(named)}
+    return with_meshes(edits, read)
 
 
 def _edit(name: str, change: object, origin: str) -> StepEdit:
@@ -254,7 +293,7 @@ def _is_move(value: object) -> bool:
 
 def _is_sole(value: object) -> bool:
     try:
-        return isinstance(value, str) and len(value.encode()) <= LONGEST_NAME and (value == "" or "/" in value)
+        return isinstance(value, str) and len(value.encode()) <= LONGEST_NAME
     except UnicodeEncodeError:  # half a character
         return False
 
@@ -265,7 +304,10 @@ _VALID: dict[str, tuple[Callable[[Any], bool], str]] = {
     "move_m": (_is_move, f"two numbers up to {FARTHEST:g} m, along x and y"),
     "turn_deg": (lambda value: _is_number(value, -360.0, 360.0), "a number from -360 to 360"),
     "scale": (lambda value: _is_number(value, SMALLEST, LARGEST), f"a number from {SMALLEST:g} to {LARGEST:g}"),
-    "sole": (_is_sole, "the character and contact of a step, such as 'Fox/paw.L'"),
+    "sole": (
+        _is_sole,
+        f"a foot of the bake, such as 'Fox/paw.L', or a mesh object, in at most {LONGEST_NAME} bytes",
+    ),
     "shift_frames": (
         lambda value: _is_number(value, -LONGEST_SHIFT, LONGEST_SHIFT) and value == int(value),
         f"a whole number from -{LONGEST_SHIFT} to {LONGEST_SHIFT}",
