@@ -43,8 +43,8 @@ MOST_TRIALS = 60
 SOFTEST, STIFFEST = 1e3, 1e10
 """Range in which a modulus is searched [Pa]."""
 TAKES_NO_PRINT = (
-    "No stiffness gives a print: the ground takes none under the feet. Look at what is painted on it, and at the crust "
-    "of its material."
+    "No stiffness gives a print: the ground takes none under the feet. Check the masks, and the crust "
+    "in Advanced > Layers."
 )
 
 
@@ -225,6 +225,6 @@ def matching_modulus(
             return modulus
         low, high = (modulus, high) if found > depth else (low, modulus)
     raise InputError(
-        f"Prints of {depth * 100:.3g} cm cannot be reached with feet that rest so briefly on the ground: shorten the "
-        "ground's time, or choose a smaller depth."
+        f"The feet touch the ground too briefly for prints of {depth * 100:.3g} cm: lower Settling Time in Advanced > "
+        "Realism, or choose a smaller depth."
     )

@@ -66,7 +66,7 @@ def asked_of(inputs: Mapping[str, Any]) -> ReliefSettings | None:
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         known, numbers, treads = False, [], {}
     if not known or not all(math.isfinite(number) and number >= 0 for number in numbers):
-        raise InputError("The stored record of the footprints says nothing sensible of its relief: bake again.")
+        raise InputError("The stored relief of the footprints is damaged: bake again.")
     strength, tread = numbers
     if not strength > 0:
         return None

@@ -100,8 +100,8 @@ def self_check(
             found += yield from _skin(motion, motion.skin, steps, terrain, ground)
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
-        message = f"{unplaced * 1e6:.0f} cm³ of displaced ground found no room at the edge of the ground"
-        found.append(Finding("rim_off_ground", "note", message, "make it larger."))
+        message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
+        found.append(Finding("rim_off_ground", "note", message, "make the ground larger."))
     return found
 
 
@@ -120,7 +120,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
             "no_print",
             "error",
             f"'{motion.name}' leaves no print in these frames",
-            "check in Contacts, under Advanced, that its soles are what touches the ground, and in the viewport "
+            "check in Advanced > Contacts that its soles are what touches the ground, and in the viewport "
             "that they face down.",
         )
     else:
@@ -142,7 +142,7 @@ def _prints(character: CharacterLoads, steps: Sequence[Footprint], ground: str) 
         yield Finding(
             "walks_in_place",
             "warning",
-            f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while they stand, and print over "
+            f"'{motion.name}' walks on the spot: its feet slide at {belt:.1f} m/s while planted, and print over "
             "each other.",
             "Press Walk Ahead in the Character panel, or use the animation with its root motion.",
         )
@@ -171,14 +171,14 @@ def _size(motion: CharacterMotion, cell_size: float) -> Iterator[Finding]:
             f"Press Scale by {scale} in the Character panel, or leave it if the size is intended.",
         )
         return  # with its size, the mass that suits it changes
-    likely, by = motion.skin.mass if motion.skin else 0.0, "what has the volume of its skin"
+    likely, by = motion.skin.mass if motion.skin else 0.0, "the volume of its skin"
     if not likely:
-        likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "a person on legs of its length"
+        likely, by = PERSON_MASS * (motion.leg_length / PERSON_LEG) ** 3, "the length of its legs"
     if not 1 / MASS_RANGE < motion.mass / likely < MASS_RANGE:
         yield Finding(
             "mass_of_size",
             "warning",
-            f"'{motion.name}' weighs {motion.mass:g} kg, and {by} about {float(f'{likely:.2g}'):g} kg.",
+            f"'{motion.name}' weighs {motion.mass:g} kg, but {by} suggests about {float(f'{likely:.2g}'):g} kg.",
             "Set Mass in the Character panel.",
         )
 
@@ -196,7 +196,7 @@ def _feet_apart(character: CharacterLoads) -> Iterator[Finding]:
         yield Finding(
             "feet_apart",
             "warning",
-            f"'{high}' of '{motion.name}' is {apart * 100:.1f} cm higher over the ground than '{low}' where it stands",
+            f"'{high}' of '{motion.name}' is planted {apart * 100:.1f} cm higher above the ground than '{low}'",
             "check that both soles have the right bones, and the ground level under them.",
         )
 
@@ -221,7 +221,7 @@ def _pace(character: CharacterLoads, steps: Sequence[Footprint]) -> Iterator[Fin
         yield Finding(
             "slow_motion",
             "note",
-            f"'{motion.name}' walks about {factor:.1f} times slower than legs of its length do",
+            f"'{motion.name}' walks about {factor:.1f} times slower than the length of its legs suggests",
             "set the frame rate of the scene to that of the animation, or leave it if slow motion is intended.",
         )
 
@@ -249,13 +249,13 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
             first, least, count = first if count else step.start_frame, min(least, share), count + 1
     if not count:
         return []
-    many = f"{count} steps of '{motion.name}' stand" if count > 1 else f"1 step of '{motion.name}' stands"
+    many = f"{count} steps of '{motion.name}' hang" if count > 1 else f"1 step of '{motion.name}' hangs"
     return [
         Finding(
             "edge_of_ground",
             "warning",
-            f"{many} on the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
-            "the sole, and the print ends there",
+            f"{many} over the edge of '{ground}', from frame {first:.0f} on, with as little as {least * 100:.0f} % of "
+            "the sole on it",
             "extend the ground beyond the steps.",
         )
     ]
@@ -356,7 +356,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"{len(alone)} of {seen} steps of '{motion.name}' print where no skin rests, from frame {alone[0]:.0f} "
                 "on",
-                "check in Contacts, under Advanced, that its contacts are the parts that touch the ground.",
+                "check in Advanced > Contacts that its contacts are the parts that touch the ground.",
             )
         )
     rests = touching.rests
@@ -368,7 +368,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
                 "error",
                 f"Skin of '{motion.name}' rests on the ground without a print in {len(missed)} frames, from frame "
                 f"{frames[missed[0]]:.0f} on",
-                "add what rests there with Add Contact, under Advanced.",
+                "add what rests there with Add Contact in Advanced > Contacts.",
             )
         )
     return found

@@ -105,7 +105,7 @@ def test_a_mass_that_does_not_suit_the_body_is_pointed_out(short_walk):
     character.mass = 10 * character.skin_mass
     (finding,) = bake(short_walk).report["self_check"]
     assert finding["code"] == "mass_of_size"
-    assert f"what has the volume of its skin about {character.skin_mass:g} kg" in finding["message"]
+    assert f"the volume of its skin suggests about {character.skin_mass:g} kg" in finding["message"]
 
 
 def test_a_body_scaled_after_it_was_added_is_weighed_at_its_new_size(short_walk):

@@ -333,8 +333,8 @@ def turned_into_the_ground(scene, thing):
         (without_faces, "'Ball' has no faces"),
         (with_a_vertex_nowhere, "mesh of 'Ball' has vertices without a valid position"),
         (weightless, "mass of 'Ball'"),
-        (unlinked, "object 'Ball' is gone"),
-        (removed, "object of 'Ball' is gone"),
+        (unlinked, "object 'Ball' was deleted"),
+        (removed, "object of 'Ball' was deleted"),
         (turned_into_the_ground, "'Ball' is the ground"),
     ],
 )

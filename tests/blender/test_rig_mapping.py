@@ -174,7 +174,7 @@ def test_a_quadruped_without_names_has_four_soles(scene):
 
 def test_a_rig_without_legs_is_refused_with_its_name_and_a_remedy(scene):
     armature = rigs.build("Snake", {f"Bone.{i}": ((0, 0.1 * i, 0), (0, 0.1 * i + 0.1, 0)) for i in range(8)})
-    with pytest.raises(InputError, match=r"Snake.*Choose the foot bones"):
+    with pytest.raises(InputError, match=r"Snake.*Add Contact"):
         map_rig(armature)
 
 

@@ -358,7 +358,7 @@ def with_broken_keys(armature):
         (flattened, r"'Human' is stretched or sheared .*apply it"),
         (sheared, r"'Human' is stretched or sheared"),
         (vanished, r"'Human' has a scale of zero"),
-        (in_edit_mode, r"'Human' is in edit mode"),
+        (in_edit_mode, r"'Human' is in Edit Mode"),
         (at_rest, r"'Human' shows its rest position"),
         (with_broken_keys, r"'Human' has no finite pose at frame \d+"),
         (lambda armature: armature.animation_data_clear(), r"'Human' has no animation"),
@@ -384,7 +384,7 @@ def test_what_cannot_be_used_is_refused_with_object_and_remedy(scene, spoil, mes
         ({"frames": range(9, 1, -1)}, "start before the end"),
         ({"mapping": RigMapping()}, "nothing else to print with"),
         ({"mapping": RigMapping(soles=(SoleSource("foot"),))}, "neither a bone nor an object"),
-        ({"mapping": RigMapping(soles=(SoleSource("foot", object="Gone"),))}, "'Gone' is gone"),
+        ({"mapping": RigMapping(soles=(SoleSource("foot", object="Gone"),))}, "'Gone' was deleted"),
     ],
 )
 def test_settings_that_cannot_be_used_are_refused(scene, change, message):

@@ -137,7 +137,7 @@ def test_a_rig_without_feet_is_added_with_an_empty_list_that_bones_fill(scene, c
     (character,) = scene.softground.characters
     assert not character.soles
     assert "Added 'Block', but found no feet: select the bones that touch the ground" in capfd.readouterr().out
-    with pytest.raises(RuntimeError, match="No feet are found in 'Block': select the bones"):
+    with pytest.raises(RuntimeError, match="No feet found in 'Block': select the bones"):
         bpy.ops.softground.detect_bones()
     rigs.key(armature, "location", {1: (0, 0, 0), 20: (0, 0.2, 0)}, bone="Thing")
     with pytest.raises(InputError, match=r"'Block' has no feet, and nothing else to print with: .* press Add Contact"):
@@ -198,6 +198,6 @@ def test_an_instance_of_a_collection_is_no_ground_and_says_what_makes_it_one(sce
     instance = new_object("Set")
     instance.instance_type, instance.instance_collection = "COLLECTION", shared
     select(instance)
-    with pytest.raises(RuntimeError, match=r"'Set' is an instance of a collection.* Make Instances Real"):
+    with pytest.raises(RuntimeError, match=r"'Set' is a collection instance.* Make Instances Real"):
         bpy.ops.softground.create_ground()
     assert scene.softground.ground is None

@@ -413,7 +413,7 @@ def test_a_box_ends_at_the_edge_of_the_viewport(baked, drag):
 
 
 def test_a_step_that_is_none_is_named(baked):
-    with pytest.raises(RuntimeError, match=r"no step 'Walker/foot.L@999.0': choose one in the list"):
+    with pytest.raises(RuntimeError, match=r"no step 'Walker/foot.L@999.0': select one in the list"):
         bpy.ops.softground.mute_step(step="Walker/foot.L@999.0")
 
 

@@ -405,12 +405,12 @@ def test_an_attribute_of_the_users_is_left_alone(opened):
     assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
 
 
-def test_the_panel_says_that_steps_do_not_feel_the_weather_where_there_is_some(opened):
+def test_the_panel_says_that_weather_only_covers_prints_where_there_is_some(opened):
     opened()
     panel = MagicMock()
     for there in (False, True):
         weather_panel.SOFTGROUND_PT_weather.draw(panel, bpy.context)
-        assert ("Steps do not feel the weather" in str(panel.mock_calls)) == there
+        assert ("Weather only covers the prints" in str(panel.mock_calls)) == there
         assert ("steps_feel_weather" in str(panel.mock_calls)) == there
         bpy.ops.softground.add_weather()
 

@@ -103,7 +103,7 @@ def _cleaned(
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
         response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds))
         missed += [
-            f"'{hold.foot}' of {motion.name} does not stand at frame {hold.frame:g}: its foot lock was left out."
+            f"'{hold.foot}' of '{motion.name}' is not planted at frame {hold.frame:g}: its foot lock was left out."
             for hold in missed_holds(motion, touching, asked.holds)
         ]
         after = responding(motion, response)
@@ -132,7 +132,7 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
         )
     if treadmill_speed(loads.motion, loads.contacts) > 0:
         raise InputError(
-            f"'{motion.name}' walks on the spot, and feet that stood still would tear its legs: press Root Motion "
+            f"'{motion.name}' walks on the spot, and planted feet would overstretch its legs: press Root Motion "
             "first, or key its travel."
         )
 

@@ -150,6 +150,6 @@ def _extent(left: record.BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.fl
         for step in (*left.footprints, *left.edited)
     ]
     if not boxes:
-        raise InputError("The bake has no step that could be edited.")
+        raise InputError("The bake has no steps to edit: check that the feet touch the ground, and bake again.")
     lows, highs = zip(*boxes, strict=True)
     return np.min(lows, axis=0), np.max(highs, axis=0)

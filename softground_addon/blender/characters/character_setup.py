@@ -260,7 +260,7 @@ def detecting_bones(scene: bpy.types.Scene, number: int) -> jobs.Job[list[str]]:
     require_armature(armature)
     mapping = (yield from recognise(scene, armature, animated_frames(scene, armature))).mapping
     if not mapping.soles:
-        raise InputError(f"No feet are found in '{armature.name}': {CHOOSE_CONTACTS}.")
+        raise InputError(f"No feet found in '{armature.name}': {CHOOSE_CONTACTS}.")
     _fill(scene, scene.softground.characters[number], mapping)
     return [source.name for source in mapping.soles]
 
@@ -296,8 +296,8 @@ def add_bone_contacts(character: SoftGroundCharacter, bones: Iterable[str]) -> l
     fresh = [bone for bone in bones if bone not in taken]
     if not fresh:
         raise InputError(
-            f"No further bone of '{title_of(character)}' is selected: select the bones that touch the ground, in pose "
-            "mode."
+            f"No further bone of '{title_of(character)}' is selected: select the bones that touch the ground, in Pose "
+            "Mode."
         )
     for bone in fresh:
         sole = character.soles.add()

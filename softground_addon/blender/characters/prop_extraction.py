@@ -37,8 +37,8 @@ def check_props(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, .
         obj = next((obj for obj in scene.objects if obj.name_full == source.object), None)
         if obj is None:
             raise InputError(
-                f"Sole '{source.name}' of '{owner}': object '{source.object}' is gone, choose another one or remove "
-                "the sole."
+                f"Sole '{source.name}' of '{owner}': object '{source.object}' was deleted: choose another one, or "
+                "remove the contact."
             )
         if obj.type != "MESH":
             raise InputError(f"'{obj.name}' has no mesh to print with: choose a mesh object for sole '{source.name}'.")

@@ -45,7 +45,7 @@ class RigMapping:
 
 CHOOSE_CONTACTS = (
     "select the bones that touch the ground in Pose Mode, or vertices of the mesh in Edit Mode, and press Add Contact "
-    "in the Character panel"
+    "in Advanced > Contacts"
 )
 """What to do where no feet are found."""
 
@@ -78,8 +78,8 @@ def map_rig(armature: bpy.types.Object) -> RigMapping:
             mapping = by_shape if mapping is None else _completed(mapping, by_shape)
     if mapping is None:
         raise InputError(
-            f"No feet found in armature '{armature.name}': neither by bone names nor as mirrored lowest chains of the "
-            "rest pose. Choose the foot bones by hand in the character's list of soles."
+            f"No feet found in '{armature.name}', neither by the names of its bones nor by its rest pose: "
+            f"{CHOOSE_CONTACTS}."
         )
     return mapping
 

@@ -387,7 +387,7 @@ def object_named(name: str) -> bpy.types.Object:
     if found is None or found.name_full != name:
         found = next((obj for obj in bpy.data.objects if obj.name_full == name), None)
     if found is None:
-        raise InputError(f"Object '{name}' is gone: choose another one for the character.")
+        raise InputError(f"Object '{name}' was deleted: choose another one for the character.")
     return found
 
 
@@ -430,7 +430,7 @@ def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: Ri
     if missing:
         raise InputError(f"Armature '{name}' has no bone '{missing[0]}': choose the bones of the character again.")
     if armature.mode == "EDIT":
-        raise InputError(f"Armature '{name}' is in edit mode and stands still: leave edit mode.")
+        raise InputError(f"Armature '{name}' is in Edit Mode and stands still: leave it with Tab first.")
     if armature.data.pose_position == "REST":
         raise InputError(f"Armature '{name}' shows its rest position: set it to Pose Position in its data properties.")
     if not is_animated(armature):

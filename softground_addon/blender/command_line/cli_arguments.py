@@ -83,7 +83,7 @@ def _add_clean(clean: argparse.ArgumentParser, *, standalone: bool) -> None:
         clean.add_argument("blend", type=Path, metavar="SHOT.blend", help="the file whose feet to clean")
     clean.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
     clean.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
-    clean.add_argument("--root-motion", action="store_true", help="first let cycles on the spot travel")
+    clean.add_argument("--root-motion", action="store_true", help="add root motion first to cycles on the spot")
     destination = clean.add_mutually_exclusive_group()
     destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the shot with its layer as this")
     destination.add_argument("--in-place", action="store_true", help="save the shot over the opened file")
@@ -109,7 +109,7 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
         "--samples", type=Path, metavar="DIR", help="for wav: your own sounds, in a folder of WAV files"
     )
     export.add_argument("--stereo", action="store_true", help="for wav: hear the steps from the camera")
-    export.add_argument("--outdated", action="store_true", help="also where the bake no longer fits its inputs")
+    export.add_argument("--outdated", action="store_true", help="export even if the bake is outdated")
     export.set_defaults(blend=None)
 
 

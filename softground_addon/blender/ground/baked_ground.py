@@ -251,7 +251,7 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     stored = record.load(bytes(stored_record(ground)))
     table = stored.about.get(EVENTS)
     if not isinstance(table, list):
-        raise InputError(f"The bake on ground '{ground.name}' has no events: bake again, and it has them.")
+        raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
     return as_edited(table, stored.steps)
 
 

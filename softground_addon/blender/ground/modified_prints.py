@@ -54,7 +54,7 @@ def are_undone(
         if detail == "NEVER":
             raise InputError(
                 f"The modifier '{barrier.name}' of ground '{ground.name}' keeps prints from playing: set Detail to "
-                "Automatic under Advanced, or apply it."
+                "Automatic in Advanced > Mesh and Look, or apply it."
             )
         return True
     if not len(moved) or not any(item.show_viewport for item in ground_mesh.users_modifiers(ground)):
@@ -73,7 +73,7 @@ def are_undone(
     if detail == "NEVER":
         raise InputError(
             f"Prints on ground '{ground.name}' would not show, as its modifiers undo them: set Detail to Automatic in "
-            "the Advanced panel, or apply the modifiers."
+            "Advanced > Mesh and Look, or apply the modifiers."
         )
     return True
 
@@ -86,7 +86,7 @@ def undone_prints(ground: bpy.types.Object) -> Finding:
             "note",
             f"The modifier '{barrier.name}' of ground '{ground.name}' keeps prints from playing: a copy without it, "
             f"'{ground.name} Trail', takes the prints.",
-            f"To have them on '{ground.name}' itself, clear the bake and apply it.",
+            f"To have them on '{ground.name}' itself, clear the bake and apply the modifier.",
         )
     return Finding(
         "undoing_modifiers",

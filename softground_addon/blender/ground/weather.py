@@ -175,7 +175,7 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces) -> None:
 def _values(mesh: bpy.types.Mesh, name: str) -> Array:
     attribute: Any = mesh.attributes.get(name)
     if attribute is None:
-        raise InputError("The bake has lost its playback: bake again.")
+        raise InputError("The bake has lost its playback modifier: bake again.")
     values = np.empty(len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("value", values)
     return values.astype(np.float64)

@@ -38,12 +38,12 @@ def read_body(path: Path, up: str | None = None) -> CapturedBody:
     suffix = path.suffix.lower()
     if suffix not in (*MARKERS, ".npz"):
         raise InputError(
-            f'"{path.name}" is not motion capture that SoftGround can read: choose a .c3d, .trc or AMASS .npz file'
+            f"'{path.name}' is not motion capture that SoftGround can read: choose a .c3d, .trc or AMASS .npz file"
         )
     try:
         content = files.read_regular(path, LARGEST)
     except OSError as error:
-        raise InputError(f'"{path.name}" cannot be read ({error.strerror}): choose another file') from error
+        raise InputError(f"'{path.name}' cannot be read ({error.strerror}): choose another file") from error
     return amass.read(content) if suffix == ".npz" else captured_body(MARKERS[suffix](content), up)
 
 

@@ -115,7 +115,7 @@ def last_step(scene: bpy.types.Scene) -> int:
 
 
 class SOFTGROUND_OT_go_to_last_step(OnBake, bpy.types.Operator):
-    """Go to the frame where the last foot leaves its print, so that all prints are there"""
+    """Go to the frame where the last foot leaves its print, so that all prints are in view"""
 
     bl_idname = "softground.go_to_last_step"
     bl_label = "Go to Last Step"

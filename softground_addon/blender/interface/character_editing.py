@@ -186,10 +186,10 @@ class SOFTGROUND_OT_add_contact(_OnCharacter, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
-    """Add something that prints: a foot, a hand, a snowshoe"""
+    """Add a contact, and choose its bone or object below"""
 
     bl_idname = "softground.add_sole"
-    bl_label = "Add Sole"
+    bl_label = "Add Empty Contact"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -203,16 +203,16 @@ class SOFTGROUND_OT_add_sole(_OnCharacter, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_remove_sole(bpy.types.Operator):
-    """Remove the selected sole from the list: it leaves no prints"""
+    """Remove the selected contact from the list: it leaves no prints"""
 
     bl_idname = "softground.remove_sole"
-    bl_label = "Remove Sole"
+    bl_label = "Remove Contact"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if active_sole(settings.scene_of(context)) is None:
-            cls.poll_message_set("Select a sole in the list first")
+            cls.poll_message_set("Select a contact in the list first")
             return False
         return True
 

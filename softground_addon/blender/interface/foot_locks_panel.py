@@ -51,7 +51,7 @@ def _foot_at_hand(character: Any, chosen: bpy.types.PoseBone | None) -> str:
     bones = armature.pose.bones
     feet = [sole for sole in character.soles if not sole.object and sole.bone in bones]
     if not feet:
-        raise InputError(f"'{armature.name}' has no foot with a bone: choose its bones in Contacts, under Advanced.")
+        raise InputError(f"'{armature.name}' has no foot with a bone: choose its bones in Advanced > Contacts.")
     names = {name: sole.name for sole in feet for name in (sole.bone, sole.toe_bone)}
     if chosen is not None and chosen.id_data == armature and chosen.name in names:
         return names[chosen.name]
@@ -73,7 +73,7 @@ class SOFTGROUND_OT_remove_foot_lock(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether one is chosen."""
-        cls.poll_message_set("Choose a foot lock in the list first")
+        cls.poll_message_set("Select a foot lock in the list first")
         return active_hold(active_character(settings.scene_of(context))) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:

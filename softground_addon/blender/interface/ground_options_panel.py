@@ -62,7 +62,7 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
 
 
 class SOFTGROUND_PT_layers(_Closed, bpy.types.Panel):
-    """Depth of the loose layer, and what lies on it and below; each is off at 0"""
+    """Depth of the loose layer, its crust, the firm ground below it, and hardening"""
 
     bl_label = "Layers"
 

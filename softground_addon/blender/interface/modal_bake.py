@@ -35,7 +35,7 @@ WORK_PER_DRAWING = 4.0
 
 STAGE_NAMES = {"sample": "Reading the animation", "simulate": "Pressing the ground", "write": "Writing the ground"}
 
-BUSY = "A bake is running, or an animation is being read"
+BUSY = "A bake is running, or an animation is being read: wait for it, or press Esc"
 """Why no other job begins."""
 
 _NAVIGATION = (
@@ -347,7 +347,7 @@ class SOFTGROUND_OT_root_motion(_Bake):
 
 
 class SOFTGROUND_OT_remove_root_motion(bpy.types.Operator):
-    """Remove the travel, and the response on top of it: the animation is as it was"""
+    """Remove the travel, and the response on top of it: the animation is as it was before"""
 
     bl_idname = "softground.remove_root_motion"
     bl_label = "Remove Root Motion"
@@ -415,7 +415,7 @@ def _why_not(context: bpy.types.Context) -> str:
     if session.is_rendering():
         return "A render is running: wait until it has ended"
     if state.is_live:
-        return "Live mode is on: stop it first"
+        return "Live mode is on: press Keep or Discard first"
     if not characters_of(settings.scene_of(context)):
         return "Add a character first: select its armature and press Add Character"
     return ""

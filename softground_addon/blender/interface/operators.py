@@ -152,8 +152,8 @@ def _selected_instance(context: bpy.types.Context) -> bpy.types.Object | None:
 def _check_no_instance(context: bpy.types.Context) -> None:
     if obj := _selected_instance(context):
         raise InputError(
-            f"'{obj.name}' is an instance of a collection, whose meshes take no prints: make it real (Object > "
-            "Apply > Make Instances Real), select the mesh that is walked on, and press Create Ground again."
+            f"'{obj.name}' is a collection instance, which takes no prints: make it real (Object > Apply > "
+            "Make Instances Real), select the mesh to walk on, and press Use Selected."
         )
 
 
@@ -169,7 +169,7 @@ def _selected_ground(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
-    """Remove the footprints from the ground and the response from the characters: all is as before the bake"""
+    """Remove the footprints from the ground and the response from the characters, as if there had been no bake"""
 
     bl_idname = "softground.clear_bake"
     bl_label = "Clear Bake"
@@ -183,7 +183,7 @@ class SOFTGROUND_OT_clear_bake(bpy.types.Operator):
             cls.poll_message_set("There is no bake on the ground")
             return False
         if session.current().is_live:
-            cls.poll_message_set("Live mode is on: stop it with Discard or Keep")
+            cls.poll_message_set("Live mode is on: press Keep or Discard first")
             return False
         return True
 

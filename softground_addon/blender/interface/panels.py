@@ -60,7 +60,7 @@ class SOFTGROUND_UL_soles(bpy.types.UIList):
 
 
 class SOFTGROUND_PT_character(SidebarPanel, bpy.types.Panel):
-    """Who walks"""
+    """Characters that leave footprints"""
 
     bl_label = "Character"
 
@@ -134,7 +134,7 @@ def _no_contacts(layout: Any, character: Any) -> None:
 
 
 class SOFTGROUND_PT_advanced(SidebarPanel, bpy.types.Panel):
-    """All that has a default which mostly fits"""
+    """Settings that rarely need a change"""
 
     bl_label = "Advanced"
     bl_options: Any = {"DEFAULT_CLOSED"}
@@ -155,7 +155,7 @@ class _OfCharacter(SidebarPanel):
 
 
 class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
-    """What prints"""
+    """Parts that touch the ground and print"""
 
     bl_label = "Contacts"
 
@@ -185,7 +185,7 @@ class SOFTGROUND_PT_soles(_OfCharacter, bpy.types.Panel):
 
 
 class SOFTGROUND_PT_joints(_OfCharacter, bpy.types.Panel):
-    """Where the body's mass is"""
+    """Bones that carry the body's mass"""
 
     bl_label = "Body Bones"
 
@@ -226,7 +226,7 @@ def _joint_label(joint: str) -> str:
 
 
 class SOFTGROUND_PT_ground(SidebarPanel, bpy.types.Panel):
-    """What gives way"""
+    """Ground that takes the prints"""
 
     bl_label = "Ground"
 

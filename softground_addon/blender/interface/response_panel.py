@@ -79,7 +79,7 @@ class SOFTGROUND_OT_slow_down(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a bake has told the speed."""
-        cls.poll_message_set("Bake with Grounding on first: the bake suggests a speed")
+        cls.poll_message_set("Bake with Sink Feet or Grounding on first: the bake suggests a speed")
         character = active_character(settings.scene_of(context))
         return bool(character and character.armature and nla_layer.has_layer(character.armature))
 

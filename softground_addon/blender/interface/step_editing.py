@@ -42,7 +42,7 @@ class OnSteps(OnBake):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether there is a bake, and neither another one nor live mode is at work."""
         if session.current().is_baking or live.is_on():
-            cls.poll_message_set("Wait for the bake, or end live mode")
+            cls.poll_message_set("A bake is running, or live mode is on: wait, or press Keep or Discard first")
             return False
         return super().poll(context)
 
@@ -63,7 +63,7 @@ class OnStep(OnSteps):
         steps = {step.name: step for step in baked_steps.of(scene)}
         for name in self.step.split("\n"):
             if name not in steps:
-                raise InputError(f"The bake has no step '{name}': choose one in the list of steps.")
+                raise InputError(f"The bake has no step '{name}': select one in the list of steps.")
         return [steps[name] for name in self.step.split("\n")]
 
 
@@ -187,7 +187,7 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
         precision=3,
     )
     turn: FloatProperty(
-        name="Turn",
+        name="Rotate",
         description="Angle by which the print is turned counter-clockwise",
         subtype="ANGLE",
         min=radians(-360),
@@ -202,7 +202,10 @@ class SOFTGROUND_OT_change_step(OnStep, bpy.types.Operator):
     )
     sole: _sole_property()
     shift: IntProperty(
-        name="Later", description="Number of frames by which the step is later", min=-LONGEST_SHIFT, max=LONGEST_SHIFT
+        name="Delay",
+        description="Frames by which the step is later; negative is earlier",
+        min=-LONGEST_SHIFT,
+        max=LONGEST_SHIFT,
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
@@ -249,7 +252,9 @@ def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> Mesh
         return None
     for step in steps:
         if not step.has_foot:
-            raise InputError(f"No foot made step '{step.name}': change the sole of steps that feet made.")
+            raise InputError(
+                f"Step '{step.name}' was not made by a foot, so it keeps its sole: select only steps of feet."
+            )
     if sole in steps[0].feet:
         return None
     obj = step_soles.object_of(scene, sole)
@@ -298,8 +303,8 @@ class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
         shift = scene.frame_current - int(np.ceil(step.baked.start_frame))
         if abs(shift) > LONGEST_SHIFT:
             raise InputError(
-                f"Step '{step.name}' is {abs(shift)} frames away; a copy comes at most {LONGEST_SHIFT} earlier or "
-                "later: go nearer to it, or choose another step."
+                f"Step '{step.name}' is {abs(shift)} frames away; a copy can be at most {LONGEST_SHIFT} earlier or "
+                "later: go to a nearer frame, or choose another step."
             )
         if self.sole:
             edit = replace(edit, sole=self.sole, mesh=_mesh(scene, [step], self.sole))

@@ -20,7 +20,7 @@ class SOFTGROUND_MT_weather(bpy.types.Menu):
 
 
 class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
-    """Weather over what is baked"""
+    """Snow, rain, wind and thaw over the baked prints"""
 
     bl_label = "Weather"
     bl_parent_id = ADVANCED
@@ -46,7 +46,7 @@ class SOFTGROUND_PT_weather(SidebarPanel, bpy.types.Panel):
         if not options.steps_feel_weather:
             note = layout.column()
             note.active = False
-            note.label(text="Steps do not feel the weather", icon="INFO")
+            note.label(text="Weather only covers the prints", icon="INFO")
 
 
 CLASSES = (SOFTGROUND_MT_weather, SOFTGROUND_PT_weather)

@@ -171,7 +171,7 @@ class LiveMode:
         assert scene is not None
         known = yield from _in_steps(analysis.refreshing(scene))
         if known is None:
-            raise InputError("The shot cannot be read any more.")
+            raise InputError("The shot can no longer be read: check that its characters and its ground are there.")
         try:
             check_cell_size(known.loads, asked.cell_size_m, asked.longest_bake_s)
         except InputError as error:  # what was pressed before is shown on

@@ -12,7 +12,7 @@ from ..operator_base import OnBake, reports_errors
 
 NONE = "NONE"
 _CHOICES = [
-    (NONE, "None", "All sliders at zero; an existing modifier keeps its own"),
+    (NONE, "None", "No weather yet: set the sliders yourself. Weather that is there already keeps its values"),
     *((key, title, f"Set the sliders to {title}") for key, (title, _) in weather.PRESETS.items()),
 ]
 

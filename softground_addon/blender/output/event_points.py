@@ -103,15 +103,15 @@ class SOFTGROUND_OT_event_points(OnBake, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_event_markers(OnBake, bpy.types.Operator):
-    """Mark when each foot strikes the ground and leaves it in the timeline"""
+    """Add markers to the timeline where each foot strikes and leaves the ground"""
 
     bl_idname = "softground.event_markers"
     bl_label = "Mark Events in Timeline"
     bl_options = {"REGISTER", "UNDO"}
 
     phases: EnumProperty(
-        name="Phases",
-        description="Phases to mark",
+        name="Events",
+        description="Which events to mark",
         items=[(kind, kind.replace("_", " ").title(), "") for kind in KINDS],
         options={"ENUM_FLAG"},
         default=MARKED,

@@ -198,8 +198,8 @@ def _ground(scene: bpy.types.Scene, *, outdated: bool) -> bpy.types.Object:
     reasons = () if outdated else bake_report.stale_reasons(scene)
     if reasons:
         raise InputError(
-            f"The bake on ground '{ground.name}' is outdated ({'; '.join(reasons)}): bake again, or allow outdated "
-            "bakes to be exported."
+            f"The bake on ground '{ground.name}' is outdated ({'; '.join(reasons)}): bake again, or turn on "
+            "Allow Outdated."
         )
     return ground
 

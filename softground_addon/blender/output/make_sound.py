@@ -45,12 +45,12 @@ class SOFTGROUND_OT_make_sound(OnBake, bpy.types.Operator):
 
     samples: StringProperty(
         name="Own Sounds",
-        description="Folder of WAV files of single steps to play instead, as loud as the forces say. "
+        description="Folder of WAV files of single steps to play instead; the force of a step sets how loud it is. "
         "Files named after a ground, such as snow_1.wav, are used on that ground only",
         subtype="DIR_PATH",
     )
     stereo: BoolProperty(
-        name="From the Camera",
+        name="Stereo from Camera",
         description="Hear each step from where the camera sees it, quieter the farther away it is",
     )
 

@@ -77,7 +77,10 @@ def _seen_by_camera(
     """The steps with the gains of two channels: to the side where the camera sees them, softer the farther they are."""
     camera = scene.camera
     if camera is None:
-        raise InputError(f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make mono sound.")
+        raise InputError(
+            f"Scene '{scene.name}' has no camera to hear the steps from: add one, or make the sound "
+            "without Stereo from Camera."
+        )
     unit = scene.unit_settings.scale_length
     frame, subframe = scene.frame_current, scene.frame_subframe
     seen = []

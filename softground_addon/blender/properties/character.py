@@ -74,7 +74,7 @@ class SoftGroundHold(bpy.types.PropertyGroup):
     """How Clean Feet holds one contact; see `core.response.foot_holds`."""
 
     foot: StringProperty(name="Foot", description="Foot whose contact this is")
-    frame: IntProperty(name="Frame", description="Any frame in which the foot stands")
+    frame: IntProperty(name="Frame", description="Any frame in which the foot is planted")
     mode: EnumProperty(
         name="Lock",
         description="What stays in its place during this contact",

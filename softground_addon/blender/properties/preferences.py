@@ -23,8 +23,7 @@ class SoftGroundPreferences(bpy.types.AddonPreferences):
 
     default_preset: StringProperty(
         name="Default Preset",
-        description="Ground that scenes start with, one of your own too. The command line starts with Snow, on every "
-        "machine alike",
+        description="Ground preset of new scenes, built-in or your own. The command line always starts with Snow",
         default=presets.DEFAULT,
         search=_names,
     )

@@ -95,7 +95,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         default=True,
     )
     dense_shape_keys: BoolProperty(
-        name="Dense Grounds Too",
+        name="Also on Dense Grounds",
         description="Keep shape keys on grounds of more than 250,000 vertices as well",
         default=False,
     )
@@ -110,7 +110,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     detail: EnumProperty(
         name="Detail",
-        description="Whether to hide the ground and let a copy that is fine along the trail take the prints",
+        description="When to hide the ground and press a copy of it that is fine along the trail",
         items=[
             ("AUTO", "Automatic", "Use the copy if the ground is too coarse to show the prints"),
             ("ALWAYS", "Always", "Use the copy even if the ground itself could show the prints"),
@@ -124,7 +124,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         items=[
             ("BOTH", "Prints and Response", "Footprints in the ground, and the characters' response if it is on"),
             ("PRINTS", "Prints Only", "Footprints in the ground; the characters keep their animation"),
-            ("RESPONSE", "Response Only", "The characters' response; the ground stays as it is"),
+            ("RESPONSE", "Response Only", "The characters' Grounding and Tilt; the ground stays as it is"),
         ],
         default="BOTH",
     )
@@ -248,9 +248,8 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     )
     steps_feel_weather: BoolProperty(
         name="Steps Feel Weather",
-        description="Bake with the weather that is on the ground: a step into an earlier print presses what snow, "
-        "rain, wind and warmth have left of it, and feet stand on new snow. The bake then "
-        "depends on the weather's sliders and their keys. If off, weather only covers what is baked",
+        description="Bake on the weathered ground: steps press fresh snow, and what the weather has left of earlier "
+        "prints. The bake then depends on the weather's sliders. If off, weather only covers what is baked",
         default=False,
     )
     keep_forces: BoolProperty(

@@ -82,7 +82,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
     for character in scene.softground.characters:
         if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
             raise InputError(
-                f"The object of '{character.name}' is gone: choose another one in Contacts, or remove "
+                f"The object of '{character.name}' was deleted: choose another one in Contacts, or remove "
                 f"'{character.name}' from the characters."
             )
     tread_images.forget()
@@ -179,7 +179,7 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
         characters = ", ".join(f"'{character.motion.name}'" for character in loads)
         raise InputError(
             f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
-            "feet in Contacts, under Advanced."
+            "feet in Advanced > Contacts."
         )
     if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
         raise InputError(

@@ -31,7 +31,7 @@ _WRITING = "writing"
 _OF_VERSION = (VERSION, SURFACE, MOVEMENT, BODY, SOLE)
 """What depends on the settings that a version of Blender has: only that version can compare it."""
 
-_UNKNOWN = "The bake does not say what it was made from"
+_UNKNOWN = "The bake has no record of its settings"
 
 _OF_0_1 = (
     *("ground", "characters", "preset", "material", "pressure", "painted", "cell_size_m", "frames"),
@@ -91,7 +91,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     if edited := next((obj for obj in (ground, display_mesh, *_bodies_of(scene, wanted)) if obj.mode == "EDIT"), None):
         return (f"'{edited.name}' is in Edit Mode",)
     if playback.modifier_of(display_mesh) is None:
-        return (f"'{display_mesh.name}' has lost its playback, and shows one moment only",)
+        return (f"'{display_mesh.name}' has lost its playback modifier, and its prints no longer move",)
     try:
         then: dict[str, str] = json.loads(ground_mesh.mesh_of(display_mesh)[FINGERPRINTS])
         inputs = wanted.inputs(Acts.WRITING)
@@ -108,7 +108,7 @@ def reasons(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[str, ...]:
     texts = {
         SETTINGS: "The settings have changed",
         _WRITING: "The settings have changed",
-        GROUND: f"The mesh or the place of '{ground.name}' has changed",
+        GROUND: f"The mesh or the position of '{ground.name}' has changed",
         SURFACE: f"The modifiers of '{ground.name}', or what is painted on it, have changed",
         PRINTS: f"The mesh of '{display_mesh.name}' has been edited",
     }

@@ -359,7 +359,7 @@ def findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
             "no_legs",
             "warning",
             f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
-            "Complete its joints in Body Bones, under Advanced.",
+            "Complete its joints in Advanced > Body Bones.",
         )
         for character in responses
         if not character.response.legs

@@ -112,7 +112,7 @@ def check_room(path: Path, size: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if size > free:
         raise InputError(
-            f"'{path}' may take up to {size / 1e6:,.0f} MB, and {free / 1e6:,.0f} MB are free: choose another place, "
+            f"'{path}' may take up to {size / 1e6:,.0f} MB, and {free / 1e6:,.0f} MB are free: choose another folder, "
             "or free disk space."
         )
 
@@ -190,4 +190,4 @@ def _sync_folder(folder: Path) -> None:
 
 def _not_written(path: Path, error: OSError) -> InputError:
     why = error.strerror or error
-    return InputError(f"'{path}' could not be written ({why}): choose another place, or free disk space.")
+    return InputError(f"'{path}' could not be written ({why}): choose another folder, or free disk space.")

@@ -85,8 +85,8 @@ def check_cell_size(
         length = max(sole.sole.length for sole in character.motion.soles)
         if length < cell_size:
             raise InputError(
-                f"The soles of '{character.motion.name}' are {length * 1e3:.3g} mm long, smaller than a cell of "
-                f"{cell_size * 1e3:g} mm: set a cell size of at most {length / CELLS_ALONG_SOLE * 1e3:.2g} mm, or "
+                f"The soles of '{character.motion.name}' are {length * 100:.3g} cm long, smaller than a cell of "
+                f"{cell_size * 100:g} cm: set a cell size of at most {length / CELLS_ALONG_SOLE * 100:.2g} cm, or "
                 "correct the scale of the character or of the scene's units."
             )
     available = machine_memory() if available is None else available
@@ -100,10 +100,10 @@ def check_cell_size(
         for size in sizes[sizes < _shortest_of_largest(loads)]
         if not _too_much(bake_memory(loads, size), bake_time(loads, size), longest, available)
     ]
-    remedy = f"set a cell size of at least {1.05 * fits[0] * 1e3:.2g} mm, or " if fits else ""  # it is rounded
+    remedy = f"set a cell size of at least {1.05 * fits[0] * 100:.2g} cm, or " if fits else ""  # it is rounded
     names = ", ".join(f"'{character.motion.name}'" for character in loads)
     raise InputError(
-        f"Cells of {cell_size * 1e3:g} mm would take about {_amount(needed, time)} for the steps of {names}, and "
+        f"Cells of {cell_size * 100:g} cm would take about {_amount(needed, time)} for the steps of {names}, and "
         f"{too_much}: {remedy}bake fewer frames."
     )
 

@@ -112,7 +112,9 @@ def new_copy(edits: Mapping[str, StepEdit], footprint: Footprint) -> str:
     taken = {copy for name in edits for copy in [_parts(name)[2]] if _is_of(_parts(name), footprint, copy)}
     free = next((copy for copy in range(1, MOST_COPIES + 1) if copy not in taken), None)
     if free is None:
-        raise InputError(f"Step '{step_id(footprint)}' has {MOST_COPIES} copies: copy another step.")
+        raise InputError(
+            f"Step '{step_id(footprint)}' already has {MOST_COPIES} copies, the most there can be: copy another step."
+        )
     return step_id(footprint, free)
 
 

@@ -88,7 +88,7 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path):
 
 
 def test_a_missing_folder_is_named_with_a_remedy(tmp_path: Path):
-    with pytest.raises(InputError, match=r"nowhere.*choose another place"):
+    with pytest.raises(InputError, match=r"nowhere.*choose another folder"):
         write_text(tmp_path / "nowhere" / "a.json", "text")
 
 
