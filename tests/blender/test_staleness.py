@@ -203,7 +203,7 @@ def test_a_ground_is_known_to_have_been_moved_by_what_it_stands_on_however_it_is
     assert bake_report.stale_reasons(scene) == ()
     bpy.data.objects["Support"].location.x += 0.05
     bpy.context.view_layer.update()
-    assert bake_report.stale_reasons(scene) == ("The mesh or the place of 'Field' has changed",)
+    assert bake_report.stale_reasons(scene) == ("The mesh or the position of 'Field' has changed",)
 
 
 def test_a_cleared_ground_is_not_stale(baked):

@@ -156,7 +156,7 @@ class SoftGroundMaterial(bpy.types.PropertyGroup):
     stiffness_mpa: in_unit(
         "youngs_modulus", 1e6, "Stiffness (MPa)", _STIFFNESS, min=1e-3, soft_min=0.02, soft_max=5.0, precision=3, step=1
     )
-    layer_depth_cm: in_unit("layer_depth", 0.01, "Layer Depth (cm)", _LAYER, min=0.1, soft_max=100.0, precision=1)
+    layer_depth_cm: in_unit("layer_depth", 0.01, "Layer (cm)", _LAYER, min=0.1, soft_max=100.0, precision=1)
     rim_reach_cm: in_unit("rim_reach", 0.01, "Rim Reach (cm)", _RIM_REACH, min=0.0, soft_max=20.0, precision=1)
     blur_sigma_cm: in_unit("blur_sigma", 0.01, "Smoothing (cm)", _SMOOTHING, min=0.0, soft_max=5.0, precision=2)
     crust_stress_kpa: in_unit("crust_stress", 1e3, "Crust (kPa)", _CRUST, min=0.0, soft_max=100.0, precision=1)

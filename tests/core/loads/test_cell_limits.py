@@ -21,7 +21,7 @@ FOR_EVER = float("inf")
 
 
 def named_size(error):
-    return float(re.search(r"at (?:least|most) ([\d.e+-]+) mm", str(error.value))[1]) / 1e3
+    return float(re.search(r"at (?:least|most) ([\d.e+-]+) cm", str(error.value))[1]) / 1e2
 
 
 def test_a_sole_that_stands_covers_its_area_once():
