@@ -95,7 +95,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         default=True,
     )
     dense_shape_keys: BoolProperty(
-        name="Also on Dense Grounds",
+        name="On Dense Grounds",
         description="Keep shape keys on grounds of more than 250,000 vertices as well",
         default=False,
     )
