@@ -63,6 +63,59 @@ def edit_findings(left: BakeRecord) -> list[Finding]:
         Finding(
             "edit_without_sole",
             "warning",
-            f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the sole "
-            f"'{left.edits[name].sole}' of its edit.",
+            f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the "
+            f"sole '{left.edits[name].sole}' of its edit.",
             "The edit is kept for when that foot or mesh is there; choose another sole, or reset the step.",
+        )
+        for name in without_sole(left.footprints, left.edits)
+    ]
+    return steps + soles
+
+
+def summary(result: dict[str, Any]) -> dict[str, float]:
+    """What the panel shows of a bake."""
+    totals, timings = result["totals"], result["timings"]
+    seconds = sum(timings[stage] for stage in STAGES)
+    shown = {key: totals[key] for key in (*ground_mesh.SHOWN, TYPICAL)}
+    last = max((step["frame_end"] for step in result["steps"]), default=0.0)
+    return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"]), LAST_FRAME: last}
+
+
+def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
+    """What the panel shows of prints that no bake reported, such as those kept of live mode."""
+    return {
+        "steps": len(footprints),
+        "max_depth_m": max((footprint.max_depth_m for footprint in footprints), default=0.0),
+        TYPICAL: typical_of(footprints),
+        "peak_force_n": max((float(footprint.peak_force_n) for footprint in footprints), default=0.0),
+    }
+
+
+def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
+    """Constant float (positive) or sink of the source animation, by character and sole [mm]."""
+    return {
+        character.motion.name: {
+            sole.sole.name: round(float(offset) * 1e3, 3)
+            for sole, offset in zip(character.motion.soles, character.contacts.offset, strict=True)
+        }
+        for character in loads
+    }
+
+
+def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
+    return staleness.reasons(scene, weather.felt(settings.snapshot(scene)))
+
+
+def force_table(
+    loads: Sequence[CharacterLoads], frames: list[float], forces: list[tuple[Array, ...]]
+) -> dict[str, object]:
+    """The force on each sole at each frame [N], by character and sole."""
+    characters: dict[str, dict[str, list[list[float]]]] = {}
+    for number, character in enumerate(loads):
+        of_character = np.array([at_frame[number] for at_frame in forces])
+        names = [sole.sole.name for sole in character.motion.soles]
+        characters[character.motion.name] = {
+            name: np.round(of_character[:, sole], 3).tolist() for sole, name in enumerate(names)
+        }
+    return {"frames": frames, "characters": characters}
