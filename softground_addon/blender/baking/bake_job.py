@@ -123,7 +123,12 @@ def bake(
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
     ground_name = wanted.ground.name if wanted.ground else "the ground"
     checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
-    findings = [*(yield from meanwhile(Progress("simulate", 1.0), checking)), *moving, *bake_report.edit_findings(left)]
+    findings = [
+        *(yield from meanwhile(Progress("simulate", 1.0), checking)),
+        *moving,
+        *bake_report.edit_findings(left),
+        *bake_report.hidden_skins(scene, wanted, shot.motions),
+    ]
     of_responses = response_job.findings(responses)
     happened = events(
         loads,

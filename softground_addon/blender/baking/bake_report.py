@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from ...core.findings import Finding
 from ...core.loads.estimate import CharacterLoads
+from ...core.motion.motion import CharacterMotion
 from ...core.record.edits import without_sole, without_step
 from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.record.typical_depth import typical_of
+from ...core.settings import BakeSettings
 from .. import settings
+from ..characters.skin_sampling import hidden_on
 from ..ground import ground_mesh, still_ground, weather
 from ..jobs import STAGES
 from ..reading import staleness
@@ -46,6 +49,28 @@ def ground_findings(ground: bpy.types.Object | None, frame: int) -> list[Finding
             "Apply the modifier at the frame you want, or switch it off.",
         )
     ]
+
+
+def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence[CharacterMotion]) -> list[Finding]:
+    """Feet of which a mesh is there that is not rendered, so that they print with a sole of average shape."""
+    findings = []
+    for one, motion in zip(wanted.characters, motions, strict=True):
+        average = {m.sole.name for m in motion.soles if m.sole.prop is None and m.sole.underside is None}
+        if not average or not one.armature:
+            continue
+        armature = settings.found(one.armature)
+        bones = {bone for sole in one.soles if sole.name in average for bone in (sole.bone, sole.toe_bone) if bone}
+        findings += [
+            Finding(
+                "hidden_skin",
+                "warning",
+                f"The feet of '{one.name}' print with a sole of average shape: '{body.name}', which covers them, is "
+                "hidden from renders.",
+                "Show it in renders and bake again, or leave it if those feet fit.",
+            )
+            for body in hidden_on(scene, armature, bones)[:1]
+        ]
+    return findings
 
 
 def edit_findings(left: BakeRecord) -> list[Finding]:

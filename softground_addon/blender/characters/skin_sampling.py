@@ -70,11 +70,26 @@ class RigSkin:
 
 
 def meshes_on(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    """The rendered mesh objects that an armature deforms or that hang on its bones."""
+    """The rendered mesh objects that an armature deforms or that hang on its bones; if none is rendered, all of them.
+
+    Beside rendered ones, those that are not are mostly stand-ins.
+    """
+    worn = _worn_by(scene, armature)
+    return [obj for obj in worn if not obj.hide_render] or worn
+
+
+def hidden_on(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Collection[str]) -> list[bpy.types.Object]:
+    """The meshes on some bones of an armature that `meshes_on` leaves out, as they are not rendered."""
+    read = meshes_on(scene, armature)
+    left_out = (obj for obj in _worn_by(scene, armature) if obj not in read)
     return [
-        obj
-        for obj in scene.objects
-        if obj.type == "MESH" and not obj.hide_render and (_deformed_by(obj, armature) or _hangs(obj, armature))
+        obj for obj in left_out if obj.parent_bone in bones or {group.name for group in obj.vertex_groups} & set(bones)
+    ]
+
+
+def _worn_by(scene: bpy.types.Scene, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    return [
+        obj for obj in scene.objects if obj.type == "MESH" and (_deformed_by(obj, armature) or _hangs(obj, armature))
     ]
 
 
@@ -90,7 +105,7 @@ def _hangs(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
 
 @sliced
 def read_skin(scene: bpy.types.Scene, armature: bpy.types.Object) -> Slices[RigSkin | None]:
-    """The rendered meshes on an armature, or None where there is none.
+    """The meshes on an armature that `meshes_on` names, or None where there is none.
 
     Raises
     ------
