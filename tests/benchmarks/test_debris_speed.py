@@ -30,8 +30,6 @@ def thrown(count):
         radius=random.uniform(0.001, 0.01, count),
         kind=random.integers(0, 3, count).astype(np.int32),
         step=np.sort(random.integers(0, 50, count)).astype(np.int32),
-        volume=np.zeros(50),
-        masses={},
     )
 
 

@@ -20,7 +20,7 @@ def added_walker(scene: bpy.types.Scene) -> None:
     shots.walker(scene, frames=34)
     bpy.ops.softground.add_character()
     bpy.ops.softground.load_preset(name="Snow")
-    scene.softground.cell_size = 0.02
+    scene.softground.cell_size, scene.softground.debris = 0.02, False
 
 
 def opened_as(surface: str, baked: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> bpy.types.Scene:

@@ -23,8 +23,6 @@ BIRTH, FLIGHT, DRAG = "softground_birth", "softground_flight", "softground_drag"
 """Of a point: frame of its birth, time in the air [s], settling speed over gravity [s]."""
 SMALL = "softground_small"
 """Whether it is one of the seen round points."""
-LEFT_OUT = "softground_left_out"
-"""Whether its step was changed, so that it is not seen."""
 START, LAUNCH = "softground_start", "softground_launch"
 """Its first place [Blender units] and its first speed [Blender units/s]."""
 RANK = "softground_rank"
@@ -61,13 +59,13 @@ def build(*, frame_rate: float, gravity: float, unit_scale: float, shapes: bpy.t
     geometry = graph.store(geometry, AGE, since, True)
     geometry = _moved(graph, geometry, wind, gravity=gravity, unit_scale=unit_scale)
     geometry = graph.forgotten(geometry, BIRTH, DRAG, START, LAUNCH)
-    unseen = graph.either(graph.less(graph.attribute(AGE), 0.0), graph.attribute(LEFT_OUT, "BOOLEAN"))
+    unseen = graph.less(graph.attribute(AGE), 0.0)
     large = graph.less(graph.attribute(RANK), shaped)
     geometry = graph.store(geometry, SMALL, graph.logic("NOR", unseen, large), True, "BOOLEAN")
-    points = _points(graph, graph.forgotten(geometry, FLIGHT, RANK, LEFT_OUT), material)
+    points = _points(graph, graph.forgotten(geometry, FLIGHT, RANK), material)
     few = graph.without(geometry, graph.logic("NOT", large))
     pieces = _pieces(graph, few, graph.logic("NOT", unseen), collection)
-    graph.finish(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, LEFT_OUT, SMALL))
+    graph.finish(graph.forgotten(graph.joined(points, pieces), FLIGHT, RANK, SMALL))
     return graph.tree
 
 

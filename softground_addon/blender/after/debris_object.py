@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any
 
 import bpy
@@ -91,19 +90,6 @@ def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
     """An input of the debris as `layout.prop` takes it: its modifier and the path of the property."""
     modifier = _modifier_of(obj)
     return compat.input_field(modifier, inputs_of(modifier)[name]) if modifier else None
-
-
-def leave_out(ground: bpy.types.Object, steps: Collection[int]) -> None:
-    """Show a ground's debris but for that of some steps, by their numbers."""
-    obj = of(ground)
-    if obj is None:
-        return
-    points: Any = obj.data
-    step = np.empty(len(points.vertices), np.int32)
-    points.attributes[nodes.STEP].data.foreach_get("value", step)
-    left_out: Any = points.attributes.get(nodes.LEFT_OUT) or points.attributes.new(nodes.LEFT_OUT, "BOOLEAN", "POINT")
-    left_out.data.foreach_set("value", np.isin(step, list(steps)))
-    points.update()
 
 
 def remove(ground: bpy.types.Object) -> None:

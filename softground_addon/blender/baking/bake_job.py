@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.after.events import events
+from ...core.after.events import as_edited, events
 from ...core.edited_steps import with_edits
 from ...core.files import report
 from ...core.findings import Finding
@@ -110,7 +110,7 @@ def bake(
     movers |= staleness.of_soles(scene, mesh_soles(edits))
     loads, left, forces, responses = yield from _press(wanted, shot, edits)
     left, debris = debris_job.thrown(wanted, shot.terrain, loads, left)
-    footprints = left.footprints
+    footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
     gaps = response_job.gap_table(responses)
@@ -130,27 +130,21 @@ def bake(
         *bake_report.hidden_skins(scene, wanted, shot.motions),
     ]
     of_responses = response_job.findings(responses)
-    happened = events(
-        loads,
-        footprints,
-        surface=wanted.surface,
-        first_frame=wanted.frames[0],
-        thrown=debris.masses if debris else None,
-    )
+    happened = events(loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     build_report = partial(
         report.build,
         inputs=inputs,
         input_hash=input_hash,
         footprints=footprints,
         pressed_again=left.pressed_again,
+        thrown=left.thrown,
         edits=left.edits,
         offsets_mm=bake_report.offsets_mm(loads),
         forces=forces,
         gaps_mm=gaps,
         worst_gaps=response_job.worst_gaps(responses),
         suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
-        events=happened,
-        thrown_m3=float(debris.volume.sum()) if debris else 0.0,
+        events=as_edited(happened, left.steps),
     )
     sole_length = shortest_sole(shot.motions)
     # They are as long as the animation, and from here on only the ground counts.
@@ -181,7 +175,7 @@ def bake(
         told = {"summary": bake_report.summary(result), "warnings": result["warnings"]}
         sign(written.display_mesh, written.ground, stamped, movers, **told)
     yield Progress("write", 1.0)
-    return BakeResult(result, tuple(footprints))
+    return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
 
 
 @dataclass(frozen=True)

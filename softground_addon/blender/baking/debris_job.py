@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.after import debris as core
 from ...core.after.debris import Debris
+from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.loads.estimate import CharacterLoads
-from ...core.record.edits import edits_by_number
 from ...core.record.footprints import recompose
 from ...core.record.record import BakeRecord
 from ...core.settings import BakeSettings
@@ -25,35 +25,47 @@ Array = NDArray[np.float64]
 def thrown(
     wanted: BakeSettings, terrain: Terrain, loads: Sequence[CharacterLoads], left: BakeRecord
 ) -> tuple[BakeRecord, Debris | None]:
-    """What the steps of a record throw, and the record without it; None where debris is off.
-
-    Steps that the artist has changed throw nothing: they were pressed elsewhere, or not at all.
-    """
+    """What the steps of a record throw, and the record with it booked; None where debris is off."""
     if not wanted.debris or not left.footprints:
         return left, None
-    ground = recompose(left.edited, cell_size=wanted.cell_size_m)
-
-    def height(x: Array, y: Array) -> Array:
-        compression, rim = ground.sample(x, y)
-        return np.asarray(terrain.heights(x, y) + rim - compression)
-
-    changed = changed_steps(left)
-    debris = core.throw(loads, left.footprints, surface=wanted.surface, height=height, without=changed)
-    pairs = zip(left.footprints, debris.volume.tolist(), strict=True)
-    return replace(left, footprints=[core.booked(one, volume) for one, volume in pairs]), debris
+    throws = core.throws_of(loads, left.footprints, surface=wanted.surface)
+    return thrown_again(wanted, wanted.surface, terrain, replace(left, throws=throws))
 
 
-def changed_steps(left: BakeRecord) -> set[int]:
-    """Numbers of the steps that the artist has changed."""
-    return {*edits_by_number(left.footprints, left.edits), *left.pressed_again}
+def thrown_again(
+    made_with: BakeSettings, surface: str, terrain: Terrain, left: BakeRecord
+) -> tuple[BakeRecord, Debris]:
+    """What the steps of a record throw as the artist leaves them, from what the record keeps of how they do.
+
+    Raises
+    ------
+    InputError
+        If that is damaged.
+    """
+    left, gravity = replace(left, thrown={}), made_with.gravity_m_s2
+    try:
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            sources = core.sources(left.throws, left.steps, surface=surface, gravity=gravity)
+            left = replace(left, thrown=core.volumes(sources))
+            ground = recompose(left.edited, cell_size=made_with.cell_size_m)
+
+            def height(x: Array, y: Array) -> Array:
+                compression, rim = ground.sample(x, y)
+                return np.asarray(terrain.heights(x, y) + rim - compression)
+
+            return left, core.throw(sources, surface=surface, gravity=gravity, height=height)
+    except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
+        raise InputError(
+            f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
+        ) from None
 
 
-def put(ground: bpy.types.Object, debris: Debris | None, wanted: BakeSettings) -> None:
-    """Let a ground have the debris of its bake, or none."""
+def put(ground: bpy.types.Object, debris: Debris | None, wanted: BakeSettings, surface: str = "") -> None:
+    """Let a ground have the debris of its bake, or none; of a surface other than the wanted one where it says so."""
     debris_object.put(
         ground,
         debris,
-        surface=wanted.surface,
+        surface=surface or wanted.surface,
         frame_rate=wanted.frame_rate,
         time_stretch=wanted.time_stretch,
         gravity=wanted.gravity_m_s2,

@@ -89,8 +89,13 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
     warnings, summary = ground_mesh.warnings_of(shown), ground_mesh.summary_of(shown)
     lengths = [step.pressed_by.pressing.sole.length for step in left.footprints if step.pressed_by]
     sole_length = min(lengths, default=FALLBACK_SOLE)
+    surface, is_deleted = str(left.about["inputs"]["surface"]), bool(left.thrown) and debris_object.of(ground) is None
+    debris = None
+    if left.throws:
+        left, debris = debris_job.thrown_again(bake.made_with, surface, bake.shot.terrain, left)
     written = jobs.run(bake_job.write_prints(scene, bake.made_with, bake.shot, left, sole_length))
-    debris_object.leave_out(ground, debris_job.changed_steps(left))
+    if left.throws and not is_deleted:
+        debris_job.put(ground, debris, bake.made_with, surface)
     renewed = summary | bake_report.summary_of_prints(left.edited)
     ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
     ground_mesh.note_warnings(written.display_mesh, warnings)

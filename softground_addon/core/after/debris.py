@@ -10,24 +10,23 @@ distance from the middle.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterator, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..loads.estimate import CharacterLoads
-from ..record.edits import step_id
+from ..record import throws
 from ..record.footprints import Footprint
+from ..record.record import EditableStep
+from ..record.throws import AIM, WEIGHT, Throw
 from . import flight, phases
 from .phases import Phase
 from .thrown_matter import MATTER, ThrownMatter
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
-_Part = TypeVar("_Part")
 
 THROWN_SHARE = 0.05
 """Share of the displaced ground that a landing throws, for each unit of v²/(g·R) above 1."""
@@ -43,6 +42,8 @@ CARRIED_ALONG = 0.5
 """Share of the sole's speed that what it throws takes along."""
 PUSH_DEPTH = 2e-3
 """Thickness of the ground that a sliding sole drags off [m]."""
+PUSHING = 0.25
+"""Time before a sole leaves in which it pushes off [s]."""
 PUSH_SPEED, PUSH_ANGLES = 0.7, (30.0, 50.0)
 """Speed of what it throws over its own, and between which angles [deg]."""
 SHEDDING = 0.2
@@ -79,11 +80,7 @@ class Debris:
     kind : (N,) int array
         Number in `KINDS`.
     step : (N,) int array
-        Number of the footprint.
-    volume : (F,) float array
-        What each footprint threw [m³].
-    masses : dict of (str, str) to float
-        What was thrown, by step id and phase [kg].
+        Number of the step (see `record.edits`).
     """
 
     birth: Array
@@ -94,8 +91,15 @@ class Debris:
     radius: Array
     kind: NDArray[np.int32]
     step: NDArray[np.int32]
-    volume: Array
-    masses: dict[tuple[str, str], float]
+
+
+@dataclass(frozen=True)
+class Source:
+    """What throws at a step as the artist left it, and how much [m³]."""
+
+    throw: Throw
+    step: EditableStep
+    volume: float
 
 
 def thrown_share(speed: float, radius: float, gravity: float) -> float:
@@ -118,121 +122,153 @@ def thrown_share(speed: float, radius: float, gravity: float) -> float:
     return float(np.clip(THROWN_SHARE * (speed**2 / (gravity * radius) - 1.0), 0.0, MOST_THROWN))
 
 
-def throw(
-    loads: Sequence[CharacterLoads],
-    footprints: Sequence[Footprint],
-    *,
-    surface: str,
-    height: Height,
-    without: Collection[int] = (),
-) -> Debris:
-    """All that the steps of a bake throw.
+def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], *, surface: str) -> list[Throw]:
+    """How the steps of a bake throw, rounded to what the record keeps of it.
 
     Parameters
     ----------
     loads : sequence of CharacterLoads
     footprints : sequence of Footprint
+        That they left.
     surface : str
         See `core.ground.presets.SURFACES`.
+    """
+    found = [
+        throw
+        for character in loads
+        for phase in phases.phases(character)
+        if (number := _footprint_of(character, phase, footprints)) is not None
+        for throw in _throws(character, phase, number, MATTER[surface])
+    ]
+    return [throws.from_json(throws.to_json(one), len(footprints)) for one in found]
+
+
+def sources(thrown: Sequence[Throw], steps: Sequence[EditableStep], *, surface: str, gravity: float) -> list[Source]:
+    """All that the steps of a record throw, at most `MOST_THROWN` of the rim of each.
+
+    Parameters
+    ----------
+    thrown : sequence of Throw
+    steps : sequence of EditableStep
+        With all of their rims.
+    surface : str
+        See `core.ground.presets.SURFACES`.
+    gravity : float
+        [m/s²]
+    """
+    of_steps: dict[int, list[Throw]] = {}
+    for one in thrown:
+        of_steps.setdefault(one.number, []).append(one)
+    count, found = sum(not step.is_copy for step in steps), []
+    for step in steps:
+        if step.left is None:
+            continue
+        ways = [one.placed(step.baked, step.left, step.edit) for one in of_steps.get(step.index % count, ())]
+        volumes = [_volume(way, step.left, MATTER[surface], gravity) for way in ways]
+        scale = min(1.0, MOST_THROWN * step.left.rim_m3 / max(sum(volumes), 1e-300))
+        found += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
+    return found
+
+
+def volumes(found: Sequence[Source]) -> dict[int, dict[str, float]]:
+    """What steps throw, by their numbers and by phase [m³]: see `BakeRecord.thrown`."""
+    thrown: dict[int, dict[str, float]] = {}
+    for one in found:
+        of_step = thrown.setdefault(one.step.index, {})
+        of_step[one.throw.phase] = of_step.get(one.throw.phase, 0.0) + one.volume
+    return thrown
+
+
+def throw(found: Sequence[Source], *, surface: str, gravity: float, height: Height) -> Debris:
+    """The pieces of all that is thrown.
+
+    Parameters
+    ----------
+    found : sequence of Source
+        From `sources`.
+    surface : str
+        See `core.ground.presets.SURFACES`.
+    gravity : float
+        [m/s²]
     height : callable
         The baked ground's heights at places x, y [m].
-    without : collection of int
-        Numbers of footprints that throw nothing.
     """
-    matter, sources = MATTER[surface], []
-    for character in loads:
-        found = phases.phases(character)
-        for phase in found:
-            there = _sources(character, phase, footprints, matter)
-            sources += [one for one in there if one.volume > 0 and one.number not in without]
-    volume = np.zeros(len(footprints))
-    for one in sources:
-        volume[one.number] += one.volume
-    budget = MOST_THROWN * np.array([one.rim_m3 for one in footprints])
-    scale = np.minimum(1.0, np.divide(budget, volume, out=np.zeros_like(volume), where=volume > 0))
-    sources = [replace(one, volume=one.volume * float(scale[one.number])) for one in sources]
-    masses: dict[tuple[str, str], float] = {}
-    for one in sources:
-        key = step_id(footprints[one.number]), one.phase.kind
-        masses[key] = masses.get(key, 0.0) + one.volume * matter.density
-    parts = [_pieces(one, matter, footprints[one.number]) for one in sources if one.volume > 1e-12]
-    return _landed(parts, height, volume * scale, masses, loads[0].motion.gravity if loads else 9.81)
+    parts = [_pieces(one, MATTER[surface], gravity) for one in found if one.volume > 1e-12]
+    return _landed(parts, height, gravity)
 
 
-def booked(footprint: Footprint, volume: float) -> Footprint:
-    """A footprint whose rim lacks what was thrown [m³]."""
-    if not volume > 0 or not footprint.rim_m3 > 0:
-        return footprint
-    left = 1.0 - volume / footprint.rim_m3
-    amounts = np.asarray(footprint.rim.amounts)
-    order = np.argsort(np.asarray(footprint.rim.cells), kind="stable")
-    # Rounded along each cell's sums, so that no cell loses more than a quantum whatever it went through.
-    total = np.cumsum(amounts[order].astype(np.int64))
-    rounded = np.diff(np.rint(total * left), prepend=0.0)
-    scaled = np.empty(len(amounts), np.int32)
-    scaled[order] = rounded.astype(np.int32)
-    return _changed(footprint, rim=_changed(footprint.rim, amounts=scaled), rim_m3=footprint.rim_m3 - volume)
-
-
-def _changed(one: _Part, **values: Any) -> _Part:
-    """As `dataclasses.replace`, which would pack anew what stays as it is."""
-    twin = copy(one)
-    for name, value in values.items():
-        object.__setattr__(twin, name, value)
-    return twin
-
-
-@dataclass(frozen=True)
-class _Source:
-    """What throws at a step of the loads: of which footprint, how much, and from which states of the sole."""
-
-    loads: CharacterLoads
-    phase: Phase
-    number: int
-    kind: int
-    volume: float
-    steps: NDArray[np.intp]
-    weights: Array
-
-
-def _sources(
-    loads: CharacterLoads, phase: Phase, footprints: Sequence[Footprint], matter: ThrownMatter
-) -> Iterator[_Source]:
-    number = _footprint_of(loads, phase, footprints)
-    if number is None:
-        return
-    footprint, step = footprints[number], loads.motion.time_step
+def _throws(loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter) -> Iterator[Throw]:
+    motion, step = loads.motion, loads.motion.time_step
     if phase.kind in ("heel_strike", "land"):
         speed = phases.landing_speed(loads, phase.sole, phase.at)
-        share = thrown_share(speed, _radius(loads, phase, footprint), loads.motion.gravity)
-        volume = share * footprint.rim_m3 * _landing_part(footprint, loads, phase)
-        yield _Source(loads, phase, number, 0, volume, np.array([phase.at]), np.ones(1))
+        middle = phases.place_of(loads, phase.sole, phase.at)
+        along = phases.sole_velocity(loads, phase.sole, max(phase.at - 1, 0))
+        rows = np.concatenate([np.ones(1), np.zeros(3), middle, along])[None]
+        yield _throw(loads, phase, number, 0, np.array([phase.at]), rows, speed)
     if phase.kind == "toe_off":
-        yield from _pushed(loads, phase, number, footprint, matter)
-        last = min(len(loads.motion.frames) - 1, phase.at + round(LONGEST_SHED / step))
-        steps = np.arange(phase.at, last)
-        weights = np.exp(-(steps - phase.at) * step / SHEDDING)
+        steps = np.arange(max(0, phase.at - max(1, round(PUSHING / step))), phase.at)
+        slid = _slid(loads, phase, steps, matter)
+        if slid.any():
+            force = loads.forces.forces[steps, phase.sole, :2]
+            aim = np.zeros((len(steps), 3))
+            aim[:, :2] = -force / np.maximum(np.linalg.norm(force, axis=1), 1e-9)[:, None]
+            yield _throw(loads, phase, number, 1, steps, _rows(loads, phase.sole, steps, slid, aim))
+        steps = np.arange(phase.at, min(len(motion.frames) - 1, phase.at + round(LONGEST_SHED / step)))
+        weights = np.exp(-(steps - phase.at) * step / SHEDDING) * step / SHEDDING
         if len(steps):
-            volume = matter.film * footprint.area_m2 * float(weights.sum() * step / SHEDDING)
-            yield _Source(loads, phase, number, 2, volume, steps, weights)
+            yield _throw(
+                loads, phase, number, 2, steps, _rows(loads, phase.sole, steps, weights, np.zeros((len(steps), 3)))
+            )
 
 
-def _pushed(
-    loads: CharacterLoads, phase: Phase, number: int, footprint: Footprint, matter: ThrownMatter
-) -> Iterator[_Source]:
-    """What a sole drags off where it pushes along the ground harder than that can bear."""
-    steps = np.arange(phase.at - max(1, round(0.25 / loads.motion.time_step)), phase.at)
-    steps = steps[steps >= 0]
-    normal = loads.contacts.normal[steps, phase.sole]
-    force = loads.forces.forces[steps, phase.sole]
+def _throw(
+    loads: CharacterLoads,
+    phase: Phase,
+    number: int,
+    kind: int,
+    steps: NDArray[np.intp],
+    rows: Array,
+    speed: float = 0.0,
+) -> Throw:
+    motion = loads.motion
+    return Throw(
+        number,
+        phase.kind,
+        kind,
+        phases.is_foot(motion.soles[phase.sole]),
+        first=float(motion.frames[min(steps[0], len(motion.frames) - 1)]),
+        spacing=float(motion.frames[-1] - motion.frames[0]) / max(1, len(motion.frames) - 1),
+        speed=speed,
+        landed_by=float(motion.frames[min(phase.at, len(motion.frames) - 1)] + LANDING_TIME * motion.adult_second),
+        samples=rows.astype(np.float32),
+    )
+
+
+def _rows(loads: CharacterLoads, sole: int, steps: NDArray[np.intp], weights: Array, aim: Array) -> Array:
+    """Samples as `Throw` has them."""
+    followed = phases.sole_points_at(loads, sole, steps)
+    parts = (weights[:, None], aim, *(part.reshape(len(steps), -1) for part in followed))
+    return np.concatenate(parts, axis=1)
+
+
+def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Array:
+    """How far a sole slides in each step as it pushes along the ground harder than that can bear, (K,) [m]."""
+    normal, force = loads.contacts.normal[steps, phase.sole], loads.forces.forces[steps, phase.sole]
     pressing = np.einsum("ni,ni->n", force, normal)
     along = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
     slips = (pressing > 0) & (along > np.tan(np.radians(matter.repose)) * pressing)
-    speed = phases.slide_speed(loads, phase.sole)[steps] * slips
-    width = np.sqrt(footprint.area_m2) / 2
-    rate = width * PUSH_DEPTH * speed
-    if rate.any():
-        yield _Source(loads, phase, number, 1, float(rate.sum()) * loads.motion.time_step, steps, rate)
+    return np.asarray(phases.slide_speed(loads, phase.sole)[steps] * slips * loads.motion.time_step)
+
+
+def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float) -> float:
+    """What is thrown by a step that left a print [m³]."""
+    amount = float(throw.samples[:, WEIGHT].astype(np.float64).sum())
+    if throw.kind == 0:
+        share = thrown_share(throw.speed, _radius(throw, left), gravity)
+        return share * left.rim_m3 * _landing_part(left, throw.landed_by) if share else 0.0
+    if throw.kind == 1:
+        return np.sqrt(left.area_m2) / 2 * PUSH_DEPTH * amount
+    return matter.film * left.area_m2 * amount
 
 
 def _footprint_of(loads: CharacterLoads, phase: Phase, footprints: Sequence[Footprint]) -> int | None:
@@ -247,18 +283,16 @@ def _footprint_of(loads: CharacterLoads, phase: Phase, footprints: Sequence[Foot
     return min(near)[1] if near else None
 
 
-def _radius(loads: CharacterLoads, phase: Phase, footprint: Footprint) -> float:
+def _radius(throw: Throw, left: Footprint) -> float:
     """Of the part of the sole that lands [m]: half a foot, the whole of all else."""
-    foot = phases.is_foot(loads.motion.soles[phase.sole])
-    return float(np.sqrt(max(footprint.area_m2, 1e-8) * (0.5 if foot else 1.0) / np.pi))
+    return float(np.sqrt(max(left.area_m2, 1e-8) * (0.5 if throw.is_foot else 1.0) / np.pi))
 
 
-def _landing_part(footprint: Footprint, loads: CharacterLoads, phase: Phase) -> float:
-    """Share of what a step compacts that it compacts as it lands."""
+def _landing_part(footprint: Footprint, until: float) -> float:
+    """Share of what a step compacts that it compacts until a scene frame."""
     changes = footprint.pressing
     total = np.concatenate([[0.0], np.cumsum(np.asarray(changes.amounts), dtype=np.float64)])
     volumes = np.maximum(np.diff(total[np.asarray(changes.first)]), 0.0)
-    until = loads.motion.frames[phase.at] + LANDING_TIME * loads.motion.adult_second
     early = np.asarray(changes.frames) <= until + 1e-6
     return float(volumes[early].sum() / max(volumes.sum(), 1e-300))
 
@@ -266,34 +300,32 @@ def _landing_part(footprint: Footprint, loads: CharacterLoads, phase: Phase) -> 
 _Pieces = dict[str, Array]
 
 
-def _pieces(source: _Source, matter: ThrownMatter, footprint: Footprint) -> _Pieces:
+def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
     """The pieces of a source, before their flight is known."""
-    digest = hashlib.sha256(f"{step_id(footprint)} {source.kind}".encode()).digest()
+    throw = source.throw
+    digest = hashlib.sha256(f"{source.step.name} {throw.kind}".encode()).digest()
     random = np.random.default_rng(int.from_bytes(digest[:8], "big"))
     radius = _radii(source.volume, matter, random)
-    count = len(radius)
-    which = random.choice(len(source.steps), count, p=source.weights / source.weights.sum())
-    steps = source.steps[which]
-    motion = source.loads.motion
-    at = np.minimum(steps + random.random(count), len(motion.frames) - 1.0)
-    if source.kind == 0:
-        start, velocity = _corona(source, footprint, random, count)
+    count, weights = len(radius), throw.samples[:, WEIGHT].astype(np.float64)
+    which = random.choice(len(weights), count, p=weights / weights.sum())
+    frames = throw.first + (which + random.random(count)) * throw.spacing
+    if throw.kind == 0:
+        start, velocity = _corona(source, random, count, gravity)
     else:
-        start, velocity = _from_sole(source, steps, random)
-        if source.kind == 1:
-            velocity = _backward(source, steps, velocity, random)
+        start, velocity = _from_sole(throw, which, random)
+        if throw.kind == 1:
+            velocity = _backward(throw.samples[which, AIM].astype(np.float64), velocity, random)
     low, high = matter.settling
     part = np.sqrt(np.clip((2 * radius - matter.sizes[0]) / np.ptp(matter.sizes), 0.0, 1.0))
     settling = (low + (high - low) * part) * (0.8 + 0.4 * random.random(count))
-    frames = np.interp(at, np.arange(len(motion.frames)), motion.frames)
     return {
         "birth": frames,
         "start": start,
         "velocity": velocity,
-        "drag_time": settling / motion.gravity,
+        "drag_time": settling / gravity,
         "radius": radius,
-        "kind": np.full(count, source.kind, float),
-        "step": np.full(count, source.number, float),
+        "kind": np.full(count, throw.kind, float),
+        "step": np.full(count, source.step.index, float),
     }
 
 
@@ -310,50 +342,45 @@ def _radii(volume: float, matter: ThrownMatter, random: np.random.Generator) -> 
     return np.asarray(diameter * scale / 2)
 
 
-def _corona(source: _Source, footprint: Footprint, random: np.random.Generator, count: int) -> tuple[Array, Array]:
+def _corona(source: Source, random: np.random.Generator, count: int, gravity: float) -> tuple[Array, Array]:
     """Where and how fast the ring around a landing starts."""
-    loads, phase = source.loads, source.phase
-    radius = _radius(loads, phase, footprint)
-    middle = phases.place_of(loads, phase.sole, phase.at)
+    throw, left = source.throw, source.step.left
+    assert left is not None
+    radius = _radius(throw, left)
+    (((middle,),), ((along,),)) = throw.followed()
     direction = 2 * np.pi * random.random(count)
     distance = np.sqrt(NEAREST**2 + random.random(count) * (FARTHEST**2 - NEAREST**2))
-    landing = phases.landing_speed(loads, phase.sole, phase.at)
-    speed = np.minimum(SPEED * np.sqrt(loads.motion.gravity * radius) * distance**SPEED_FALL, landing)
+    speed = np.minimum(SPEED * np.sqrt(gravity * radius) * distance**SPEED_FALL, throw.speed)
     angle = np.radians(CORONA + SPREAD * (2 * random.random(count) - 1))
     outward = np.stack([np.cos(direction), np.sin(direction)], -1)
     start = np.column_stack([middle[:2] + outward * (radius * distance)[:, None], np.full(count, middle[2])])
     velocity = np.column_stack([outward * (speed * np.cos(angle))[:, None], speed * np.sin(angle)])
-    along = phases.sole_velocity(loads, phase.sole, max(phase.at - 1, 0))
     velocity[:, :2] += CARRIED_ALONG * along[:2]
     return start, velocity
 
 
-def _from_sole(source: _Source, steps: NDArray[np.intp], random: np.random.Generator) -> tuple[Array, Array]:
-    """Places under a sole at steps, and its speed there."""
-    points, velocities = phases.sole_points_at(source.loads, source.phase.sole, steps)
-    weights = random.dirichlet(np.ones(points.shape[1]), len(steps))
+def _from_sole(throw: Throw, which: NDArray[np.intp], random: np.random.Generator) -> tuple[Array, Array]:
+    """Places under a sole at samples, and its speed there."""
+    points, velocities = (part[which] for part in throw.followed())
+    weights = random.dirichlet(np.ones(points.shape[1]), len(which))
     start = np.einsum("nl,nli->ni", weights, points)
-    start[:, :2] += 0.02 * (random.random((len(steps), 2)) - 0.5)
+    start[:, :2] += 0.02 * (random.random((len(which), 2)) - 0.5)
     velocity = np.einsum("nl,nli->ni", weights, velocities)
-    return start, velocity * (0.7 + 0.5 * random.random(len(steps)))[:, None]
+    return start, velocity * (0.7 + 0.5 * random.random(len(which)))[:, None]
 
 
-def _backward(source: _Source, steps: NDArray[np.intp], slide: Array, random: np.random.Generator) -> Array:
+def _backward(aim: Array, slide: Array, random: np.random.Generator) -> Array:
     """Speeds of what a sole throws as it pushes off: against the force that drives the body, and up."""
-    force = source.loads.forces.forces[steps, source.phase.sole, :2]
-    back = -force / np.maximum(np.linalg.norm(force, axis=1), 1e-9)[:, None]
     speed = PUSH_SPEED * np.linalg.norm(slide, axis=1)
     low, high = np.radians(PUSH_ANGLES)
-    angle = low + (high - low) * random.random(len(steps))
-    turn = 0.3 * random.standard_normal(len(steps))
-    sideways = np.stack([-back[:, 1], back[:, 0]], -1)
-    way = back * np.cos(turn)[:, None] + sideways * np.sin(turn)[:, None]
+    angle = low + (high - low) * random.random(len(aim))
+    turn = 0.3 * random.standard_normal(len(aim))
+    sideways = np.stack([-aim[:, 1], aim[:, 0]], -1)
+    way = aim[:, :2] * np.cos(turn)[:, None] + sideways * np.sin(turn)[:, None]
     return np.column_stack([way * (speed * np.cos(angle))[:, None], speed * np.sin(angle)])
 
 
-def _landed(
-    parts: Sequence[_Pieces], height: Height, volume: Array, masses: dict[tuple[str, str], float], gravity: float
-) -> Debris:
+def _landed(parts: Sequence[_Pieces], height: Height, gravity: float) -> Debris:
     """All pieces with their flights, in the order of their birth."""
     keys = ("birth", "start", "velocity", "drag_time", "radius", "kind", "step")
     shapes = {"start": (0, 3), "velocity": (0, 3)}
@@ -363,5 +390,4 @@ def _landed(
     birth, start, velocity, drag_time, radius, kind, step = (whole[key][order] for key in keys)
     start[:, 2] = np.maximum(start[:, 2], np.nan_to_num(height(start[:, 0], start[:, 1]), nan=-np.inf))
     time = flight.landing_times(start, velocity, drag_time, gravity, height)
-    numbers = kind.astype(np.int32), step.astype(np.int32)
-    return Debris(birth, start, velocity, drag_time, time, radius, *numbers, volume, masses)
+    return Debris(birth, start, velocity, drag_time, time, radius, kind.astype(np.int32), step.astype(np.int32))

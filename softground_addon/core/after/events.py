@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from . import phases
 from .phases import Phase
+from .thrown_matter import MATTER
 
 Event = dict[str, Any]
 """A row, ready for JSON: see `COLUMNS`."""
@@ -42,9 +43,6 @@ COLUMNS = {
 LANDINGS = ("heel_strike", "land")
 """Phases with which a contact begins."""
 
-Thrown = Mapping[tuple[str, str], float]
-"""Mass that is thrown by step id and phase [kg]."""
-
 
 def events(
     loads: Sequence[CharacterLoads],
@@ -52,7 +50,6 @@ def events(
     *,
     surface: str,
     first_frame: float,
-    thrown: Thrown | None = None,
 ) -> list[Event]:
     """The events of a bake, in the order of time.
 
@@ -65,7 +62,6 @@ def events(
         See `core.ground.presets.SURFACES`.
     first_frame : float
         Of the bake.
-    thrown : mapping, optional
 
     Returns
     -------
@@ -78,14 +74,12 @@ def events(
         found = phases.phases(character)
         soles = [_Sole(character, sole, found) for sole in range(len(character.motion.soles))]
         rows += [_row(character, one, steps, surface, first_frame, soles[one.sole]) for one in found]
-    for row in rows:
-        row["thrown_kg"] = _rounded((thrown or {}).get((row["step"], row["phase"]), 0.0))
     return _in_order(rows)
 
 
 def as_edited(table: Sequence[Event], steps: Sequence[EditableStep]) -> list[Event]:
-    """The events of the steps as the artist left them: those of muted steps are gone, of others are where and when
-    these are, and copies have their own.
+    """The events of the steps as the artist left them, with what each phase threw: those of muted steps are gone, of
+    others are where and when these are, and copies have their own.
 
     Parameters
     ----------
@@ -189,6 +183,8 @@ def _moved(row: Event, step: EditableStep) -> Event:
     """An event of a step as that was left."""
     before, after = step.baked, step.left
     assert after is not None
+    if step.thrown:
+        row = row | {"thrown_kg": _rounded(step.thrown.get(row["phase"], 0.0) * MATTER[row["surface"]].density)}
     later = after.start_frame - before.start_frame
     if later and before.pressed_by:
         seconds = later / before.load_spacing * before.pressed_by.time_step

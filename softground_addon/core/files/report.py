@@ -37,7 +37,7 @@ def build(
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
-    thrown_m3: float = 0.0,
+    thrown: Mapping[int, Mapping[str, float]] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -69,10 +69,10 @@ def build(
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
         From `core.after.events`.
-    thrown_m3 : float
-        What steps have thrown out of their rims.
+    thrown : mapping, optional
+        Of the `BakeRecord`: what steps have thrown out of their rims.
     """
-    left = steps_of(footprints, edits, pressed_again)
+    left = steps_of(footprints, edits, pressed_again, thrown)
     steps = [_step(step) for step in left]
     counted = [step for step in steps if not step.get("left_out")]
     shown = [step.left for step in left if step.left]
@@ -88,7 +88,7 @@ def build(
             "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
-            "thrown_m3": thrown_m3,
+            "thrown_m3": sum(sum(step.thrown.values()) for step in left),
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},

@@ -9,6 +9,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,11 @@ from ..numerics.slices import Slices, sliced
 from . import archive as members
 from . import contact_arrays
 from . import edits as step_edits
+from . import throws as step_throws
 from .footprint_arrays import ARRAYS, from_arrays, to_parts
 from .footprints import Footprint
 
-FORMAT = 4
+FORMAT = 5
 """Version of the bytes' layout. Who raises it adds to `MIGRATIONS` what lifts the version before."""
 
 Layout = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -46,9 +48,10 @@ MIGRATIONS: dict[int, Callable[[dict[str, Any], dict[str, NDArray[Any]]], Layout
     1: _with_edits,
     2: _without_contacts,
     3: lambda text, arrays: (text, arrays),
+    4: lambda text, arrays: (text | {"throws": [], "thrown": []}, arrays),
 }
 """What lifts a layout of a version to the next. Version 1 had no edits, version 2 nothing to press steps again from,
-version 3 no copies of steps."""
+version 3 no copies of steps, version 4 not what steps throw."""
 
 _TEXT = "record.json"
 _DAMAGE = (
@@ -86,12 +89,19 @@ class BakeRecord:
     pressed_again : mapping of int to Footprint or None
         What stands for some of the footprints and for copies of them because of the edits, by their numbers (see
         `edits`); None where nothing of one is left.
+    throws : sequence of Throw
+        How the baked steps throw.
+    thrown : mapping of int to mapping of str to float
+        What the steps as they were left have thrown, by their numbers and by phase [m³]: it is missing from the rims of
+        `edited` and `steps`, not from those of `footprints` and `pressed_again`.
     """
 
     footprints: Sequence[Footprint]
     about: Mapping[str, Any]
     edits: Mapping[str, step_edits.StepEdit] = field(default_factory=dict)
     pressed_again: Mapping[int, Footprint | None] = field(default_factory=dict)
+    throws: Sequence[step_throws.Throw] = ()
+    thrown: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def edited(self) -> list[Footprint]:
@@ -99,10 +109,10 @@ class BakeRecord:
         left = [step.left for step in self.steps if step.left is not None]
         return sorted(left, key=lambda footprint: footprint.start_frame) if self.edits else left
 
-    @property
+    @cached_property
     def steps(self) -> list[EditableStep]:
         """All steps, and after them the copies of some."""
-        return steps_of(self.footprints, self.edits, self.pressed_again)
+        return steps_of(self.footprints, self.edits, self.pressed_again, self.thrown)
 
 
 @dataclass(frozen=True)
@@ -113,25 +123,32 @@ class EditableStep:
     ----------
     name : str
         Its id.
+    index : int
+        See `edits`.
     baked : Footprint
         As it was baked; of a copy, that which it is a copy of.
     left : Footprint or None
-        As it was left; None where nothing of it is.
+        As it was left, without what it threw; None where nothing of it is.
     edit : StepEdit
     is_copy : bool
+    thrown : mapping of str to float
+        What it threw, by phase [m³].
     """
 
     name: str
+    index: int
     baked: Footprint
     left: Footprint | None
     edit: step_edits.StepEdit
     is_copy: bool
+    thrown: Mapping[str, float]
 
 
 def steps_of(
     footprints: Sequence[Footprint],
     edits: Mapping[str, step_edits.StepEdit],
     pressed_again: Mapping[int, Footprint | None],
+    thrown: Mapping[int, Mapping[str, float]],
 ) -> list[EditableStep]:
     """The steps of a record, and after them the copies of some."""
     changes, count = step_edits.edits_by_number(footprints, edits), len(footprints)
@@ -139,7 +156,9 @@ def steps_of(
     for number in (*range(count), *(n for n in changes if n >= count)):
         edit, baked, copy = changes.get(number, step_edits.UNCHANGED), footprints[number % count], number // count
         left = None if edit.mute else pressed_again.get(number, None if copy else baked)
-        steps.append(EditableStep(step_edits.step_id(baked, copy), baked, left, edit, copy > 0))
+        lacking = thrown.get(number, {}) if left else {}
+        left = step_throws.booked(left, sum(lacking.values())) if left and lacking else left
+        steps.append(EditableStep(step_edits.step_id(baked, copy), number, baked, left, edit, copy > 0, lacking))
     return steps
 
 
@@ -156,6 +175,8 @@ def dump(record: BakeRecord) -> Slices[bytes]:
         "edits": step_edits.to_json(record.edits),
         "soles": soles,
         "pressed_again": [[number, footprint is not None] for number, footprint in again],
+        "throws": [step_throws.to_json(one) for one in record.throws],
+        "thrown": [[number, dict(volumes)] for number, volumes in sorted(record.thrown.items())],
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -202,6 +223,8 @@ def load(content: bytes) -> BakeRecord:
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
         soles, again = text["soles"], [(number, there) for number, there in text["pressed_again"]]
         baked = _count_baked(len(names), again)
+        how_thrown = [step_throws.from_json(one, baked) for one in text["throws"]]
+        thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
         raise InputError(
             f"The stored record of the footprints is damaged ({error}): clear the bake and bake again."
@@ -210,7 +233,19 @@ def load(content: bytes) -> BakeRecord:
     footprints = from_arrays(names, soles, arrays)
     prints = iter(footprints[baked:])
     pressed_again = {number: next(prints) if there else None for number, there in again}
-    return BakeRecord(footprints[:baked], about, changes, pressed_again)
+    return BakeRecord(footprints[:baked], about, changes, pressed_again, how_thrown, thrown)
+
+
+def _thrown(rows: list[Any], baked: int) -> dict[int, dict[str, float]]:
+    """What steps have thrown; ValueError where that cannot be."""
+    thrown = {
+        number: {str(phase): float(volume) for phase, volume in dict(volumes).items()} for number, volumes in rows
+    }
+    if any(type(number) is not int or not 0 <= number < baked * (1 + step_edits.MOST_COPIES) for number in thrown):
+        raise ValueError("steps threw that it does not have")
+    if not all(0 <= volume < np.inf for volumes in thrown.values() for volume in volumes.values()):
+        raise ValueError("steps threw no volume")
+    return thrown
 
 
 def _count_baked(count: int, again: list[tuple[Any, Any]]) -> int:

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from softground_addon.core.after import debris, flight, phases
-from softground_addon.core.after.events import events
+from softground_addon.core.after.events import as_edited, events
 from softground_addon.core.after.thrown_matter import MATTER
 from softground_addon.core.ground.presets import find
+from softground_addon.core.record import throws
+from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
+from softground_addon.core.record.record import BakeRecord, dump, load
 from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed
 
 SAND = find("dry_sand").material
@@ -35,8 +38,23 @@ def record():
     return pressed(jump(2.0), SAND, cell_size=0.02)[1]
 
 
+class Heard:
+    """What a bake throws: its pieces, its record, and the volume of each footprint [m³]."""
+
+    def __init__(self, loads, left, height=flat, surface="sand"):
+        if not left.throws:
+            left = replace(left, throws=debris.throws_of(loads, left.footprints, surface=surface))
+        found = debris.sources(left.throws, left.steps, surface=surface, gravity=GRAVITY)
+        self.pieces = debris.throw(found, surface=surface, gravity=GRAVITY, height=height)
+        self.left = replace(left, thrown=debris.volumes(found))
+        self.volume = np.array([sum(self.left.thrown.get(n, {}).values()) for n in range(len(left.footprints))])
+
+    def __getattr__(self, name):
+        return getattr(self.pieces, name)
+
+
 def thrown(speed, record, height=flat, surface="sand"):
-    return debris.throw([jump(speed)], record, surface=surface, height=height)
+    return Heard([jump(speed)], BakeRecord(record, {}), height, surface)
 
 
 @pytest.mark.parametrize("speed", [0.4, 1.5, 4.0])
@@ -106,7 +124,7 @@ def test_the_rim_lacks_what_was_thrown(record):
     heard = thrown(4.0, record)
     for one, volume in zip(record, heard.volume, strict=True):
         assert volume > 0
-        left = debris.booked(one, volume)
+        left = throws.booked(one, volume)
         change = left.tile(left.rim).sum() * left.cell_size**2
         before = one.tile(one.rim).sum() * one.cell_size**2
         assert change + volume == pytest.approx(before, rel=1e-6)
@@ -116,18 +134,80 @@ def test_the_rim_lacks_what_was_thrown(record):
 
 def test_events_tell_the_mass_that_each_phase_throws(record):
     heard = thrown(4.0, record)
-    rows = events([jump(4.0)], record, surface="sand", first_frame=1.0, thrown=heard.masses)
+    table = events([jump(4.0)], record, surface="sand", first_frame=1.0)
+    assert not any(row["thrown_kg"] for row in table)
+    rows = as_edited(table, heard.left.steps)
     total = sum(row["thrown_kg"] for row in rows)
     assert total == pytest.approx(heard.volume.sum() * MATTER["sand"].density, abs=2e-6)
     assert all(row["thrown_kg"] == 0 for row in rows if row["phase"] not in ("land", "toe_off"))
 
 
-def test_changed_steps_throw_nothing_and_the_same_bake_throws_the_same(record):
+def test_the_same_bake_throws_the_same(record):
     once, again = thrown(4.0, record), thrown(4.0, record)
     assert all(np.array_equal(getattr(once, name), getattr(again, name)) for name in ("start", "velocity", "radius"))
-    part = debris.throw([jump(4.0)], record, surface="sand", height=flat, without={0})
-    assert part.volume[0] == 0
-    assert set(part.step) == {1}
+
+
+def test_edited_steps_throw_where_when_and_as_much_as_they_press(record):
+    """A muted step throws nothing; what a moved and turned one throws moves and turns with it."""
+    count, one = len(record), record[0]
+    turned = replace(one, position=one.position + np.array([0.5, -0.2, 0.1]), heading=one.heading + np.pi / 2)
+    later = replace(record[1], start_frame=record[1].start_frame + 6, end_frame=record[1].end_frame + 6)
+    edits = {
+        step_id(one): StepEdit(move_m=(0.5, -0.2), turn_deg=90.0),
+        step_id(record[1]): StepEdit(mute=True),
+        step_id(record[1], 1): StepEdit(shift_frames=6),
+    }
+    plain = thrown(4.0, record)
+    left = replace(plain.left, edits=edits, pressed_again={0: turned, 1: None, 1 + count: later}, thrown={})
+    heard = Heard([], left)
+    assert set(heard.step) == {0, 1 + count}
+    before, after = plain.step == 0, heard.step == 0
+    offset, way = (plain.start - one.position)[before], plain.velocity[before]
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    # each ring is drawn anew around its middle: its pieces are as far from it, and as fast
+    assert heard.radius[after] == pytest.approx(plain.radius[before], rel=1e-6)
+    middle = (heard.start[after] - turned.position)[:, :2].mean(axis=0)
+    assert middle == pytest.approx((offset @ quarter.T)[:, :2].mean(axis=0), abs=0.02)
+    assert np.linalg.norm(heard.velocity[after], axis=1) == pytest.approx(np.linalg.norm(way, axis=1), rel=1e-4)
+    assert heard.birth[heard.step == 1 + count].min() >= plain.birth[plain.step == 1].min() + 5
+    assert heard.volume[0] == pytest.approx(plain.volume[0], rel=1e-6)
+    assert heard.volume[1] == 0
+    for step, volume in ((heard.left.steps[0], heard.volume[0]), (heard.left.steps[2], plain.volume[1])):
+        assert step.left.rim_m3 + sum(step.thrown.values()) == pytest.approx(step.baked.rim_m3, rel=1e-12)
+        assert sum(step.thrown.values()) == pytest.approx(volume, rel=1e-6)
+
+
+def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(record):
+    left = thrown(4.0, record).left
+    content = dump(left)
+    again = load(content)
+    assert dump(again) == content
+    assert again.thrown == left.thrown
+    for one, other in zip(left.throws, again.throws, strict=True):
+        assert np.array_equal(one.samples, other.samples)
+    row = throws.to_json(left.throws[0])
+    samples = {"shape": [1, 10], "samples": throws.to_json(replace(left.throws[0], samples=np.full((1, 10), np.nan)))}
+    for forged in (
+        {"number": len(record)},
+        {"number": True},
+        {"kind": 3},
+        {"first": float("nan")},
+        {"shape": [10**9, 10]},
+        {"shape": [2, 10]},
+        {"samples": "%"},
+        {"samples": samples["samples"]["samples"]},
+    ):
+        with pytest.raises((ValueError, TypeError)):
+            throws.from_json(row | forged, len(record))
+
+
+def test_a_step_that_is_twice_as_large_throws_from_twice_as_far(record):
+    (way,) = [one for one in thrown(4.0, record).left.throws if one.number == 0 and one.kind == 0]
+    larger = way.placed(record[0], record[0], StepEdit(scale=2.0))
+    points, velocities = way.followed()
+    assert larger.followed()[0] - record[0].position == pytest.approx(2 * (points - record[0].position), abs=1e-6)
+    assert larger.followed()[1] == pytest.approx(2 * velocities, abs=1e-6)
+    assert larger.speed == 2 * way.speed
 
 
 def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
@@ -136,7 +216,7 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     lifted.contacts.touching[100:] = False
     lifted.forces.forces[100:] = 0.0
     _, record = pressed(lifted, SAND, cell_size=0.02)
-    heard = debris.throw([lifted], record, surface="wet_sand", height=flat)
+    heard = Heard([lifted], BakeRecord(record, {}), surface="wet_sand")
     assert set(heard.kind) == {2}
     film = MATTER["wet_sand"].film * sum(one.area_m2 for one in record)
     assert heard.volume.sum() <= film

@@ -1,0 +1,164 @@
+"""What contacts throw, kept with their footprints: how soles land, push off and leave, whatever becomes of the prints.
+
+From it and the prints as the artist leaves them debris is made again without the animation; volumes that were thrown
+are missing from the rims.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..numerics.packed import Packed
+from .edits import StepEdit
+from .footprints import Footprint
+
+Array = NDArray[np.float64]
+_Part = TypeVar("_Part")
+
+WEIGHT, AIM, FOLLOWED = 0, slice(1, 4), 4
+"""Columns of `Throw.samples`: see there."""
+_NUMBERS = ("first", "spacing", "speed", "landed_by")
+_LARGEST = 1e6
+"""Of any number that is stored: what is larger is damage."""
+_MOST_SAMPLES = 10_000
+
+
+@dataclass(frozen=True)
+class Throw:
+    """What one contact throws as it lands, pushes off or leaves.
+
+    Attributes
+    ----------
+    number : int
+        Of the footprint as it was baked.
+    phase : str
+        See `core.after.phases`.
+    kind : int
+        See `core.after.debris.KINDS`.
+    is_foot : bool
+        Whether it has a heel and a ball to roll over.
+    first, spacing : float
+        Scene frame of the first sample, and scene frames from one to the next.
+    speed : float
+        Of a landing, into the ground [m/s].
+    landed_by : float
+        Scene frame until which what is compacted is compacted by the landing.
+    samples : (K, 4 + 6·L) float array
+        At K times: how much is thrown, over what a print of its size throws in all; the unit vector that it is thrown
+        along, 0 where it goes with the sole; L points of the sole [m], and their velocities [m/s].
+    """
+
+    number: int
+    phase: str
+    kind: int
+    is_foot: bool
+    first: float
+    spacing: float
+    speed: float
+    landed_by: float
+    samples: Packed[np.float32] = Packed()
+
+    def followed(self) -> tuple[Array, Array]:
+        """Points of the sole and their velocities, (K, L, 3) [m] and [m/s]."""
+        samples = self.samples[:, FOLLOWED:].astype(np.float64)
+        points, velocities = samples.reshape(len(samples), 2, -1, 3).transpose(1, 0, 2, 3)
+        return points, velocities
+
+    def placed(self, baked: Footprint, left: Footprint, edit: StepEdit) -> Throw:
+        """The same of a step that the artist has moved, turned, scaled or shifted in time.
+
+        Parameters
+        ----------
+        baked, left : Footprint
+            The step as it was baked and as it was left.
+        edit : StepEdit
+        """
+        shift = round(edit.shift_frames / baked.frame_step) * baked.frame_step
+        turn, moved = left.heading - baked.heading, left.position - baked.position
+        if not (shift or turn or moved.any()) and edit.scale == 1.0:
+            return self
+        cos, sin = np.cos(turn), np.sin(turn)
+        turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        points, velocities = self.followed()
+        samples = self.samples.astype(np.float64)
+        samples[:, AIM] = samples[:, AIM] @ turned.T
+        points = left.position + edit.scale * (points - baked.position) @ turned.T
+        velocities = edit.scale * velocities @ turned.T
+        samples[:, FOLLOWED:] = np.stack([points, velocities], axis=1).reshape(len(samples), -1)
+        return replace(
+            self,
+            first=self.first + shift,
+            landed_by=self.landed_by + shift,
+            speed=self.speed * edit.scale,
+            samples=samples.astype(np.float32),
+        )
+
+
+def to_json(throw: Throw) -> dict[str, Any]:
+    """A throw for JSON."""
+    samples = throw.samples
+    content = base64.b64encode(zlib.compress(samples.astype("<f4").tobytes())).decode()
+    about = {name: getattr(throw, name) for name in ("number", "phase", "kind", "is_foot", *_NUMBERS)}
+    return about | {"shape": list(samples.shape), "samples": content}
+
+
+def from_json(content: Mapping[str, Any], count: int) -> Throw:
+    """The throw from what `to_json` gave.
+
+    Parameters
+    ----------
+    content : mapping
+    count : int
+        Of footprints that were baked.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, zlib.error
+        If it was forged or damaged.
+    """
+    rows, columns = content["shape"]
+    number, phase, kind, is_foot = (content[name] for name in ("number", "phase", "kind", "is_foot"))
+    kinds = (type(number), type(phase), type(kind), type(is_foot), type(rows), type(columns))
+    if kinds != (int, str, int, bool, int, int) or not (0 <= number < count and 0 <= kind < 3):
+        raise ValueError("it throws what no step of it does")
+    if not (0 < rows <= _MOST_SAMPLES and FOLLOWED + 6 <= columns <= FOLLOWED + 600) or (columns - FOLLOWED) % 6:
+        raise ValueError("it throws along no way")
+    unpacking, size = zlib.decompressobj(), 4 * rows * columns
+    packed = base64.b64decode(content["samples"], validate=True)
+    samples = np.frombuffer(unpacking.decompress(packed, size + 1), "<f4").reshape(rows, columns)
+    numbers = {name: float(content[name]) for name in _NUMBERS}
+    if not (np.abs([*numbers.values(), *samples.ravel()]) <= _LARGEST).all() or not (samples[:, WEIGHT] >= 0).all():
+        raise ValueError("it throws what is no number")
+    return Throw(number, phase, kind, is_foot, **numbers, samples=samples.astype(np.float32))
+
+
+def booked(footprint: Footprint, volume: float) -> Footprint:
+    """A footprint whose rim lacks what was thrown [m³]."""
+    volume = min(volume, footprint.rim_m3)
+    if not volume > 0 or not footprint.rim_m3 > 0:
+        return footprint
+    left = 1.0 - volume / footprint.rim_m3
+    amounts = np.asarray(footprint.rim.amounts)
+    order = np.argsort(np.asarray(footprint.rim.cells), kind="stable")
+    # Rounded along each cell's sums, so that no cell loses more than a quantum whatever it went through.
+    total = np.cumsum(amounts[order].astype(np.int64))
+    rounded = np.diff(np.rint(total * left), prepend=0.0)
+    scaled = np.empty(len(amounts), np.int32)
+    scaled[order] = rounded.astype(np.int32)
+    return _changed(footprint, rim=_changed(footprint.rim, amounts=scaled), rim_m3=footprint.rim_m3 - volume)
+
+
+def _changed(one: _Part, **values: Any) -> _Part:
+    """As `dataclasses.replace`, which would pack anew what stays as it is."""
+    twin = copy(one)
+    for name, value in values.items():
+        object.__setattr__(twin, name, value)
+    return twin
