@@ -22,8 +22,8 @@ from .settings import BakeSettings
 
 Array = NDArray[np.float64]
 
-BARE = "BARE"
-"""The pattern of those in no shoes."""
+BARS = ("HIKING", "TRAINER")
+"""Patterns that materials may draw as bars across a print, where the mesh is too coarse for the pattern itself."""
 IMAGE, SHOES = "IMAGE", "SHOES"
 """Patterns that are read: from an image that is the same under all soles, and from the undersides of each."""
 

@@ -56,8 +56,9 @@ def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scen
     assert own_data.SOLE not in ground.data.attributes
 
 
-def test_bare_feet_are_not_shown_with_the_bars_of_shoes(ground, scene):
-    scene.softground.tread_pattern = "BARE"
+@pytest.mark.parametrize("pattern", ["BARE", "IMAGE", "SHOES"])
+def test_soles_of_another_kind_are_not_shown_with_the_bars_of_shoes(ground, scene, pattern):
+    scene.softground.tread_pattern = pattern
     bake(scene)
     assert own_data.SOLE not in ground.data.attributes
 

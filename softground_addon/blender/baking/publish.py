@@ -17,7 +17,7 @@ from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
-from ...core.relief_plan import BARE, relief_at, shod_of
+from ...core.relief_plan import BARS, relief_at, shod_of
 from ...core.settings import BakeSettings
 from .. import settings
 from ..ground import baked_ground, display_key, ground_mesh, playback
@@ -141,11 +141,11 @@ def sign(
 def _tread(
     footprints: Sequence[Footprint], position: Array, made_with: BakeSettings, relief: Sequence[StepRelief]
 ) -> Array | None:
-    """What `own_data.SOLE` says of places (K, 3): the tread of shoes, on those who go on two feet; None if nobody
-    has one, they are barefoot, or relief has it in the mesh."""
+    """What `own_data.SOLE` says of places (K, 3): the bars of shoes, on those who go on two feet; None if nobody
+    has any, or relief has the tread in the mesh."""
     in_relief = {(step.character, step.sole) for step, its in zip(footprints, relief, strict=False) if its.tread}
     shod = shod_of(made_with.inputs()) - in_relief
-    is_shod = made_with.tread_m > 0 and made_with.tread_pattern != BARE
+    is_shod = made_with.tread_m > 0 and made_with.tread_pattern in BARS
     if not is_shod or not any((step.character, step.sole) in shod for step in footprints):
         return None
     marks = sole_marks(footprints, footprints[0].cell_size, shod)
