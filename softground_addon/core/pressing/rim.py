@@ -147,22 +147,23 @@ def whole_reach(reach: float) -> int:
 
 def dilate(mask: Mask, reach: float) -> Mask:
     """Cells within `reach` cells (at least one) of a marked cell, for each of N masks (N, rows, columns)."""
-    radius = whole_reach(reach)
+    radius, count = whole_reach(reach), len(mask)
     reach_squared = max(reach + 1e-6, 1.0) ** 2
-    result = np.zeros_like(mask)
-    wider, half_width = mask.copy(), 0  # `wider` is the mask dilated along the row by half_width
+    packed = np.packbits(mask, axis=0)  # eight masks at a time
+    result = np.zeros_like(packed)
+    wider, half_width = packed.copy(), 0  # `wider` is the mask dilated along the row by half_width
     for offset in range(radius, -1, -1):
         reach_along_row = int(np.sqrt(reach_squared - offset**2))
         for shift in range(half_width + 1, reach_along_row + 1):
-            wider[..., shift:] |= mask[..., :-shift]
-            wider[..., :-shift] |= mask[..., shift:]
+            wider[..., shift:] |= packed[..., :-shift]
+            wider[..., :-shift] |= packed[..., shift:]
         half_width = reach_along_row
         if offset:
             result[:, offset:] |= wider[:, :-offset]
             result[:, :-offset] |= wider[:, offset:]
         else:
             result |= wider
-    return result
+    return np.unpackbits(result, axis=0, count=count).view(bool)
 
 
 def displaced_volume(compressed_volume: Array | float, material: GroundMaterial, factor: Array | float = 1.0) -> Array:
