@@ -76,6 +76,14 @@ class NodeGraph:
         self.link(offset, node.inputs["Offset"])
         return node.outputs["Geometry"]
 
+    def put_higher(self, geometry: Any, up: Any, height: Any, selection: Any = True) -> Any:
+        """Put the selected vertices higher by multiples of a vector."""
+        node = self.node("GeometryNodeSetPosition")
+        self.link(geometry, node.inputs["Geometry"])
+        self.link(selection, node.inputs["Selection"])
+        self.link(self.scaled(up, height), node.inputs["Offset"])
+        return node.outputs["Geometry"]
+
     def store(self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT") -> Any:
         """Give the selected vertices another value of that name."""
         node = self.node("GeometryNodeStoreNamedAttribute")
@@ -159,6 +167,20 @@ class NodeGraph:
         self.link(index, node.inputs["Index"])
         return node.outputs["Value"]
 
+    def repeated(
+        self, count: int, geometry: Any, number: float, step: Callable[[Any, Number], tuple[Any, Number]]
+    ) -> Any:
+        """What a geometry becomes by so many steps, each from it and a number to the next of both."""
+        begin, end = self.node("GeometryNodeRepeatInput"), self.node("GeometryNodeRepeatOutput")
+        begin.pair_with_output(end)
+        end.repeat_items.new("FLOAT", "Number")
+        for value, name in ((count, "Iterations"), (geometry, "Geometry"), (number, "Number")):
+            self.link(value, begin.inputs[name])
+        changed, following = step(begin.outputs["Geometry"], self.number(begin.outputs["Number"]))
+        self.link(changed, end.inputs["Geometry"])
+        self.link(following.socket, end.inputs["Number"])
+        return end.outputs["Geometry"]
+
     def combined(self, *parts: Any) -> Any:
         """A vector of up to three numbers."""
         node = self.node("ShaderNodeCombineXYZ")
@@ -167,6 +189,7 @@ class NodeGraph:
         return node.outputs["Vector"]
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
+        """One or the other; a number is true if it is above 0."""
         node = self.node("GeometryNodeSwitch")
         node.input_type = kind
         self.link(switch, node.inputs["Switch"])
@@ -181,6 +204,10 @@ class NodeGraph:
         for vector, socket in zip(vectors, node.inputs, strict=False):
             self.link(vector, socket)
         return node.outputs[output]
+
+    def parts(self, vector: Any) -> list[Number]:
+        """The three numbers of a vector."""
+        return [self.number(part) for part in self.separated(vector)]
 
     def dot(self, first: Any, second: Any) -> Any:
         return self.vector("DOT_PRODUCT", first, second, output="Value")
@@ -235,9 +262,8 @@ class Number:
 
         What is not asked for is not worked out.
         """
-        total = sum(acting[1:], acting[0]).above(0.0)
         value = otherwise.socket if isinstance(otherwise, Number) else otherwise
-        return Number(self.graph, self.graph.choose("FLOAT", total.socket, value, self.socket))
+        return Number(self.graph, self.graph.choose("FLOAT", sum(acting[1:], acting[0]).socket, value, self.socket))
 
     def within_one(self) -> Number:
         """No less than 0, no more than 1."""

@@ -14,9 +14,9 @@ from softground_addon.blender.ground import baked_ground, ground_mesh, weather, 
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
-from softground_addon.core.after.weather import matter_of
+from softground_addon.core.after.weather import MOMENTS, matter_of
 from softground_addon.core.after.weather_course import Weather
-from softground_addon.core.after.weather_places import WeatherPlaces, section_of
+from softground_addon.core.after.weather_places import NOT_YET, WeatherPlaces, section_of
 from tests.blender import weathered_shots
 from tests.core.after.weathered_ground import weathered
 from tests.tiers import slow_but_one
@@ -24,8 +24,8 @@ from tests.tiers import slow_but_one
 FRAMES = (1, 20, 34, 300)
 SOME = weathered_shots.SOME | {"Water Table": 2.0, "Halo": 0.8}
 DEFAULTS = {name: value for name, value, *_ in nodes.INPUTS}
-MAY_LACK = (*nodes.OF_HOLLOWS, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)
-"""What is not stored where no water stands, and where there is no weather."""
+MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)
+"""What is not stored where the ground does not ask for it, and where there is no weather."""
 HOUR = 3600.0
 
 
@@ -77,10 +77,11 @@ def in_core(values):
 
 
 def read(mesh, name, width=1):
+    kind = np.int32 if nodes.KINDS.get(name) == "INT" else np.float32
     if name in MAY_LACK and name not in mesh.attributes:
-        return np.zeros((len(mesh.vertices), width)).squeeze()
+        return np.zeros((len(mesh.vertices), width), dtype=kind).squeeze()
     attribute = mesh.attributes[name]
-    values = np.empty(len(attribute.data) * width, dtype=np.float32)
+    values = np.empty(len(attribute.data) * width, dtype=kind)
     attribute.data.foreach_get("value" if width == 1 else "vector", values)
     return values.reshape(-1, width) if width > 1 else values
 
@@ -116,7 +117,8 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
     ground = carrier(scene)
     mesh = ground.data
     footprints, about = baked_ground.load(scene.softground.ground)
-    places = held(mesh)
+    span = weather.span_of(*about["inputs"]["frames"], 24.0)
+    places = held(mesh, span)
     matter = matter_of(surface, about["inputs"]["material"]["layer_depth"], section_of(footprints))
     rest = ground_mesh.rest_positions(mesh)
     alone = [{name: value} for name, value in SOME.items() if name != "Time Scale"]
@@ -130,7 +132,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
                 said,
                 matter,
                 frame=frame,
-                span=weather.span_of(*about["inputs"]["frames"], 24.0),
+                span=span,
             )
             now = shown(scene, frame)
             moved = (read(now, "position", 3) - before[frame])[:, 2]
@@ -140,7 +142,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
             if not matter.wet or nodes.WETNESS in now.attributes:
                 close(read(now, nodes.WETNESS), wanted.wetness, atol=1e-3)
             close(read(now, nodes.FRESH), wanted.fresh, atol=1e-3)
-            assert nodes.NOW not in now.attributes
+            assert nodes.STANDING not in now.attributes
             if matter.wet:
                 close(read(now, nodes.DRIED), wanted.dried, atol=1e-3)
             if matter.soaking and not about["inputs"].get("relief_look"):
@@ -165,13 +167,16 @@ def key(scene, name, values, interpolation="LINEAR"):
     return curve
 
 
-def held(mesh):
+def held(mesh, span):
+    """What a bake has stored for weather, with the frames of the moments that it tells apart."""
+    moments = np.append(NOT_YET, np.linspace(span.first, span.last, MOMENTS + 1))
+    since, filled = (moments[read(mesh, name)] for name in (nodes.MOMENT, nodes.FILLED))
     return WeatherPlaces(
         read(mesh, nodes.BLUR, 3),
         read(mesh, nodes.TRODDEN, 3),
-        read(mesh, nodes.TIMES, 3),
+        np.stack([read(mesh, nodes.PRESSED), since, read(mesh, nodes.COMPACTED)], axis=1),
         read(mesh, nodes.POOL, 3),
-        np.concatenate([read(mesh, name, 3) for name in nodes.LEVELS], axis=1),
+        np.column_stack([read(mesh, nodes.LEVELS[0], 3), read(mesh, nodes.LEVELS[1], 3)[:, :2], filled]),
     )
 
 
@@ -205,7 +210,7 @@ def test_keyed_weather_is_what_its_keys_add_up_to_in_any_order_and_without_the_a
         values = np.where(parts < 100, 0.0, 9.0) if name == "Wind" else linear
         sliders[name] = np.append(values.mean(axis=1), list(keys.values())[-1])
     matter = matter_of(surface, about["inputs"]["material"]["layer_depth"], section_of(footprints))
-    rest, places = ground_mesh.rest_positions(mesh), held(mesh)
+    rest, places = ground_mesh.rest_positions(mesh), held(mesh, weather.span_of(*about["inputs"]["frames"], 24.0))
     seen = {}
     for frame in (300, 1, 34, 20, 300):
         wanted = weathered(
@@ -398,7 +403,7 @@ def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened
 
 def test_an_attribute_of_the_users_is_left_alone(opened):
     scene = opened()
-    carrier(scene).data.attributes.new(nodes.TIMES, "FLOAT", "POINT")
+    carrier(scene).data.attributes.new(nodes.PRESSED, "FLOAT", "POINT")
     with pytest.raises(RuntimeError, match=r"rename it"):
         bpy.ops.softground.add_weather()
     assert weather_modifier.modifier_of(carrier(scene)) is None

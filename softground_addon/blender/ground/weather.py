@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.felt_weather import felt_in
-from ...core.after.weather import matter_of, span_of
-from ...core.after.weather_places import NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
+from ...core.after.weather import Matter, Span, matter_of, moment_of, span_of
+from ...core.after.weather_places import KNOTS, NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
@@ -116,21 +116,22 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
         known = of_bake(inputs)
         stretch, rate = known["time_stretch"], float(inputs["frame_rate"])
         first, last = (float(frame) * stretch for frame in inputs["frames"])
-        surface, unit_scale = str(inputs["surface"]), float(inputs["unit_scale_m"])
+        unit_scale, matter = float(inputs["unit_scale_m"]), matter_on(footprints, inputs)
     except (KeyError, TypeError, ValueError, IndexError):
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
-    mesh = ground_mesh.mesh_of(display_mesh)
-    store(mesh, places)
-    matter = matter_of(surface, known["layer_depth"], section_of(footprints))
-    if matter.soaking is None:  # no water stands there
-        own_data.remove(mesh, nodes.OF_HOLLOWS)
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
+    store(ground_mesh.mesh_of(display_mesh), places, matter, span)
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
     nodes.build(tree, **given, felt=known["felt"])
     tree[weather_keys.LAST] = span.last
+
+
+def matter_on(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Matter:
+    """How the ground of a bake takes weather, by its footprints and inputs."""
+    return matter_of(str(inputs["surface"]), float(inputs["material"]["layer_depth"]), section_of(footprints))
 
 
 def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -162,13 +163,29 @@ def _places(
     return weather_places(footprints, position, relief, start, np.maximum(end, last), **known)
 
 
-def store(mesh: bpy.types.Mesh, places: WeatherPlaces) -> None:
-    """Give a mesh what the node group reads, of its vertices."""
-    halves = np.split(places.levels, 2, axis=1)
-    vectors = (places.blur, places.trodden, places.times, places.pool, *halves)
-    for name, values in zip(nodes.OF_WEATHER, vectors, strict=True):
-        attribute = own_data.attribute(mesh, name, "FLOAT_VECTOR")
-        attribute.data.foreach_set("vector", values.astype(np.float32).ravel())
+def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> None:
+    """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for."""
+    pressed, since, compacted = places.times.T
+    capacity, rises = places.pool[:, 0], places.levels[:, :KNOTS]
+    values: dict[str, NDArray[Any]] = {
+        nodes.BLUR: places.blur,
+        nodes.TRODDEN: places.trodden,
+        nodes.PRESSED: pressed,
+        nodes.MOMENT: np.where(since < NOT_YET, 1 + moment_of(since, span), 0),
+    }
+    if matter.snow_depth:
+        values[nodes.COMPACTED] = compacted
+    if matter.soaking:
+        values[nodes.POOL] = places.pool
+        values[nodes.LEVELS[0]] = rises[:, :3]
+        values[nodes.LEVELS[1]] = np.column_stack([rises[:, 3:], rises.sum(axis=1)])
+        values[nodes.FILLED] = np.where(capacity > 0, 1 + moment_of(places.levels[:, KNOTS], span), 0)
+    own_data.remove(mesh, set(nodes.OF_WEATHER) - set(values))
+    for name, of_vertices in values.items():
+        kind = nodes.KINDS[name]
+        field = "vector" if kind == "FLOAT_VECTOR" else "value"
+        stored = of_vertices.astype(np.int32 if kind == "INT" else np.float32)
+        own_data.attribute(mesh, name, kind).data.foreach_set(field, stored.ravel())
     mesh.update()
 
 

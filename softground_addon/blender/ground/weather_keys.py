@@ -58,6 +58,13 @@ def follow(display_mesh: bpy.types.Object) -> None:
         tree.update_tag()
 
 
+def moments_of(display_mesh: bpy.types.Object) -> Span:
+    """The span of which the weather of an object tells the moments apart, keys or none."""
+    modifier: Any = weather_modifier.modifier_of(display_mesh)
+    tree = modifier.node_group
+    return span_of(tree.nodes[FIRST].outputs[0].default_value, tree[LAST])
+
+
 def rates(modifier: Any, span: Span) -> dict[str, Any]:
     """What acts on prints, as `core.after.weather_course.Weather` has it: numbers, or means over each part if keyed."""
     keyed, values = _keyed(modifier), dict(compat.node_inputs(modifier))

@@ -3,8 +3,9 @@
 z = rest + kept·relief(sigma) + level. The level is that of untouched ground, which the weather has acted on from the
 start, and in a print that since it was made; relief and bounds of prints lose their edges as variances add up.
 
-Native Blender data that needs nothing of this add-on. What is the same everywhere is worked out once, the rest for each
-vertex, from what `core.after.weather_places` found and the group's own inputs.
+Native Blender data that needs nothing of this add-on. All that follows from a vertex's last contact alone is worked out
+for each moment of `weather_course_nodes`, of which the vertex has the number. What is left for each vertex is linear in
+what `core.after.weather_places` found.
 """
 
 from __future__ import annotations
@@ -26,20 +27,35 @@ MARK = "softground_weather"
 """Custom property of the group, whatever the user calls it."""
 
 BLUR, TRODDEN = "softground_weather_blur", "softground_weather_trodden"
-TIMES, POOL = "softground_weather_times", "softground_weather_pool"
+PRESSED, MOMENT, COMPACTED = (
+    "softground_weather_pressed",
+    "softground_weather_moment",
+    "softground_weather_compacted",
+)
+"""Frame of the first contact; number of the last one's end among the moments, 0 where there is none; what steps
+compressed, on snow alone [m]."""
+POOL, FILLED = "softground_weather_pool", "softground_weather_filled"
 LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
-"""Vectors; see `core.after.weather_places.WeatherPlaces`. The levels are three and three."""
-OF_HOLLOWS = (POOL, *LEVELS)
-OF_WEATHER = (BLUR, TRODDEN, TIMES, *OF_HOLLOWS)
+"""See `core.after.weather_places.WeatherPlaces`. The levels are vectors of three and two and their sum; from the moment
+on that has the number `FILLED`, which is 0 where no hollow is."""
+KINDS = {
+    BLUR: "FLOAT_VECTOR",
+    TRODDEN: "FLOAT_VECTOR",
+    PRESSED: "FLOAT",
+    MOMENT: "INT",
+    COMPACTED: "FLOAT",
+    POOL: "FLOAT_VECTOR",
+    **dict.fromkeys(LEVELS, "FLOAT_VECTOR"),
+    FILLED: "INT",
+}
+OF_WEATHER = tuple(KINDS)
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
 """What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
 standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 
-NOW = "softground_weather_now"
-"""A vector that is there only while the group works."""
-HEIGHT, KEPT, PALE, PRESSED = "height", "kept", "pale", "pressed"
-"""Names of what is worked out with that, and not stored."""
+STANDING = "softground_weather_standing"
+"""Depth of standing water without the bake's own [m], there only while the group works."""
 
 NEVER_FULL = 1e9
 """Of a sixth knot of the levels, which is none."""
@@ -135,129 +151,166 @@ def build(
     group = graph.node("NodeGroupInput")
     said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
     course = CourseNodes(graph, said, matter, span, soaking)
+    ground = _Vertices(graph, course, matter, up)
 
-    graph.next_row()
-    pressed, since, compression = (graph.number(part) for part in graph.separated(_vector(graph, TIMES)))
-    aged = course.since(since, course.of_places)
-    share = _shares(graph, aged["variance"])
-    relief = _relief(graph, up)
-    snow, warmth, wind, rain, drying, _, seep, halo = course.acts.values()
-    soft = relief + graph.number(graph.dot(_vector(graph, BLUR), share))
-    if matter.blown:
-        soft = soft * aged["kept"]
-    trodden = _vector(graph, TRODDEN)
-    begun = 1.0 - pressed.above(course.frame)
-    inside = graph.number(graph.dot(trodden, graph.vector("MAXIMUM", share, (1.0, 0.0, 0.0)))).within_one() * begun
-
-    lower = inside * aged["kept"] if matter.blown else inside  # what is blown full lies as high as open ground
-
-    graph.next_row()
-    cover = (course.around["cover"] + (aged["cover"] - course.around["cover"]) * lower).where(snow)
-    height = (soft - relief).where(snow, warmth, wind, rain) + cover
-    if matter.snow_depth:
-        left = (soft + matter.snow_depth).at_least(0.0)
-        ratio = (1.0 - compression * (1.0 / matter.snow_depth)).at_least(0.0)
-        around, within = course.around["thawed"].at_most(left), (aged["thawed"] * ratio * ratio).at_most(left)
-        height = (height - around - (within - around) * lower).where(warmth, otherwise=height)
-    wetness = course.around["wet"]
-    if matter.wet:
-        wetness = (wetness + (aged["wet"] - wetness) * inside).where(drying, otherwise=1.0)
-    seen = {HEIGHT: height, FRESH: (cover * (1.0 / COVERED)).within_one(), WETNESS: wetness}
-    if matter.soaking:
-        graph.next_row()
-        water = _standing(graph, course, said["Water Table"] * 0.01, height).where(rain, seep)
-        seen |= {HEIGHT: height + water, WETNESS: wetness.at_least(water.above(0.0)), WATER: water}
-    if matter.blown:
-        seen[KEPT] = aged["kept"]
-    if felt and matter.snow_depth:
-        seen[PRESSED] = compression * begun
-    if matter.pales:
-        near = graph.number(graph.dot(trodden, (NEAR,) * 3)).within_one() * begun
-        seen[PALE] = (said["Halo"] * near * aged["pale"]).where(halo)
     graph.next_row()
     geometry = group.outputs["Geometry"]
-    changed = _changed(graph, geometry, seen, course.acts, matter, up)
-    graph.finish(graph.choose("GEOMETRY", course.is_any.above(0.0).socket, geometry, changed))
-
-
-def _changed(
-    graph: NodeGraph,
-    geometry: Any,
-    seen: Mapping[str, Number],
-    acts: Mapping[str, Number],
-    matter: Matter,
-    up: Sequence[float],
-) -> Any:
-    """The geometry under weather; `acts` as those of the course."""
-    # Before anything moves: all of it follows from where the playback has the vertices.
-    together = (HEIGHT, WETNESS, WATER) if matter.soaking else (HEIGHT, FRESH, KEPT)
-    geometry, seen = _worked_out(graph, geometry, seen, together)
-    geometry = _with(graph, geometry, {FRESH: seen[FRESH]}, acts["Snowfall"])
-    geometry = _with(graph, geometry, {WETNESS: seen[WETNESS]})
+    changed = ground.stored(geometry, felt=felt)
+    changed = ground.moved(changed)
+    if matter.soaking:
+        changed = ground.flooded(changed, said["Water Table"] * 0.01)
     if matter.wet:
-        dried = (1.0 - seen[WETNESS]).at_least(seen.get(PALE, 0.0))
-        geometry = _with(graph, geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
-    if matter.soaking:  # the bake's own water stays
-        water = graph.number(graph.attribute(WATER)).at_least(seen[WATER])
-        geometry = _with(graph, geometry, {WATER: water}, acts["Rain"], acts["Water Table"])
-    if PRESSED in seen:
-        deep = graph.number(graph.attribute(COMPRESSION)).at_least(seen[PRESSED])
-        geometry = _with(graph, geometry, {COMPRESSION: deep}, acts["Snowfall"])
-    if matter.blown:  # what is blown full looks trodden no more
-        blown = {name: graph.number(graph.attribute(name)) * seen[KEPT] for name in (COMPRESSION, RIM)}
-        geometry = _with(graph, geometry, blown, acts["Wind"])
-    return graph.forgotten(_moved(graph, geometry, up, seen[HEIGHT]), NOW)
+        changed = ground.dried(changed, said["Halo"])
+    graph.finish(graph.choose("GEOMETRY", course.is_any.socket, geometry, changed))
 
 
-def _worked_out(
-    graph: NodeGraph, geometry: Any, values: Mapping[str, Number], together: Sequence[str]
-) -> tuple[Any, dict[str, Number]]:
-    """A geometry that keeps up to three numbers, and all, these as they are kept: they are not worked out again."""
-    names = [name for name in together if name in values]
-    pack = graph.combined(*(values[name].socket for name in names))
-    parts = graph.separated(_vector(graph, NOW))
-    known = {name: graph.number(part) for name, part in zip(names, parts, strict=False)}
-    return graph.store(geometry, NOW, pack, True, "FLOAT_VECTOR"), {**values, **known}
+class _Vertices:
+    """What the weather makes of the vertices.
 
+    Parameters
+    ----------
+    graph : NodeGraph
+    course : CourseNodes
+    matter : Matter
+    up : (3,) floats
+        See `build`.
+    """
 
-def _with(graph: NodeGraph, geometry: Any, values: Mapping[str, Number], *acting: Number) -> Any:
-    """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
-    changed = geometry
-    for name, value in values.items():
-        changed = graph.store(changed, name, value.socket, True)
-    if not acting:
-        return changed
-    return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).above(0.0).socket, geometry, changed)
+    def __init__(self, graph: NodeGraph, course: CourseNodes, matter: Matter, up: Sequence[float]) -> None:
+        self._graph, self._course, self._matter, self._up = graph, course, matter, tuple(up)
+        self._acts = course.acts
+        not_yet = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(PRESSED))
+        self._moment = graph.attribute(MOMENT, "INT")
+        self._moment_if_begun = graph.choose("INT", not_yet, self._moment, 0)
+        self._share = _shares(graph, course.aged["variance"])
+        _, wider, widest = graph.parts(self._share)
+        self._inside = graph.combined(
+            *(one.socket for one in (course.begun, wider * course.begun, widest * course.begun))
+        )
+        self._kept = course.aged["filled"] + 1.0
+        self._trodden = graph.attribute(TRODDEN, "FLOAT_VECTOR")
 
+    def stored(self, geometry: Any, *, felt: bool) -> Any:
+        """The geometry with what materials read, but for new snow and standing water; `felt` as in `build`."""
+        graph, acts, matter = self._graph, self._acts, self._matter
+        wetness = self._course.around["wet"]
+        if matter.wet:
+            wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
+        geometry = graph.store(geometry, WETNESS, wetness.socket, True)
+        if felt and matter.snow_depth:
+            begun = graph.number(self._moment_if_begun).at_most(1.0)
+            deep = graph.number(graph.attribute(COMPACTED)) * begun
+            deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
+            geometry = self._with(geometry, {COMPRESSION: deep}, acts["Snowfall"])
+        if matter.blown:  # what is blown full looks trodden no more
+            kept = self._number(self._kept, self._moment)
+            blown = {name: graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM)}
+            geometry = self._with(geometry, blown, acts["Wind"], selection=graph.attribute(MOVED, "BOOLEAN"))
+        return geometry
 
-def _moved(graph: NodeGraph, geometry: Any, up: Sequence[float], height: Number) -> Any:
-    """A geometry that is higher by so much."""
-    node = graph.node("GeometryNodeSetPosition")
-    graph.link(geometry, node.inputs["Geometry"])
-    graph.link(graph.scaled(tuple(up), height.socket), node.inputs["Offset"])
-    return node.outputs["Geometry"]
+    def moved(self, geometry: Any) -> Any:
+        """The geometry under new snow and as high as the weather has it, but for standing water."""
+        graph, acts, matter = self._graph, self._acts, self._matter
+        snow, fresh = acts["Snowfall"], graph.number(graph.attribute(FRESH))
+        cover = self._around("cover", self._not_full(self._inside))
+        geometry = self._with(geometry, {FRESH: cover * (1.0 / COVERED)}, snow)
+        relief = self._relief()
+        change = self._dot(graph.attribute(BLUR, "FLOAT_VECTOR"), self._not_full(self._share), self._moment)
+        if matter.blown:
+            change = change + (relief * self._number(self._course.aged["filled"], self._moment)).where(acts["Wind"])
+        change = change.where(acts["Snowfall"], acts["Temperature"], acts["Wind"], acts["Rain"])
+        height = change + (fresh * COVERED).where(snow)
+        if matter.snow_depth:
+            # Vertices that the user adds have no place at rest.
+            left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
+            height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
+        geometry = graph.put_higher(geometry, self._up, height.socket)
+        return self._with(geometry, {FRESH: fresh.within_one()}, snow)
 
+    def flooded(self, geometry: Any, table: Number) -> Any:
+        """The geometry with water in the hollows; `table` is how far below their brims it comes by itself [m]."""
+        graph, acts = self._graph, self._acts
+        hollows = graph.attribute(FILLED, "INT")
+        wet = graph.store(geometry, STANDING, self._standing(table).socket, hollows)
+        standing = graph.number(graph.attribute(STANDING))
+        wet = graph.put_higher(wet, self._up, standing.socket, hollows)
+        deepest = graph.number(graph.attribute(WATER)).at_least(standing)  # the bake's own water stays
+        wet = graph.store(wet, WATER, deepest.socket, hollows)
+        wetness = graph.number(graph.attribute(WETNESS)).at_least(standing.above(0.0))
+        wet = graph.forgotten(graph.store(wet, WETNESS, wetness.socket, hollows), STANDING)
+        return graph.choose("GEOMETRY", (acts["Rain"] + acts["Water Table"]).socket, geometry, wet)
 
-def _standing(graph: NodeGraph, course: CourseNodes, table: Number, height: Number) -> Number:
-    """Depth of water where the ground has changed by a height; `table` is how far below the brim it comes by itself."""
-    capacity, above, left = (graph.number(part) for part in graph.separated(_vector(graph, POOL)))
-    rises = [_vector(graph, name) for name in LEVELS]
-    aged = course.since(graph.number(graph.separated(rises[1])[2]), course.of_hollows)
-    excess = aged["low"] + (aged["high"] - aged["low"]) * course.between(left)
-    filled = (excess / capacity).within_one().root() * KNOTS
-    parts = []
-    for rise, begin in zip(rises, ((0.0, 1.0, 2.0), (3.0, 4.0, NEVER_FULL)), strict=True):
-        steps = graph.vector("SUBTRACT", filled.socket, begin)
-        steps = graph.vector("MINIMUM", graph.vector("MAXIMUM", steps, (0.0,) * 3), (1.0,) * 3)
-        parts.append(graph.number(graph.dot(steps, rise)))
-    brim = graph.number(graph.dot(rises[0], (1.0,) * 3)) + graph.number(graph.dot(rises[1], (1.0, 1.0, 0.0)))
-    seeped = ((brim - table).at_least(0.0) * aged["seeped"]).where(course.acts["Water Table"])
-    level = (parts[0] + parts[1]).where(course.acts["Rain"]).at_least(seeped)
-    return (level - above - height).at_least(0.0) * level.above(0.0)
+    def dried(self, geometry: Any, halo: Number) -> Any:
+        """The geometry with how dry ground looks that is wet to begin with."""
+        graph, acts = self._graph, self._acts
+        dried = 1.0 - graph.number(graph.attribute(WETNESS))
+        if self._matter.pales:
+            near = graph.number(graph.dot(self._trodden, (NEAR,) * 3)).within_one()
+            pale = self._number(self._course.aged["pale"] * self._course.begun, self._moment_if_begun)
+            dried = dried.at_least((halo * near * pale).where(acts["Halo"]))
+        return self._with(geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
 
+    def _standing(self, table: Number) -> Number:
+        """Depth of water in hollows."""
+        graph, course = self._graph, self._course
+        capacity, above, left = graph.parts(graph.attribute(POOL, "FLOAT_VECTOR"))
+        rises = [graph.attribute(name, "FLOAT_VECTOR") for name in LEVELS]
+        low, high, seeped = graph.parts(self._course.moments.at("hollows", graph.attribute(FILLED, "INT")))
+        excess = low + (high - low) * course.between(left)
+        filled = (excess / capacity).within_one().root() * KNOTS
+        parts = []
+        for rise, begin in zip(rises, ((0.0, 1.0, 2.0), (3.0, 4.0, NEVER_FULL)), strict=True):
+            steps = _within_one(graph, graph.vector("SUBTRACT", filled.socket, begin))
+            parts.append(graph.number(graph.dot(steps, rise)))
+        brim = graph.parts(rises[1])[2]
+        risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
+        level = (parts[0] + parts[1]).where(self._acts["Rain"]).at_least(risen)
+        return (level - above - self._relief()).at_least(0.0) * level.above(0.0)
 
-def _vector(graph: NodeGraph, name: str) -> Any:
-    return graph.attribute(name, "FLOAT_VECTOR")
+    def _thawed(self, left: Number) -> Number:
+        """What has melted of snow of which so much would be left without [m]."""
+        graph, depth = self._graph, self._matter.snow_depth
+        ratio = (1.0 - graph.number(graph.attribute(COMPACTED)) * (1.0 / depth)).at_least(0.0)
+        around = self._course.around["thawed"].at_most(left)
+        within = (self._number(self._course.aged["thawed"], self._moment) * ratio * ratio).at_most(left)
+        return around + (within - around) * self._dot(
+            self._trodden, self._not_full(self._inside), self._moment_if_begun
+        )
+
+    def _not_full(self, vector: Any) -> Any:
+        """A vector of the moments by the share of prints that is not blown full."""
+        return self._graph.scaled(vector, self._kept.socket) if self._matter.blown else vector
+
+    def _around(self, name: str, inside: Any) -> Number:
+        """What it is of open ground, and in prints since they were made."""
+        around = self._course.around[name]
+        more = self._graph.scaled(inside, (self._course.aged[name] - around).socket)
+        return around + self._dot(self._trodden, more, self._moment_if_begun)
+
+    def _dot(self, stored: Any, of_moments: Any, moment: Any) -> Number:
+        """A vector of the vertices by one that belongs to their moments."""
+        looked_up = self._graph.at_index(self._course.moments.geometry, of_moments, moment)
+        return self._graph.number(self._graph.dot(stored, looked_up))
+
+    def _number(self, value: Number, moment: Any) -> Number:
+        """A number of the vertices' moments."""
+        moments = self._course.moments.geometry
+        return self._graph.number(self._graph.at_index(moments, value.socket, moment, "FLOAT"))
+
+    def _relief(self) -> Number:
+        """How high a vertex is over its place at rest [m]."""
+        graph, up = self._graph, self._up
+        position = graph.node("GeometryNodeInputPosition").outputs["Position"]
+        moved = graph.vector("SUBTRACT", position, graph.attribute(REST, "FLOAT_VECTOR"))
+        metre = sum(part * part for part in up)
+        return graph.number(graph.dot(moved, tuple(part / metre for part in up)))
+
+    def _with(self, geometry: Any, values: Mapping[str, Number], *acting: Number, selection: Any = True) -> Any:
+        """A geometry with numbers of these names, if one of those that act, the same everywhere, is above 0."""
+        graph, changed = self._graph, geometry
+        for name, value in values.items():
+            changed = graph.store(changed, name, value.socket, selection)
+        return graph.choose("GEOMETRY", sum(acting[1:], acting[0]).socket, geometry, changed)
 
 
 def _shares(graph: NodeGraph, variance: Number) -> Any:
@@ -265,14 +318,8 @@ def _shares(graph: NodeGraph, variance: Number) -> Any:
     spans = [high - low for low, high in pairwise(BOUNDS)]
     factors = tuple(1.0 / span for span in spans)
     offsets = tuple(-low / span for low, span in zip(BOUNDS[:-1], spans, strict=True))
-    passed = graph.vector("MULTIPLY_ADD", variance.socket, factors, offsets)
-    return graph.vector("MINIMUM", graph.vector("MAXIMUM", passed, (0.0,) * 3), (1.0,) * 3)
+    return _within_one(graph, graph.vector("MULTIPLY_ADD", variance.socket, factors, offsets))
 
 
-def _relief(graph: NodeGraph, up: Sequence[float]) -> Number:
-    """How high the playback has a vertex over its place at rest [m]."""
-    position = graph.node("GeometryNodeInputPosition").outputs["Position"]
-    moved = graph.vector("SUBTRACT", position, _vector(graph, REST))
-    metre = sum(part * part for part in up)
-    along = graph.number(graph.dot(moved, tuple(part / metre for part in up)))
-    return along * graph.number(graph.attribute(MOVED, "BOOLEAN"))
+def _within_one(graph: NodeGraph, vector: Any) -> Any:
+    return graph.vector("MINIMUM", graph.vector("MAXIMUM", vector, (0.0,) * 3), (1.0,) * 3)

@@ -15,7 +15,7 @@ from ...core.after.weather_places import NOT_YET, SIGMAS, weather_places
 from ...core.playback.keyframe_tables import keyframe_tables
 from ...core.playback.vertex_histories import VertexHistories
 from ..mesh_arrays import positions
-from . import baked_ground, ground_mesh, own_data, weather, weather_modifier
+from . import baked_ground, ground_mesh, own_data, weather, weather_keys, weather_modifier
 from . import playback_nodes as played
 from . import weather_nodes as nodes
 
@@ -84,7 +84,10 @@ def weathered_points(
     points = bpy.data.meshes.new("SoftGround Points")
     try:
         points.vertices.add(count)
-        weather.store(points, weather_places(footprints, position, final, start, end, **known))
+        places = weather_places(footprints, position, final, start, end, **known)
+        weather.store(
+            points, places, weather.matter_on(footprints, about["inputs"]), weather_keys.moments_of(display_mesh)
+        )
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))

@@ -67,6 +67,8 @@ SEALING = 5.0
 
 PARTS = 256
 """Of the time from the first frame of the weather to the last frame at which anything begins or changes."""
+MOMENTS = 4 * PARTS
+"""That are told apart in that time, at which vertices were last stepped on."""
 NO_WATER = 1.0
 """Depth of a water table that no print reaches [m]."""
 
@@ -88,6 +90,18 @@ class Span:
 def span_of(first: float, last: float, frame_rate: float = 1.0) -> Span:
     """A span of parts of whole frames."""
     return Span(first, first + PARTS * max(math.ceil((last - first) / PARTS), 1), frame_rate)
+
+
+def moment_of(frame: Any, span: Span) -> Any:
+    """Number of the moment that is nearest to a frame, of those from 0 to `MOMENTS` into which a span is divided.
+
+    Examples
+    --------
+    >>> moment_of([-5.0, 1.0, 1.2, 257.0, 1e9], span_of(1.0, 257.0))
+    array([   0,    0,    1, 1024, 1024])
+    """
+    through = np.subtract(frame, span.first) / (span.last - span.first)
+    return np.rint(np.clip(through, 0.0, 1.0) * MOMENTS).astype(np.intp)
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,8 @@ class WeatherPlaces:
         First frame of the first contact there, and last frame that something happened, both from the contacts around
         where there was none; what steps compressed, at the first of the sigmas [m].
     pool : (K, 3) float array
-        What the hollow there holds as a depth of water on it [m], 0 where there is none; height above its bottom [m];
-        how much of its soaking is left.
+        What the hollow there holds as a depth of water on it [m], 0 where there is none; how far the undisturbed ground
+        is above its bottom [m]; how much of its soaking is left.
     levels : (K, 6) float array
         Rise of the water at each fifth of the root of the share of what the hollow holds [m], and the frame from
         which on it is there.
@@ -114,7 +114,7 @@ def weather_places(
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
         pressed = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma)))
         (compression,) = pressed.sample(*places)
-    pool, levels = _pools(footprints, ground, position, relief, blur_sigma, layer_depth, time_stretch)
+    pool, levels = _pools(footprints, ground, position, blur_sigma, layer_depth, time_stretch)
     return WeatherPlaces(
         blur=np.diff(heights, axis=0).T,
         trodden=np.stack([inside[0], inside[1] - inside[0], inside[2] - inside[1]], axis=-1),
@@ -176,7 +176,6 @@ def _pools(
     footprints: Sequence[Footprint],
     ground: HeightField,
     position: Array,
-    relief: Array,
     blur_sigma: float,
     layer_depth: float,
     time_stretch: float,
@@ -204,7 +203,7 @@ def _pools(
             known = hollow.level(hollow.capacity * (np.arange(KNOTS + 1) / KNOTS) ** 2) - hollow.bottom
             pressed = compression.ravel()[hollow.cells].mean() / layer_depth
             pool[wet, 0] = hollow.capacity / hollow.catchment
-            pool[wet, 1] = position[wet, 2] + relief[wet] - hollow.bottom
+            pool[wet, 1] = position[wet, 2] - hollow.bottom
             pool[wet, 2] = np.exp(-SEALING * pressed)
             levels[wet] = [*np.diff(known), footprint.end_frame * time_stretch]
     return pool, levels

@@ -97,7 +97,7 @@ def test_a_print_is_gone_under_a_night_of_snow(left):
 def lone(depth, *, capacity=0.0, rises=(0.0,) * KNOTS):
     """A flat-bottomed print of a depth, deep within it, made at the first frame."""
     times = np.array([[1.0, 1.0, depth]])
-    pool, levels = np.array([[capacity, 0.0, 1.0]]), np.array([[*rises, 1.0]])
+    pool, levels = np.array([[capacity, depth, 1.0]]), np.array([[*rises, 1.0]])
     return WeatherPlaces(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), times, pool, levels)
 
 

@@ -72,7 +72,7 @@ def weathered(
         within = np.minimum(course.since(since, course.thawed) * ratio**2, left)
         change = change - around - lower * (within - around)
 
-    water = _standing(places, change, weather, matter, course)
+    water = _standing(places, relief + change, weather, matter, course)
     looks = course.wet[0] + inside * (course.since(since, course.wet) - course.wet[0])
     wetness = np.where(water > 0, 1.0, looks)
     return Weathered(
@@ -98,17 +98,17 @@ def _dried(
     return dried
 
 
-def _standing(places: WeatherPlaces, change: Array, weather: Weather, matter: w.Matter, course: Course) -> Array:
-    """Depth of the water above ground that has changed by so much (K,) [m]."""
+def _standing(places: WeatherPlaces, height: Array, weather: Weather, matter: w.Matter, course: Course) -> Array:
+    """Depth of the water above ground that is so high above its place at rest (K,) [m]."""
     if matter.soaking is None:
-        return np.zeros_like(change)
+        return np.zeros_like(height)
     capacity, above, left = places.pool.T
     since, rises = places.levels[:, KNOTS], places.levels[:, :KNOTS]
     low, high = soaking_shares(places)
     at_low, at_high = (course.since(since, course.excess(share)) for share in (low, high))
     excess = at_low + (at_high - at_low) * np.clip((left - low) / max(high - low, LEAST_RANGE), 0.0, 1.0)
-    full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(change), where=capacity > 0), 0.0, 1.0))
+    full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(height), where=capacity > 0), 0.0, 1.0))
     rain = (np.clip(full[:, None] * KNOTS - np.arange(KNOTS), 0.0, 1.0) * rises).sum(axis=-1)
     seep = np.maximum(rises.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)
     level = np.maximum(rain, seep)
-    return np.where(level > 0, np.maximum(level - above - change, 0.0), 0.0)
+    return np.where(level > 0, np.maximum(level - above - height, 0.0), 0.0)
