@@ -19,11 +19,12 @@ from softground_addon.blender import compat, jobs, mesh_arrays, node_graph
 from softground_addon.blender.after import debris_object
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
-from softground_addon.blender.output import debris_points, exports
+from softground_addon.blender.output import debris_points, exports, image_exports
 from softground_addon.core.after import flight
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
+from tests.blender.images import read_image
 
 
 def runner(scene):
@@ -311,6 +312,51 @@ def arrays_of_points(text, name):
     block = re.search(rf"\b{name}\.timeSamples = \{{(.*?)\n\s*\}}", text, re.DOTALL)[1]
     found = re.findall(r"([-\d.]+): \[(.*?)\]", block, re.DOTALL)
     return {float(frame): np.array(re.findall(r"-?[\d.]+(?:e-?\d+)?", row), float) for frame, row in found}
+
+
+def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
+    """All of the volume that has landed by a frame, around where it lies."""
+    ground, side, resolution = scene.softground.ground, 8.0, 1024
+    obj = debris_object.of(ground)
+    place = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", place.ravel())
+    middle = place[:, :2].mean(axis=0)
+    corners = np.empty((len(ground.data.loops), 2), np.float32)
+    vertex = np.empty(len(ground.data.loops), np.int32)
+    ground.data.loops.foreach_get("vertex_index", vertex)
+    world = mesh_arrays.positions(ground.data) + np.array(ground.location)
+    corners[:] = (world[vertex, :2] - middle) / side + 0.5
+    ground.data.uv_layers.new(name="Square").uv.foreach_set("vector", corners.ravel())
+    scene.frame_set(5)
+    paths = image_exports.export_images(scene, ground, tmp_path, 20, 20, resolution=resolution, uv_map="Square")
+    for early in (1, 8):
+        paths += image_exports.export_images(
+            scene, ground, tmp_path, early, early, resolution=resolution, uv_map="Square"
+        )
+    assert {path.stem.split("_")[-2] for path in paths} == {"displacement", "mask", "debris"}
+    assert image_exports.kinds_of(ground) == ("displacement", "mask", "debris")
+    assert scene.frame_current == 5
+    volume = 4 / 3 * np.pi * values(obj, "radius").astype(float) ** 3
+    landed = values(obj, "softground_birth") + 24 * values(obj, "softground_flight")
+    centre = ((np.arange(resolution) + 0.5) / resolution - 0.5) * side
+    for frame in (1, 8, 20):
+        (path,) = [one for one in paths if one.name.endswith(f"debris_{frame:04d}.exr")]
+        thickness, cover, since, _ = np.moveaxis(read_image(path), -1, 0)
+        down = landed <= frame
+        there = thickness.sum() * (side / resolution) ** 2
+        assert there == pytest.approx(volume[down].sum(), rel=0.05, abs=1e-12)
+        assert (cover.max() > 0.1) == (frame > 1)
+        assert ((since >= 0) == (thickness > 0)).all()
+        assert since.max() <= frame / 24
+        if down.any():
+            lies = np.average(place[down, :2] - middle, axis=0, weights=volume[down])
+            shown = (thickness.sum(axis=0) @ centre, thickness.sum(axis=1) @ centre) / thickness.sum()
+            assert shown == pytest.approx(lies, abs=0.02)
+    set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
+    blown = debris_object.at_rest(obj, frame_rate=24.0, time_stretch=1.0, unit_scale=1.0).place
+    there = wanted(obj, 1e4, (3, 0, 0))
+    assert len(there) - len(blown) == (there[:, 2] < -10).sum() < 10  # what fell beside the ground lies nowhere
+    assert KDTree(there[:, :2]).query(blown)[0].max() < 1e-4
 
 
 @pytest.mark.slow

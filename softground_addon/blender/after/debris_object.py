@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.after import flight
 from ...core.after.debris import Debris
@@ -19,6 +21,26 @@ NAME = "SoftGround Debris"
 MODIFIER = "SoftGround Debris"
 THROWN = "softground_thrown"
 """Property of the ground: its debris."""
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """Pieces that lie on the ground.
+
+    Attributes
+    ----------
+    place : (N, 2) float array
+        [m]
+    radius : (N,) float array
+        [m]
+    landed : (N,) float array
+        Scene frame at which each came down.
+    """
+
+    place: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    landed: NDArray[np.float64]
+
 
 _AT_FIRST: dict[str, Any] = {"Wind": (0.0, 0.0, 0.0), "Amount": 1.0, "Shaped": nodes.SHAPED}
 
@@ -90,6 +112,35 @@ def field_of(obj: bpy.types.Object, name: str) -> tuple[Any, str] | None:
     """An input of the debris as `layout.prop` takes it: its modifier and the path of the property."""
     modifier = _modifier_of(obj)
     return compat.input_field(modifier, inputs_of(modifier)[name]) if modifier else None
+
+
+def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, unit_scale: float) -> AtRest:
+    """Where the pieces of debris come to rest in the wind of the moment; those that never do are left out.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        From `of`.
+    frame_rate, time_stretch, unit_scale
+        As of `put`.
+    """
+    points: Any = obj.data
+    count, modifier = len(points.vertices), _modifier_of(obj)
+
+    def values(name: str) -> NDArray[np.float64]:
+        found = np.empty(count, np.float32)
+        points.attributes[name].data.foreach_get("value", found)
+        return found.astype(np.float64)
+
+    place = np.empty(count * 3, np.float32)
+    points.vertices.foreach_get("co", place)
+    time, drag = values(nodes.FLIGHT), values(nodes.DRAG)
+    wind = compat.read_input(modifier, inputs_of(modifier)["Wind"]) if modifier else None
+    drift = np.outer(time + drag * np.expm1(-time / drag), tuple(wind or (0.0, 0.0, 0.0))[:2])
+    landed = values(nodes.BIRTH) / time_stretch + time * frame_rate
+    down = time < flight.LONGEST_FLIGHT - 1e-3
+    at = place.reshape(-1, 3)[:, :2].astype(np.float64) * unit_scale + drift
+    return AtRest(at[down], values(nodes.RADIUS)[down] * unit_scale, landed[down])
 
 
 def remove(ground: bpy.types.Object) -> None:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.fallout import Fallout
 from ...core.errors import InputError
 from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
@@ -20,15 +21,21 @@ from ...core.record.footprints import NEVER, Footprint
 from ...core.relief.steps import water_at
 from ...core.relief_plan import relief_at
 from .. import settings
+from ..after import debris_object
 from ..ground import baked_ground, ground_mesh, refined_mesh, weathered_points
 from .exports import baked_display_mesh, written_by_blender
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-DISPLACEMENT, MASK, WEATHER = "displacement", "mask", "weather"
+DISPLACEMENT, MASK, WEATHER, DEBRIS = "displacement", "mask", "weather", "debris"
 """Change of height [m] in all channels; compression [m], rim [m], age [s] in red, green, blue; where there is weather,
-wetness and fresh snow, 0 to 1, and depth of standing water [m]."""
+wetness and fresh snow, 0 to 1, and depth of standing water [m]; where steps threw, of what has come down: volume over
+area [m], share that it covers, 0 to 1, and time since [s], `NEVER` where nothing did."""
+FINEST_FALLOUT = 0.01
+"""Least side of the squares over which debris is summed [m]; in coarse images it is that of a pixel."""
+FARTHEST_FALLOUT = 3.0
+"""Debris that lies farther than this from all prints is left out [m]."""
 
 STRAY = 0.02
 """Pixels farther than this from any footprint's cells are left out of the look-up [m]."""
@@ -59,7 +66,7 @@ def export_images(
         Its own UV map is used, also where the detail along the trail carries the bake.
     folder : Path
         Gets `<name>_displacement_<frame>.exr` and `<name>_mask_<frame>.exr`, and under weather
-        `<name>_weather_<frame>.exr`.
+        `<name>_weather_<frame>.exr`, and of steps that throw `<name>_debris_<frame>.exr`.
     start, end : int
         First and last frame.
     resolution : int
@@ -78,6 +85,9 @@ def export_images(
     footprints, about = baked_ground.load(ground)
     sigma = baked_ground.baked_with(about, "blur_sigma")
     reach = STRAY + 4 * (float(np.hypot(sigma, weathered_points.BLUR)) if weathered else sigma)
+    fallen = _fallen(scene, ground)
+    if fallen is not None:
+        reach = max(reach, _farthest(footprints, fallen.place))
     pixels = _pixels(scene, ground, footprints, reach, resolution, uv_map)
     # Last comes a place that no footprint reaches: as it is, so is all the ground around.
     far = max(((one.window.column + one.window.columns) * one.cell_size for one in footprints), default=0.0)
@@ -87,6 +97,12 @@ def export_images(
     over_time = vertex_histories(footprints, x, y, blur_sigma=sigma, relief=relief)
     if not folder.is_dir():
         raise InputError(f"There is no folder '{folder}': create it first, or choose another.")
+    fallout = None
+    if fallen is not None:
+        # No finer than the pixels, which lie beside each other mostly: none falls between them.
+        pixel = np.median(np.linalg.norm(np.diff(pixels.position, axis=0), axis=1)) if len(x) > 2 else 0.0
+        cell_size = max(FINEST_FALLOUT, float(pixel), footprints[0].cell_size if footprints else 0.0)
+        fallout = Fallout(fallen.place, fallen.radius, fallen.landed, position[:, :2], cell_size)
     stem = name or bpy.path.clean_name(ground.name)
     paths = []
     with ExitStack() as open_:
@@ -105,6 +121,10 @@ def export_images(
                 now = at(frame, height, compression, rim)
                 height, compression, rim = now.height, now.compression, now.rim
                 kinds = {WEATHER: (now.wetness, now.fresh, now.water)}
+            if fallout is not None:
+                thickness, cover, latest = fallout.at(frame)
+                since = np.where(np.isfinite(latest), (frame - latest) / settings.frame_rate_of(scene), NEVER)
+                kinds |= {DEBRIS: (thickness, cover, since)}
             for kind, channels in {DISPLACEMENT: (height,) * 3, MASK: (compression, rim, age), **kinds}.items():
                 path = folder / f"{stem}_{kind}_{frame:04d}.exr"
                 _save(image, resolution, pixels.index, np.stack(channels, axis=-1), path)
@@ -115,7 +135,28 @@ def export_images(
 def kinds_of(ground: bpy.types.Object) -> tuple[str, ...]:
     """The kinds of images that are written of a ground."""
     weathered = weathered_points.has_weather(baked_ground.display_mesh_of(ground))
-    return (DISPLACEMENT, MASK, WEATHER) if weathered else (DISPLACEMENT, MASK)
+    thrown = debris_object.of(ground) is not None
+    return (DISPLACEMENT, MASK, *((WEATHER,) if weathered else ()), *((DEBRIS,) if thrown else ()))
+
+
+def _fallen(scene: bpy.types.Scene, ground: bpy.types.Object) -> debris_object.AtRest | None:
+    """What lies of what steps threw; None where they threw nothing."""
+    obj = debris_object.of(ground)
+    if obj is None:
+        return None
+    units = settings.units_of(scene)
+    return debris_object.at_rest(
+        obj, frame_rate=units.frame_rate, time_stretch=units.time_stretch, unit_scale=units.unit_scale_m
+    )
+
+
+def _farthest(footprints: Sequence[Footprint], place: Array) -> float:
+    """How far from the box around all footprints something lies, `FARTHEST_FALLOUT` at most [m]."""
+    if not footprints or not len(place):
+        return 0.0
+    low, high = _box(footprints)
+    away = np.maximum(low - place, place - high).max(axis=1)
+    return float(np.clip(away[away <= FARTHEST_FALLOUT].max(initial=0.0) + FINEST_FALLOUT, 0.0, FARTHEST_FALLOUT))
 
 
 def _age(over_time: VertexHistories, frame: float, points: int, scene: bpy.types.Scene) -> Array:
@@ -179,6 +220,13 @@ def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array
     """Which triangles (T, 3, 2) come near the box around all footprints."""
     if not footprints:
         return np.zeros(len(place), dtype=bool)
+    low, high = _box(footprints)
+    inside = (place.max(axis=1) > low - reach) & (place.min(axis=1) < high + reach)
+    return np.asarray(inside.all(axis=1))
+
+
+def _box(footprints: Sequence[Footprint]) -> tuple[Array, Array]:
+    """Lower and upper corner (2,) of the cells of footprints [m]."""
     low = np.min([(one.window.column * one.cell_size, one.window.row * one.cell_size) for one in footprints], axis=0)
     high = np.max(
         [
@@ -188,8 +236,7 @@ def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array
         ],
         axis=0,
     )
-    inside = (place.max(axis=1) > low - reach) & (place.min(axis=1) < high + reach)
-    return np.asarray(inside.all(axis=1))
+    return low, high
 
 
 @contextmanager
