@@ -41,7 +41,7 @@ CORONA, SPREAD = 45.0, 10.0
 CARRIED_ALONG = 0.5
 """Share of the sole's speed that what it throws takes along."""
 PUSH_DEPTH = 2e-3
-"""Thickness of the ground that a sliding sole drags off [m]."""
+"""Thickness of the ground that a sole drags off which pushes or slides harder than the ground can bear [m]."""
 PUSHING = 0.25
 """Time before a sole leaves in which it pushes off [s]."""
 PUSH_SPEED, PUSH_ANGLES = 0.7, (30.0, 50.0)
@@ -57,7 +57,7 @@ MOST_PIECES = 4000
 LANDING_TIME = 0.1
 """What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
 
-KINDS = ("landing", "push", "shed")
+KINDS = ("landing", "push", "shed")  # a slide is a push
 """Where a piece comes from."""
 
 
@@ -133,13 +133,17 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
     surface : str
         See `core.ground.presets.SURFACES`.
     """
-    found = [
-        throw
-        for character in loads
-        for phase in phases.phases(character)
-        if (number := _footprint_of(character, phase, footprints)) is not None
-        for throw in _throws(character, phase, number, MATTER[surface])
-    ]
+    found: list[Throw] = []
+    for character in loads:
+        of_character = phases.phases(character)
+        sliding = np.zeros(character.contacts.touching.shape, bool)
+        for phase in of_character:
+            if phase.kind == "slide_start":
+                sliding[phase.first : phase.last, phase.sole] = True
+        for phase in of_character:
+            number = _footprint_of(character, phase, footprints)
+            if number is not None:
+                found += _throws(character, phase, number, MATTER[surface], sliding)
     return [throws.from_json(throws.to_json(one), len(footprints)) for one in found]
 
 
@@ -197,7 +201,9 @@ def throw(found: Sequence[Source], *, surface: str, gravity: float, height: Heig
     return _landed(parts, height, gravity)
 
 
-def _throws(loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter) -> Iterator[Throw]:
+def _throws(
+    loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatter, sliding: NDArray[np.bool_]
+) -> Iterator[Throw]:
     motion, step = loads.motion, loads.motion.time_step
     if phase.kind in ("heel_strike", "land"):
         speed = phases.landing_speed(loads, phase.sole, phase.at)
@@ -205,9 +211,16 @@ def _throws(loads: CharacterLoads, phase: Phase, number: int, matter: ThrownMatt
         along = phases.sole_velocity(loads, phase.sole, max(phase.at - 1, 0))
         rows = np.concatenate([np.ones(1), np.zeros(3), middle, along])[None]
         yield _throw(loads, phase, number, 0, np.array([phase.at]), rows, speed)
+    if phase.kind == "slide_start":  # what slides under load has overcome what the ground can bear
+        steps = np.arange(phase.first, phase.last)
+        slid = phases.slide_speed(loads, phase.sole)[steps] * step
+        _, velocities = phases.sole_points_at(loads, phase.sole, steps)
+        aim = velocities.mean(axis=1) * (1.0, 1.0, 0.0)
+        aim /= np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-9)
+        yield _throw(loads, phase, number, 1, steps, _rows(loads, phase.sole, steps, slid, aim))
     if phase.kind == "toe_off":
         steps = np.arange(max(0, phase.at - max(1, round(PUSHING / step))), phase.at)
-        slid = _slid(loads, phase, steps, matter)
+        slid = _slid(loads, phase, steps, matter) * ~sliding[steps, phase.sole]
         if slid.any():
             force = loads.forces.forces[steps, phase.sole, :2]
             aim = np.zeros((len(steps), 3))

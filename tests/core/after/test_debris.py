@@ -210,6 +210,32 @@ def test_a_step_that_is_twice_as_large_throws_from_twice_as_far(record):
     assert larger.speed == 2 * way.speed
 
 
+def test_a_sole_that_slides_under_load_throws_what_it_drags_off_ahead_of_itself():
+    """At 2 m/s for half a second: width, 2 mm and the way by hand; 0.7 of its speed, 30 to 50° up."""
+    time = np.arange(241) / 120
+    x = np.interp(time, [0.5, 1.0], [0.0, 1.0])
+    soles = [foot_sole("foot.L", "L"), foot_sole("foot.R", "R")]
+    poses = [np.repeat(pose(np.stack([x, 0 * x + y, 0 * x], -1))[:, None], 2, axis=1) for y in (0.1, -0.1)]
+    touching = np.ones((len(time), 2), bool)
+    loads = loads_of(soles, poses, np.full((len(time), 2), MASS * GRAVITY / 2), touching, 120.0)
+    _, record = pressed(loads, SAND, cell_size=0.02)
+    heard = Heard([loads], BakeRecord(record, {}))
+    assert set(heard.kind) == {1}
+    by_hand = sum(np.sqrt(one.area_m2) / 2 * 2e-3 * 1.0 for one in record)
+    assert heard.volume.sum() == pytest.approx(by_hand, rel=0.03)
+    speed = np.linalg.norm(heard.velocity, axis=1)
+    assert speed.mean() == pytest.approx(0.7 * 2.0 * 0.95, rel=0.03)  # between 0.7 and 1.2 of it at random
+    flies = speed > 0.1  # all but what is left as the sole stops
+    rise = np.degrees(np.arcsin(heard.velocity[flies, 2] / speed[flies]))
+    assert 29.9 < rise.min() < 31
+    assert 49 < rise.max() < 50.1
+    assert heard.velocity[:, 0].mean() > 3 * abs(heard.velocity[:, 1].mean())
+    at = np.interp(heard.birth, loads.motion.frames, time)
+    assert 0.48 < at.min() < at.max() < 1.03
+    rows = as_edited(events([loads], record, surface="sand", first_frame=1.0), heard.left.steps)
+    assert {row["phase"] for row in rows if row["thrown_kg"]} == {"slide_start"}
+
+
 def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     loads = jump(0.4)
     lifted = replace(loads, contacts=replace(loads.contacts, touching=loads.contacts.touching.copy()))
