@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 from unittest.mock import MagicMock
 
@@ -16,7 +17,7 @@ from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import MOMENTS, matter_of
 from softground_addon.core.after.weather_course import Weather
-from softground_addon.core.after.weather_places import NOT_YET, WeatherPlaces, section_of
+from softground_addon.core.after.weather_places import NOT_YET, WeatherPlaces, section_of, weather_places
 from tests.blender import weathered_shots
 from tests.core.after.weathered_ground import weathered
 from tests.tiers import slow_but_one
@@ -109,8 +110,19 @@ def contents(mesh):
     return held
 
 
+def trodden_twice(footprints, position, *rest, **known):
+    """What a bake left, as if half of the places had been trodden before, and in another shape."""
+    places = weather_places(footprints, position, *rest, **known)
+    again, blur = places.again.copy(), places.blur_before.copy()
+    again[::2], blur[::2] = (30.0, 10.0), 0.5 * places.blur[::2]
+    return replace(places, again=again, blur_before=blur)
+
+
+@pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("surface", slow_but_one(["snow", "sand", "mud", "wet_sand"]))
-def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface):
+def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface, twice, monkeypatch):
+    if twice:
+        monkeypatch.setattr(weather, "weather_places", trodden_twice)
     scene = opened(surface)
     before = {frame: positions(scene, frame) for frame in FRAMES}
     assert bpy.ops.softground.add_weather() == {"FINISHED"}
@@ -170,13 +182,16 @@ def key(scene, name, values, interpolation="LINEAR"):
 def held(mesh, span):
     """What a bake has stored for weather, with the frames of the moments that it tells apart."""
     moments = np.append(NOT_YET, np.linspace(span.first, span.last, MOMENTS + 1))
-    since, filled = (moments[read(mesh, name)] for name in (nodes.MOMENT, nodes.FILLED))
+    since, filled, before = (moments[read(mesh, name)] for name in (nodes.MOMENT, nodes.FILLED, nodes.BEFORE))
+    again = read(mesh, nodes.AGAIN) if nodes.AGAIN in mesh.attributes else np.full(len(since), -NOT_YET)
     return WeatherPlaces(
         read(mesh, nodes.BLUR, 3),
         read(mesh, nodes.TRODDEN, 3),
         np.stack([read(mesh, nodes.PRESSED), since, read(mesh, nodes.COMPACTED)], axis=1),
         read(mesh, nodes.POOL, 3),
         np.column_stack([read(mesh, nodes.LEVELS[0], 3), read(mesh, nodes.LEVELS[1], 3)[:, :2], filled]),
+        read(mesh, nodes.BLUR_BEFORE, 3),
+        np.stack([again, before], axis=1),
     )
 
 

@@ -123,9 +123,10 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     places = _places(display_mesh, footprints, up, unit_scale, known)
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
-    store(ground_mesh.mesh_of(display_mesh), places, matter, span)
+    mesh = ground_mesh.mesh_of(display_mesh)
+    store(mesh, places, matter, span)
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
-    nodes.build(tree, **given, felt=known["felt"])
+    nodes.build(tree, **given, felt=known["felt"], again=nodes.AGAIN in mesh.attributes)
     tree[weather_keys.LAST] = span.last
 
 
@@ -180,6 +181,10 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         values[nodes.LEVELS[0]] = rises[:, :3]
         values[nodes.LEVELS[1]] = np.column_stack([rises[:, 3:], rises.sum(axis=1)])
         values[nodes.FILLED] = np.where(capacity > 0, 1 + moment_of(places.levels[:, KNOTS], span), 0)
+    if (again := places.again[:, 1] < NOT_YET).any():
+        values[nodes.AGAIN] = places.again[:, 0]
+        values[nodes.BEFORE] = np.where(again, 1 + moment_of(places.again[:, 1], span), 0)
+        values[nodes.BLUR_BEFORE] = places.blur_before
     own_data.remove(mesh, set(nodes.OF_WEATHER) - set(values))
     for name, of_vertices in values.items():
         kind = nodes.KINDS[name]

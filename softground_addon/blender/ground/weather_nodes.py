@@ -34,6 +34,13 @@ PRESSED, MOMENT, COMPACTED = (
 )
 """Frame of the first contact; number of the last one's end among the moments, 0 where there is none; what steps
 compressed, on snow alone [m]."""
+AGAIN, BEFORE, BLUR_BEFORE = (
+    "softground_weather_again",
+    "softground_weather_before",
+    "softground_weather_blur_before",
+)
+"""First frame of the last step into an earlier print, and moment and blur that hold until then; only where there are
+such steps."""
 POOL, FILLED = "softground_weather_pool", "softground_weather_filled"
 LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
 """See `core.after.weather_places.WeatherPlaces`. The levels are vectors of three and two and their sum; from the moment
@@ -44,6 +51,9 @@ KINDS = {
     PRESSED: "FLOAT",
     MOMENT: "INT",
     COMPACTED: "FLOAT",
+    AGAIN: "FLOAT",
+    BEFORE: "INT",
+    BLUR_BEFORE: "FLOAT_VECTOR",
     POOL: "FLOAT_VECTOR",
     **dict.fromkeys(LEVELS, "FLOAT_VECTOR"),
     FILLED: "INT",
@@ -128,6 +138,7 @@ def build(
     span: Span,
     soaking: tuple[float, float] = (1.0, 1.0),
     felt: bool = False,
+    again: bool = False,
 ) -> None:
     """Fill a group, in place of what is in it; its inputs stay.
 
@@ -145,13 +156,15 @@ def build(
         Of the hollows; see `core.after.weather_places.soaking_shares`.
     felt : bool
         Whether steps felt the weather: how deep they are below new snow is then not what the record has.
+    again : bool
+        Whether there are steps into earlier prints.
     """
     tree.nodes.clear()
     graph = NodeGraph(tree)
     group = graph.node("NodeGroupInput")
     said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
     course = CourseNodes(graph, said, matter, span, soaking)
-    ground = _Vertices(graph, course, matter, up)
+    ground = _Vertices(graph, course, matter, up, again=again)
 
     graph.next_row()
     geometry = group.outputs["Geometry"]
@@ -174,13 +187,21 @@ class _Vertices:
     matter : Matter
     up : (3,) floats
         See `build`.
+    again : bool
+        See `build`.
     """
 
-    def __init__(self, graph: NodeGraph, course: CourseNodes, matter: Matter, up: Sequence[float]) -> None:
+    def __init__(
+        self, graph: NodeGraph, course: CourseNodes, matter: Matter, up: Sequence[float], *, again: bool
+    ) -> None:
         self._graph, self._course, self._matter, self._up = graph, course, matter, tuple(up)
         self._acts = course.acts
         not_yet = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(PRESSED))
-        self._moment = graph.attribute(MOMENT, "INT")
+        self._moment, self._blur = graph.attribute(MOMENT, "INT"), graph.attribute(BLUR, "FLOAT_VECTOR")
+        if again:
+            before = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(AGAIN))
+            self._moment = graph.choose("INT", before, self._moment, graph.attribute(BEFORE, "INT"))
+            self._blur = graph.choose("VECTOR", before, self._blur, graph.attribute(BLUR_BEFORE, "FLOAT_VECTOR"))
         self._moment_if_begun = graph.choose("INT", not_yet, self._moment, 0)
         self._share = _shares(graph, course.aged["variance"])
         _, wider, widest = graph.parts(self._share)
@@ -215,7 +236,7 @@ class _Vertices:
         cover = self._around("cover", self._not_full(self._inside))
         geometry = self._with(geometry, {FRESH: cover * (1.0 / COVERED)}, snow)
         relief = self._relief()
-        change = self._dot(graph.attribute(BLUR, "FLOAT_VECTOR"), self._not_full(self._share), self._moment)
+        change = self._dot(self._blur, self._not_full(self._share), self._moment)
         if matter.blown:
             change = change + (relief * self._number(self._course.aged["filled"], self._moment)).where(acts["Wind"])
         change = change.where(acts["Snowfall"], acts["Temperature"], acts["Wind"], acts["Rain"])

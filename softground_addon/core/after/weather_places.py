@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.display_blur import blurred, blurred_window
-from ..ground.heightfield import HeightField, SparseGrid
+from ..ground.display_blur import CUT_OFF, blurred, blurred_window
+from ..ground.heightfield import HeightField, SparseGrid, Window
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
@@ -52,6 +52,10 @@ class WeatherPlaces:
     levels : (K, 6) float array
         Rise of the water at each fifth of the root of the share of what the hollow holds [m], and the frame from
         which on it is there.
+    blur_before : (K, 3) float array
+        As `blur`, of the relief before the last step into an earlier print; 0 elsewhere.
+    again : (K, 2) float array
+        First frame of that step, long ago elsewhere; last frame of the contacts before it.
     """
 
     blur: Array
@@ -59,6 +63,8 @@ class WeatherPlaces:
     times: Array
     pool: Array
     levels: Array
+    blur_before: Array
+    again: Array
 
 
 def section_of(footprints: Sequence[Footprint]) -> float:
@@ -100,27 +106,29 @@ def weather_places(
         Whether steps felt the weather: their record then has in it how high the open ground was.
     """
     places = position[:, :2].T
-    ground, trodden = recompose(footprints, cell_size=cell_size), _contacts(footprints, cell_size)
+    ground, trodden = recompose(footprints, cell_size=cell_size), _contacts(footprints, cell_size, time_stretch)
     # The blur of the display is in what is shown already.
     at_sigma = [blurred(ground, float(np.hypot(sigma, blur_sigma))).sample(*places) for sigma in SIGMAS]
-    heights = [relief, *(rim - compression for compression, rim in at_sigma)]
     # What the record has of the level of open ground ends where its display does.
     narrowest = blur_sigma if felt else SIGMAS[0]
     bounds = [blurred(trodden, sigma).sample(*places) for sigma in (narrowest, *SIGMAS[1:])]
     inside = [share for share, *_ in bounds]
-    first, last = (_mean_frame([(one[0], one[k] * time_stretch) for one in bounds]) for k in (1, 2))
+    first, last = (_mean_frame(bounds, number) for number in (1, 2))
     last, compression = np.maximum(last, ended), at_sigma[0][0]
     if felt:
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
         pressed = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma)))
         (compression,) = pressed.sample(*places)
     pool, levels = _pools(footprints, ground, position, blur_sigma, layer_depth, time_stretch)
+    blur_before, again = _before_the_last(footprints, position, cell_size, blur_sigma, time_stretch)
     return WeatherPlaces(
-        blur=np.diff(heights, axis=0).T,
+        blur=_steps_of_blur(relief, at_sigma),
         trodden=np.stack([inside[0], inside[1] - inside[0], inside[2] - inside[1]], axis=-1),
         times=np.stack([np.minimum(first, started), last, compression], axis=-1),
         pool=pool,
         levels=levels,
+        blur_before=blur_before,
+        again=again,
     )
 
 
@@ -140,19 +148,68 @@ def soaking_shares(places: WeatherPlaces) -> tuple[float, float]:
     return (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
 
 
-def _contacts(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
-    """Which cells were in contact, 1 or 0, and the same times the first and the last frame at which they were."""
+def _contacts(footprints: Sequence[Footprint], cell_size: float, time_stretch: float) -> SparseGrid:
+    """Which cells were in contact, 1 or 0, and the same times the first and the last frame at which they were.
+
+    Frames are those of the animation.
+    """
     grid = SparseGrid(cell_size, channels=3)
     for footprint in footprints:
         touched, first, last = values = grid.read(footprint.window)
         cells = footprint.contact_cells[:]
-        start, end = footprint.contact_start[:], footprint.contact_end[:]
+        start, end = time_stretch * footprint.contact_start[:], time_stretch * footprint.contact_end[:]
         known = touched.reshape(-1)[cells] > 0
         first.reshape(-1)[cells] = np.where(known, np.minimum(first.reshape(-1)[cells], start), start)
         last.reshape(-1)[cells] = np.where(known, np.maximum(last.reshape(-1)[cells], end), end)
         touched.reshape(-1)[cells] = 1.0
         grid.write(footprint.window, values)
     return grid
+
+
+def _steps_of_blur(relief: Array, at_sigma: Sequence[Array]) -> Array:
+    """See `WeatherPlaces.blur`, of a relief (K,) and compression and rim (2, K) at each of the sigmas."""
+    return np.diff([relief, *(rim - compression for compression, rim in at_sigma)], axis=0).T
+
+
+def _before_the_last(
+    footprints: Sequence[Footprint], position: Array, cell_size: float, blur_sigma: float, time_stretch: float
+) -> tuple[Array, Array]:
+    """See `WeatherPlaces.blur_before` and `again`."""
+    blur, again = np.zeros((len(position), 3)), np.tile([-NOT_YET, NOT_YET], (len(position), 1))
+    edge, around = (int(np.ceil(CUT_OFF * sigma / cell_size)) + 1 for sigma in SIGMAS[1:])
+    trodden, so_far = SparseGrid(cell_size, channels=1), list[Footprint]()
+    column, row = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (0, 1))
+    for footprint in sorted(footprints, key=lambda one: one.start_frame):
+        touched, near = trodden.read(footprint.window), footprint.window.expanded(edge)
+        if touched.reshape(-1)[footprint.contact_cells[:]].any():
+            there = np.flatnonzero(near.holds(row, column))
+            x, y = position[there, :2].T
+            before = [one for one in so_far if one.window.intersects(near.expanded(around))]
+            own, old = (
+                [_blurred_at(_contacts(which, cell_size, time_stretch), sigma, near, x, y) for sigma in SIGMAS[:2]]
+                for which in ([footprint], before)
+            )
+            start, last = _mean_frame(own, 1), _mean_frame(old, 2)
+            now = _mean_frame([one + other for one, other in zip(own, old, strict=True)], 2)
+            restarts = (last + 1.0 < now) & (now < NOT_YET)
+            there, x, y = there[restarts], x[restarts], y[restarts]
+            ground = recompose(before, cell_size=cell_size)
+            shown, *at_sigma = (
+                _blurred_at(ground, float(np.hypot(sigma, blur_sigma)), near, x, y) for sigma in (0.0, *SIGMAS)
+            )
+            blur[there] = _steps_of_blur(shown[1] - shown[0], at_sigma)
+            again[there] = np.stack([start[restarts], last[restarts]], axis=-1)
+        touched.reshape(-1)[footprint.contact_cells[:]] = 1.0
+        trodden.write(footprint.window, touched)
+        so_far.append(footprint)
+    return blur, again
+
+
+def _blurred_at(grid: SparseGrid, sigma: float, window: Window, x: Array, y: Array) -> Array:
+    """Blurred values at positions in a window, (channels, N)."""
+    part, around = SparseGrid(grid.cell_size, channels=grid.channels), window.expanded(1)
+    part.write(around, blurred_window(grid, around, sigma))
+    return part.sample(x, y)
 
 
 def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
@@ -163,12 +220,15 @@ def _pressed(footprints: Sequence[Footprint], cell_size: float) -> SparseGrid:
     return grid
 
 
-def _mean_frame(blurs: Sequence[tuple[Array, Array]]) -> Array:
-    """Mean frame of the contacts around, by the narrowest blur that reaches any; never, where none does."""
-    frame = np.full(len(blurs[0][0]), NOT_YET)
-    for share, total in reversed(blurs):
-        near = share > LEAST_SHARE
-        frame[near] = total[near] / share[near]
+def _mean_frame(blurs: Sequence[Array], number: int) -> Array:
+    """Mean frame of the contacts around, by the narrowest blur that reaches any; never, where none does.
+
+    The first or the second of the frames of `_contacts`, by its number.
+    """
+    frame = np.full(blurs[0].shape[1], NOT_YET)
+    for blur in reversed(blurs):
+        near = blur[0] > LEAST_SHARE
+        frame[near] = blur[number, near] / blur[0, near]
     return frame
 
 
@@ -186,12 +246,7 @@ def _pools(
     row, column = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (1, 0))
     for footprint in sorted(footprints, key=lambda one: one.end_frame):
         window = footprint.window.expanded(1)
-        there = np.flatnonzero(
-            (column >= window.column)
-            & (column < window.column + window.columns)
-            & (row >= window.row)
-            & (row < window.row + window.rows)
-        )
+        there = np.flatnonzero(window.holds(row, column))
         if not len(there):
             continue
         x, y = np.meshgrid(*window.centres(cell_size))

@@ -108,6 +108,11 @@ class Window(NamedTuple):
         row = np.floor(y / cell_size).astype(np.intp) - self.row
         return np.clip(row, 0, self.rows - 1), np.clip(column, 0, self.columns - 1)
 
+    def holds(self, row: Indices, column: Indices) -> Mask:
+        """Whether cells lie within the window."""
+        right, down = column - self.column, row - self.row
+        return (right >= 0) & (right < self.columns) & (down >= 0) & (down < self.rows)
+
     def union(self, other: Window) -> Window:
         """The smallest window that holds both."""
         column, row = min(self.column, other.column), min(self.row, other.row)

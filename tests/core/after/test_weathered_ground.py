@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from softground_addon.core.after.weather import DEGREE_DAY, SNOW, WATER_DENSITY, Span, matter_of
 from softground_addon.core.after.weather_course import Weather, course_of
-from softground_addon.core.after.weather_places import KNOTS, SIGMAS, WeatherPlaces, section_of, weather_places
+from softground_addon.core.after.weather_places import KNOTS, NOT_YET, SIGMAS, WeatherPlaces, section_of, weather_places
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import recompose
 from tests.core.after.weathered_ground import weathered
@@ -74,6 +74,60 @@ def test_ages_are_those_of_the_contacts(track, left):
     assert places.times[0, 1] > 1e6  # far from any print nothing has an age
 
 
+def later(footprint, frames):
+    """The same footprint, made some frames later."""
+    compression, rim = (
+        replace(changes, frames=changes.frames + frames) for changes in (footprint.compression, footprint.rim)
+    )
+    return replace(
+        footprint,
+        start_frame=footprint.start_frame + frames,
+        end_frame=footprint.end_frame + frames,
+        compression=compression,
+        rim=rim,
+        contact_start=footprint.contact_start[:] + frames,
+        contact_end=footprint.contact_end[:] + frames,
+    )
+
+
+@pytest.mark.parametrize("weather", [{"wind": 9.0}, {"rain": 50e-3 / HOUR}, {"snowfall": 0.05 / HOUR}])
+def test_a_print_changes_until_somebody_steps_into_it_and_as_a_new_one_after(track, weather):
+    footprints, position = track
+    first, place = footprints[0], position.reshape(-1, 3)
+    never = np.full(len(place), 1e9)
+
+    def places(*steps):
+        return weather_places(
+            steps, place, shown(*steps), never, -never, cell_size=CELL, blur_sigma=BLUR, layer_depth=0.3
+        )
+
+    def shown(*steps):
+        raw = recompose(steps).sample(*place[:, :2].T)
+        return gaussian_filter((raw[1] - raw[0]).reshape(position.shape[:2]), BLUR / CELL, mode="constant").ravel()
+
+    single, second, twice = places(first), places(later(first, 300)), places(first, later(first, 300))
+    sky, sand = Weather(**weather, temperature=-5.0, time_scale=300.0), matter_of("sand", 0.3, 0.01)
+    begin = first.start_frame + 300
+    away = single.times[:, 1] > 1e6
+    for frame in (begin - 150, begin - 1):
+        results = (weathered(one, shown(first), sky, sand, frame=frame, span=SPAN) for one in (single, twice))
+        alone, now = (one.height - one.water for one in results)  # water stands in the last print
+        change = np.abs(alone - alone[away].max()).max()
+        assert change > 2e-3
+        np.testing.assert_allclose(now, alone, rtol=0, atol=0.01 * change)
+    after = first.end_frame + 400
+    np.testing.assert_array_equal(twice.times[:, 1], second.times[:, 1])
+    trodden = twice.trodden[:, 0] > 0.99
+    alone, now = (weathered(one, shown(first), sky, sand, frame=after, span=SPAN) for one in (second, twice))
+    np.testing.assert_allclose(now.fresh[trodden], alone.fresh[trodden], atol=1e-6)
+
+
+def test_prints_apart_have_no_print_before_them(left):
+    _, _, places = left
+    assert not places.blur_before.any()
+    assert (places.again[:, 0] < 0).all()
+
+
 def test_no_weather_changes_nothing_and_neither_does_any_before_the_bake(left):
     heavy = Weather(0.1 / HOUR, 5.0, 12.0, 30e-3 / HOUR, 1e-7, 1e3)
     for result in (at(left, Weather(time_scale=1e5), 900.0), at(left, heavy, 1.0)):
@@ -98,7 +152,12 @@ def lone(depth, *, capacity=0.0, rises=(0.0,) * KNOTS):
     """A flat-bottomed print of a depth, deep within it, made at the first frame."""
     times = np.array([[1.0, 1.0, depth]])
     pool, levels = np.array([[capacity, depth, 1.0]]), np.array([[*rises, 1.0]])
-    return WeatherPlaces(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), times, pool, levels)
+    return WeatherPlaces(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), times, pool, levels, *never(1))
+
+
+def never(count):
+    """No step into an earlier print."""
+    return np.zeros((count, 3)), np.tile([-NOT_YET, NOT_YET], (count, 1))
 
 
 def test_a_print_stands_up_as_a_pedestal_in_a_thaw():

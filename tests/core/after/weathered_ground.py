@@ -53,10 +53,11 @@ def weathered(
 ) -> Weathered:
     """The ground under weather at a frame; `relief` (K,) is what the bake shows there at that frame [m]."""
     course = course_of(weather, matter, frame=frame, span=span)
-    pressed, since, compression = places.times.T
+    pressed, _, compression = places.times.T
+    since, blur = _since(places, frame), np.where(frame < places.again[:, :1], places.blur_before, places.blur)
     share = shares(course.since(since, course.variance))
     kept = course.since(since, course.kept)
-    soft = kept * (relief + (places.blur * share).sum(axis=-1))
+    soft = kept * (relief + (blur * share).sum(axis=-1))
 
     inside = places.trodden[:, 0] + (places.trodden[:, 1:] * share[:, 1:]).sum(axis=-1)
     inside = np.where(frame >= pressed, np.clip(inside, 0.0, 1.0), 0.0)
@@ -84,6 +85,12 @@ def weathered(
     )
 
 
+def _since(places: WeatherPlaces, frame: float) -> Array:
+    """End of the contact that the age of each place counts from."""
+    again, before = places.again.T
+    return np.where(frame < again, before, places.times[:, 1])
+
+
 def _dried(
     places: WeatherPlaces, wetness: Array, weather: Weather, matter: w.Matter, course: Course, frame: float
 ) -> Array:
@@ -92,7 +99,7 @@ def _dried(
         return np.zeros_like(wetness)
     dried = 1.0 - wetness
     if matter.pales:
-        pressed, since, _ = places.times.T
+        pressed, since = places.times[:, 0], _since(places, frame)
         near = np.clip(places.trodden.sum(axis=-1) * NEAR, 0.0, 1.0) * (frame >= pressed)
         dried = np.maximum(dried, weather.halo * near * course.since(since, course.pale))
     return dried
