@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import compat
+from softground_addon.blender.after import debris_object
 from softground_addon.blender.baking import bake_report, step_edits
 from softground_addon.blender.ground import baked_ground, weather_keys, weather_modifier
 from softground_addon.blender.mesh_arrays import positions
+from softground_addon.core.after.felt_weather import felt_in, weathering_of
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
@@ -68,6 +70,28 @@ SNOWFALL = {"Snowfall": 3.0, "Temperature": -5.0, "Time_Scale": 21_600.0}
 
 def fallen(scene, frame):
     return 3e-2 / 3600 * 21_600 * (frame - scene.softground.frame_start) / 24
+
+
+def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
+    opened.softground.steps_feel_weather = opened.softground.debris = True
+    set_to(opened, **SNOWFALL)
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    ground = opened.softground.ground
+    left = record.load(bytes(baked_ground.stored_record(ground)))
+    obj = debris_object.of(ground)
+    lies, born = positions(obj.data).astype(float), np.empty(len(obj.data.vertices), np.float32)
+    obj.data.attributes["softground_birth"].data.foreach_get("value", born)
+    away = np.min([np.linalg.norm(lies[:, :2] - one.position[:2], axis=1) for one in left.edited], axis=0) > 0.3
+    weathering = weathering_of(felt_in(left.about["inputs"]), opened.softground.material.layer_depth)
+    level = np.array([weathering.level(frame) for frame in np.floor(born[away])])
+    assert away.sum() > 5
+    assert level.max() > 0.05
+    assert np.mean(np.abs(lies[away, 2] - level) < 1e-3) > 0.95  # some lie at the tips of prints
+    pieces = positions(obj.data)
+    bake = step_edits.editable(opened)  # an edit throws in the same weather
+    step_edits.edit(opened, bake, {step_id(left.footprints[0]): StepEdit(mute=True)})
+    step_edits.edit(opened, bake, {})
+    assert np.array_equal(positions(debris_object.of(ground).data), pieces)
 
 
 def test_without_weather_steps_that_feel_it_leave_the_same_bits(opened):

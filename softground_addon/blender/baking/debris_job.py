@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import bpy
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ...core.after import debris as core
 from ...core.after.debris import Debris
+from ...core.after.felt_weather import weathering_of
 from ...core.errors import InputError
-from ...core.ground.heightfield import Terrain
+from ...core.ground.heightfield import SparseGrid, Terrain
 from ...core.loads.estimate import CharacterLoads
 from ...core.record.footprints import recompose
 from ...core.record.record import BakeRecord
@@ -53,11 +54,34 @@ def thrown_again(
                 compression, rim = ground.sample(x, y)
                 return np.asarray(terrain.heights(x, y) + rim - compression)
 
-            return left, core.throw(sources, surface=surface, gravity=gravity, height=height)
+            in_weather = _in_weather(made_with, left, height)
+            return left, core.throw(sources, surface=surface, gravity=gravity, height=height, height_at=in_weather)
     except (ArithmeticError, IndexError, MemoryError, ValueError) as error:
         raise InputError(
             f"The stored steps of the footprints are damaged ({error}): clear the bake and bake again."
         ) from None
+
+
+def _in_weather(
+    made_with: BakeSettings, left: BakeRecord, height: core.Height
+) -> Callable[[float], core.Height] | None:
+    """Heights at scene frames, where steps feel weather: new snow raises open ground, and steps press it down."""
+    weathering = weathering_of(made_with.weather, made_with.material.layer_depth)
+    if weathering is None:
+        return None
+    trodden = SparseGrid(made_with.cell_size_m, channels=1)
+    for one in left.edited:
+        values = trodden.read(one.window)
+        values.reshape(-1)[one.contact_cells] = 1.0
+        trodden.write(one.window, values)
+
+    def height_at(frame: float) -> core.Height:
+        level = weathering.level(frame)
+        return lambda x, y: (
+            np.asarray(height(x, y) + (1.0 - trodden.sample(x, y)[0]) * level) if level else height(x, y)
+        )
+
+    return height_at
 
 
 def put(ground: bpy.types.Object, debris: Debris | None, wanted: BakeSettings, surface: str = "") -> None:

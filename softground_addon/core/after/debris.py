@@ -183,7 +183,14 @@ def volumes(found: Sequence[Source]) -> dict[int, dict[str, float]]:
     return thrown
 
 
-def throw(found: Sequence[Source], *, surface: str, gravity: float, height: Height) -> Debris:
+def throw(
+    found: Sequence[Source],
+    *,
+    surface: str,
+    gravity: float,
+    height: Height,
+    height_at: Callable[[float], Height] | None = None,
+) -> Debris:
     """The pieces of all that is thrown.
 
     Parameters
@@ -196,9 +203,11 @@ def throw(found: Sequence[Source], *, surface: str, gravity: float, height: Heig
         [m/s²]
     height : callable
         The baked ground's heights at places x, y [m].
+    height_at : callable, optional
+        The same at a scene frame, where they change over time: pieces land on the ground of the frame they fly from.
     """
     parts = [_pieces(one, MATTER[surface], gravity) for one in found if one.volume > 1e-12]
-    return _landed(parts, height, gravity)
+    return _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None)
 
 
 def _throws(
@@ -393,7 +402,7 @@ def _backward(aim: Array, slide: Array, random: np.random.Generator) -> Array:
     return np.column_stack([way * (speed * np.cos(angle))[:, None], speed * np.sin(angle)])
 
 
-def _landed(parts: Sequence[_Pieces], height: Height, gravity: float) -> Debris:
+def _landed(parts: Sequence[_Pieces], height_at: Callable[[float], Height], gravity: float, *, moves: bool) -> Debris:
     """All pieces with their flights, in the order of their birth."""
     keys = ("birth", "start", "velocity", "drag_time", "radius", "kind", "step")
     shapes = {"start": (0, 3), "velocity": (0, 3)}
@@ -401,6 +410,9 @@ def _landed(parts: Sequence[_Pieces], height: Height, gravity: float) -> Debris:
     whole = {key: np.concatenate([part[key] for part in (nothing, *parts)]) for key in keys}
     order = np.argsort(whole["birth"], kind="stable")
     birth, start, velocity, drag_time, radius, kind, step = (whole[key][order] for key in keys)
-    start[:, 2] = np.maximum(start[:, 2], np.nan_to_num(height(start[:, 0], start[:, 1]), nan=-np.inf))
-    time = flight.landing_times(start, velocity, drag_time, gravity, height)
+    frames, time = np.floor(birth) if moves else np.zeros(len(birth)), np.zeros(len(birth))
+    for frame, first, count in zip(*np.unique(frames, return_index=True, return_counts=True), strict=True):
+        part, height = slice(first, first + count), height_at(float(frame))
+        start[part, 2] = np.maximum(start[part, 2], np.nan_to_num(height(start[part, 0], start[part, 1]), nan=-np.inf))
+        time[part] = flight.landing_times(start[part], velocity[part], drag_time[part], gravity, height)
     return Debris(birth, start, velocity, drag_time, time, radius, kind.astype(np.int32), step.astype(np.int32))
