@@ -137,7 +137,8 @@ def plan_ground(motions: Sequence[CharacterMotion]) -> Slices[GroundPlan]:
         for sole, offset in zip(motion.soles, found.offset, strict=True)
         if motion.centre is None and any(sole is foot for foot in _feet(motion))
     ]
-    height = low + (float(np.median(floats)) if floats else 0.0)
+    # What skin shows is where it rests; the underside of a foot that was cut from it may lie a little off.
+    height = low + (float(np.median(floats)) if floats and not levels else 0.0)
     raster = shortest_length(sole.sole.length for motion in motions for sole in motion.soles) / POINTS_ALONG_SOLE
     footfalls = []
     for motion, found in zip(motions, contacts, strict=True):

@@ -29,6 +29,12 @@ def moved(motion, matrix):
     return replace(motion, soles=tuple(replace(sole, transforms=matrix @ sole.transforms) for sole in motion.soles))
 
 
+def moved_up(transforms, height):
+    raised = transforms.copy()
+    raised[..., 2, 3] += height
+    return raised
+
+
 def climbing(angle):
     """From walking along x to walking up a slope along x."""
     matrix = np.eye(4)
@@ -74,6 +80,23 @@ def test_feet_that_float_unevenly_do_not_tilt_the_ground():
         motion, soles=tuple(replace(sole, transforms=poses) for sole, poses in zip(motion.soles, raised, strict=True))
     )
     assert isinstance(plan_ground([motion]).terrain, FlatTerrain)
+
+
+@pytest.mark.parametrize("floats", [-0.02, 0.02])
+def test_where_the_skin_shows_the_ground_it_lies_there_not_where_soles_that_are_off_the_skin_stand(floats):
+    motion = walked()
+    soles = [
+        replace(
+            sole,
+            transforms=moved_up(sole.transforms, floats),
+            bears=sole.landmark_positions()[..., 2].min(axis=1) < 0.03,
+        )
+        for sole in motion.soles
+    ]
+    middle = np.mean([sole.transforms[:, 0, :3, 3] for sole in motion.soles], axis=0)
+    hips = middle + np.array([0.0, 0.0, 0.9])
+    plan = plan_ground([replace(motion, soles=tuple(soles), joints={"hips": hips}, ground_level=0.0)])
+    assert plan.terrain.height == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_run_on_the_spot_whose_feet_pause_in_the_air_gets_level_ground():
