@@ -101,14 +101,15 @@ def _dragged(bears: Mask, lies: Mask) -> Mask:
 
 
 def _landed(bears: Mask, height: Array) -> Mask:
-    """Without the samples at which what bears is still coming down: what is near is not there yet."""
+    """Without the samples at which what bears is still coming down, or has begun to go up: it is near, not there."""
     landed = bears.copy()
     for part in np.flatnonzero(bears.any(axis=0)):
         for first, last in zip(*runs(bears[:, part]), strict=True):
             over = height[first:last, part]
             down = np.flatnonzero(over < max(float(np.median(over)), 0.0) + LANDED)
-            if first > 0 and len(down) > 1:
-                landed[first : first + down[0], part] = False
+            if len(down) > 1:
+                landed[first : first + down[0] * (first > 0), part] = False
+                landed[last - (last - first - 1 - down[-1]) * (last < len(bears)) : last, part] = False
     return landed
 
 

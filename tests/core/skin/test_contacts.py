@@ -304,6 +304,19 @@ def test_what_is_near_the_ground_and_still_comes_down_has_not_landed() -> None:
     assert np.flatnonzero(bearing(tracks, 0.0, np.zeros(2))[:, 0]).tolist() == [4, 5, 6, 7]
 
 
+@pytest.mark.parametrize("rate", [24.0, 60.0])
+def test_what_is_near_the_ground_and_goes_up_has_left(rate: float) -> None:
+    """A foot that stands for a quarter of a second and then rises faster and faster."""
+    time = np.arange(round(0.6 * rate)) / rate
+    low = np.maximum(time - 0.25, 0.0) ** 2 * 1.6
+    rise = np.minimum(np.abs(np.diff(low, prepend=0.0)), np.abs(np.diff(low, append=1.0))) * rate
+    still = np.zeros((2, len(low), 1, 2))
+    tracks = PartTracks(low[:, None], still[0], rise[:, None], still, 0.35, rate)
+    bears = bearing(tracks, 0.0, np.zeros(2))[:, 0]
+    assert bears[low == 0].all()
+    assert not bears[low > 0.0075].any()
+
+
 def test_a_foot_that_slides_on_from_one_rest_to_the_next_has_not_left_the_ground() -> None:
     frames = np.arange(60)
     lifted = (frames >= 40) & (frames < 50)
