@@ -51,3 +51,9 @@ def test_a_box_chooses_the_steps_in_it_and_they_are_dragged_together(facts):
     one, other = facts["dragged together"]
     assert one == pytest.approx(0.2, abs=0.02)
     assert other == pytest.approx(one, abs=1e-5)
+
+
+def test_a_mesh_presses_a_step_until_that_is_undone(facts):
+    before, shod = facts["in a shoe"]
+    assert shod == pytest.approx(0.2 * 0.4, rel=0.15)
+    assert facts["without the shoe"] == before

@@ -107,6 +107,29 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     after = edits()
     facts["dragged together"] = [after[step.name][2] - before.get(step.name, [0, 0, 0])[2] for step in wanted]
 
+    # a mesh presses a step, which is one undo step
+    yield from hand.move(*hand.middle())
+    shoe = bpy.data.objects.new("Shoe", bpy.data.meshes.new("Shoe"))
+    shoe.data.from_pydata([(-0.1, -0.2, 0), (0.1, -0.2, 0), (0.1, 0.2, 0), (-0.1, 0.2, 0)], [], [(0, 1, 2, 3)])
+    scene().collection.objects.link(shoe)
+    name = wanted[0].name
+    module("session").choose_steps(name)
+    bpy.ops.ed.undo_push(message="Shoe")
+    before = area_of(name)
+    with_viewport(hand, bpy.ops.softground.change_step, "EXEC_DEFAULT", True, sole="Shoe")
+    yield 1.0
+    facts["in a shoe"] = before, area_of(name)
+    yield from hand.picture("steps_in_a_shoe", in_docs=False)
+    yield from hand.press_button("softground.change_step")
+    yield 1.0
+    yield from hand.picture("steps_change", in_docs=False)
+    yield from hand.key("ESC")
+    yield 0.5
+    yield from hand.move(*hand.middle())
+    yield from hand.key("Z", ctrl=True)
+    yield 1.0
+    facts["without the shoe"] = area_of(name)
+
 
 def show_alone(panel: type, tab: str = "") -> None:
     """Show a panel once more, open and beside the others or in a tab: what a region has closed stays closed."""
@@ -130,6 +153,11 @@ def edits() -> dict:
     ground = scene().softground.ground
     found = module("ground.baked_ground").edits_of(ground)
     return {name: [edit.mute, *edit.move_m] for name, edit in found.items()}
+
+
+def area_of(name: str) -> float:
+    """Area of a step's print [m²]."""
+    return next(float(step.left.area_m2) for step in steps() if step.name == name)
 
 
 def prints() -> str:
