@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after import debris as core
+from ...core.after import flight
 from ...core.after.debris import Debris
 from ...core.after.felt_weather import weathering_of
 from ...core.errors import InputError
@@ -49,10 +50,11 @@ def thrown_again(
             sources = core.sources(left.throws, left.steps, surface=surface, gravity=gravity)
             left = replace(left, thrown=core.volumes(sources))
             ground = recompose(left.edited, cell_size=made_with.cell_size_m)
+            bare = flight.SampledHeights(terrain.heights, made_with.cell_size_m)  # thousands fall side by side
 
             def height(x: Array, y: Array) -> Array:
                 compression, rim = ground.sample(x, y)
-                return np.asarray(terrain.heights(x, y) + rim - compression)
+                return np.asarray(bare(x, y) + rim - compression)
 
             in_weather = _in_weather(made_with, left, height)
             return left, core.throw(sources, surface=surface, gravity=gravity, height=height, height_at=in_weather)

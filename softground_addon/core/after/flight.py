@@ -10,6 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numerics.cell_keys import among, cells_of, keys_of
+
 Array = NDArray[np.float64]
 
 HALVINGS = 20
@@ -92,6 +94,48 @@ def landing_times(
         begin, end = np.where(flies, middle, begin), np.where(flies, end, middle)
     time[left] = end
     return time
+
+
+class SampledHeights:
+    """Heights of a ground that are looked up once for each corner of the squares that are asked for, bilinear between.
+
+    Parameters
+    ----------
+    height : callable
+        Heights at places x, y (N,) [m]; NaN where there is no ground.
+    side : float
+        Of a square [m].
+
+    Examples
+    --------
+    >>> plane = SampledHeights(lambda x, y: 2.0 * x - y, 0.1)
+    >>> plane(np.array([0.33, -1.0]), np.array([0.0, 0.25])).round(9).tolist()
+    [0.66, -2.25]
+    """
+
+    def __init__(self, height: Callable[[Array, Array], Array], side: float) -> None:
+        self._height, self._side = height, side
+        self._keys, self._values = np.empty(0, np.int64), np.empty(0)
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Heights at places x, y (N,) [m]."""
+        at = np.stack([x, y], axis=-1) / self._side
+        first = np.floor(at)
+        u, v = (at - first).T
+        low, high = 1.0 - u, 1.0 - v
+        weights = (low * high, u * high, low * v, u * v)
+        corners = [keys_of(first + shift) for shift in ((0, 0), (1, 0), (0, 1), (1, 1))]
+        self._look_up(np.unique(np.concatenate(corners)))
+        values = (self._values[np.searchsorted(self._keys, keys)] for keys in corners)
+        return np.asarray(sum(weight * value for weight, value in zip(weights, values, strict=True)))
+
+    def _look_up(self, wanted: NDArray[np.int64]) -> None:
+        new = wanted[~among(self._keys, wanted)]
+        if len(new):
+            keys = np.concatenate([self._keys, new])
+            values = np.concatenate([self._values, self._height(*(cells_of(new) * self._side).T)])
+            order = np.argsort(keys)
+            self._keys, self._values = keys[order], values[order]
 
 
 def _down_to(level: Array, start: Array, velocity: Array, drag_time: Array, gravity: float) -> Array:
