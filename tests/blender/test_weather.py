@@ -189,7 +189,7 @@ def held(mesh, span):
         read(mesh, nodes.TRODDEN, 3),
         np.stack([read(mesh, nodes.PRESSED), since, read(mesh, nodes.COMPACTED)], axis=1),
         read(mesh, nodes.POOL, 3),
-        np.column_stack([read(mesh, nodes.LEVELS[0], 3), read(mesh, nodes.LEVELS[1], 3)[:, :2], filled]),
+        np.column_stack([read(mesh, nodes.RISE, 3), filled]),
         read(mesh, nodes.BLUR_BEFORE, 3),
         np.stack([again, before], axis=1),
     )
@@ -365,6 +365,15 @@ def test_only_what_the_sliders_ask_for_is_stored(opened, values, stored):
     set_to(scene, **values)
     anywhere = set() if "Wind" in values else {nodes.WETNESS}  # no wind blows wet sand
     assert set(shown(scene, 300).attributes.keys()) - there - set(nodes.OF_WEATHER) == {*stored, *anywhere}
+
+
+@pytest.mark.slow
+def test_weather_stores_no_more_than_sixty_bytes_of_a_vertex(opened):
+    scene = opened("sand")
+    bpy.ops.softground.add_weather()
+    size = {"FLOAT_VECTOR": 12, "FLOAT": 4, "INT": 4}
+    stored = [size[kind] for name, kind in nodes.KINDS.items() if name in carrier(scene).data.attributes]
+    assert sum(stored) <= 60
 
 
 @pytest.mark.slow

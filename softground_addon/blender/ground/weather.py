@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.after.felt_weather import felt_in
 from ...core.after.weather import Matter, Span, matter_of, moment_of, span_of
-from ...core.after.weather_places import KNOTS, NOT_YET, WeatherPlaces, section_of, soaking_shares, weather_places
+from ...core.after.weather_places import NOT_YET, POWERS, WeatherPlaces, section_of, soaking_shares, weather_places
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
@@ -167,7 +167,7 @@ def _places(
 def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> None:
     """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for."""
     pressed, since, compacted = places.times.T
-    capacity, rises = places.pool[:, 0], places.levels[:, :KNOTS]
+    capacity, rise, filled = places.pool[:, 0], places.levels[:, :POWERS], places.levels[:, POWERS]
     values: dict[str, NDArray[Any]] = {
         nodes.BLUR: places.blur,
         nodes.TRODDEN: places.trodden,
@@ -178,9 +178,8 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
         values[nodes.COMPACTED] = compacted
     if matter.soaking:
         values[nodes.POOL] = places.pool
-        values[nodes.LEVELS[0]] = rises[:, :3]
-        values[nodes.LEVELS[1]] = np.column_stack([rises[:, 3:], rises.sum(axis=1)])
-        values[nodes.FILLED] = np.where(capacity > 0, 1 + moment_of(places.levels[:, KNOTS], span), 0)
+        values[nodes.RISE] = rise
+        values[nodes.FILLED] = np.where(capacity > 0, 1 + moment_of(filled, span), 0)
     if (again := places.again[:, 1] < NOT_YET).any():
         values[nodes.AGAIN] = places.again[:, 0]
         values[nodes.BEFORE] = np.where(again, 1 + moment_of(places.again[:, 1], span), 0)

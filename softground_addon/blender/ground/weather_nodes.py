@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 
 from ...core.after.weather import Matter, Span
-from ...core.after.weather_places import BOUNDS, COVERED, KNOTS, NEAR
+from ...core.after.weather_places import BOUNDS, COVERED, NEAR, POWERS
 from ..node_graph import NodeGraph, Number, new_group
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import CourseNodes
@@ -41,10 +41,9 @@ AGAIN, BEFORE, BLUR_BEFORE = (
 )
 """First frame of the last step into an earlier print, and moment and blur that hold until then; only where there are
 such steps."""
-POOL, FILLED = "softground_weather_pool", "softground_weather_filled"
-LEVELS = ("softground_weather_level_1", "softground_weather_level_2")
-"""See `core.after.weather_places.WeatherPlaces`. The levels are vectors of three and two and their sum; from the moment
-on that has the number `FILLED`, which is 0 where no hollow is."""
+POOL, RISE, FILLED = "softground_weather_pool", "softground_weather_rise", "softground_weather_filled"
+"""See `core.after.weather_places.WeatherPlaces`; from the moment on that has the number `FILLED`, which is 0 where no
+hollow is."""
 KINDS = {
     BLUR: "FLOAT_VECTOR",
     TRODDEN: "FLOAT_VECTOR",
@@ -55,7 +54,7 @@ KINDS = {
     BEFORE: "INT",
     BLUR_BEFORE: "FLOAT_VECTOR",
     POOL: "FLOAT_VECTOR",
-    **dict.fromkeys(LEVELS, "FLOAT_VECTOR"),
+    RISE: "FLOAT_VECTOR",
     FILLED: "INT",
 }
 OF_WEATHER = tuple(KINDS)
@@ -66,9 +65,6 @@ standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 
 STANDING = "softground_weather_standing"
 """Depth of standing water without the bake's own [m], there only while the group works."""
-
-NEVER_FULL = 1e9
-"""Of a sixth knot of the levels, which is none."""
 
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
@@ -275,17 +271,15 @@ class _Vertices:
         """Depth of water in hollows."""
         graph, course = self._graph, self._course
         capacity, above, left = graph.parts(graph.attribute(POOL, "FLOAT_VECTOR"))
-        rises = [graph.attribute(name, "FLOAT_VECTOR") for name in LEVELS]
+        rise = graph.attribute(RISE, "FLOAT_VECTOR")
         low, high, seeped = graph.parts(self._course.moments.at("hollows", graph.attribute(FILLED, "INT")))
         excess = low + (high - low) * course.between(left)
-        filled = (excess / capacity).within_one().root() * KNOTS
-        parts = []
-        for rise, begin in zip(rises, ((0.0, 1.0, 2.0), (3.0, 4.0, NEVER_FULL)), strict=True):
-            steps = _within_one(graph, graph.vector("SUBTRACT", filled.socket, begin))
-            parts.append(graph.number(graph.dot(steps, rise)))
-        brim = graph.parts(rises[1])[2]
+        share = (excess / capacity).within_one()
+        root = share.root()
+        powers = graph.combined(*(one.socket for one in (root, share, share * root)))
+        brim = graph.number(graph.dot(rise, (1.0,) * POWERS))
         risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
-        level = (parts[0] + parts[1]).where(self._acts["Rain"]).at_least(risen)
+        level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
         return (level - above - self._relief()).at_least(0.0) * level.above(0.0)
 
     def _thawed(self, left: Number) -> Number:

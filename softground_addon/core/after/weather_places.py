@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 SIGMAS = (0.01, 0.03, 0.09)
 """Standard deviations at which the relief is known besides its own [m]; in between, linear in the variance."""
 BOUNDS = (0.0, *(sigma**2 for sigma in SIGMAS))
-KNOTS = 5
-"""Shares of a hollow's depth that are known: at even steps of the root of what it holds."""
+POWERS = 3
+"""Of the root of how full a hollow is, which its water level is a polynomial of: within 2 % of its depth in a walk."""
 NEAR = 4.0
 """Of the contact that is within `SIGMAS[-1]`, for sand that turns pale: all of it along the edges of a foot."""
 LEAST_RANGE = 1e-6
@@ -49,9 +49,8 @@ class WeatherPlaces:
     pool : (K, 3) float array
         What the hollow there holds as a depth of water on it [m], 0 where there is none; how far the undisturbed ground
         is above its bottom [m]; how much of its soaking is left.
-    levels : (K, 6) float array
-        Rise of the water at each fifth of the root of the share of what the hollow holds [m], and the frame from
-        which on it is there.
+    levels : (K, 4) float array
+        Coefficients of the water level for each of the powers [m], and the frame from which on the hollow is there.
     blur_before : (K, 3) float array
         As `blur`, of the relief before the last step into an earlier print; 0 elsewhere.
     again : (K, 2) float array
@@ -241,7 +240,7 @@ def _pools(
     time_stretch: float,
 ) -> tuple[Array, Array]:
     """`WeatherPlaces.pool` and `levels`: of the latest print whose hollow each place lies in."""
-    pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), KNOTS + 1))
+    pool, levels = np.zeros((len(position), 3)), np.zeros((len(position), POWERS + 1))
     cell_size = ground.cell_size
     row, column = (np.floor(position[:, axis] / cell_size).astype(np.intp) for axis in (1, 0))
     for footprint in sorted(footprints, key=lambda one: one.end_frame):
@@ -255,13 +254,23 @@ def _pools(
         within = (row[there] - window.row) * window.columns + column[there] - window.column
         for hollow in hollows.hollows(rest + rim - compression, cell_size**2):
             wet = there[np.isin(within, hollow.cells)]
-            known = hollow.level(hollow.capacity * (np.arange(KNOTS + 1) / KNOTS) ** 2) - hollow.bottom
             pressed = compression.ravel()[hollow.cells].mean() / layer_depth
             pool[wet, 0] = hollow.capacity / hollow.catchment
             pool[wet, 1] = position[wet, 2] - hollow.bottom
             pool[wet, 2] = np.exp(-SEALING * pressed)
-            levels[wet] = [*np.diff(known), footprint.end_frame * time_stretch]
+            levels[wet] = [*rise_of(hollow), footprint.end_frame * time_stretch]
     return pool, levels
+
+
+def rise_of(hollow: hollows.Hollow) -> Array:
+    """Coefficients of a hollow's water level, exact where it is full."""
+    root = (1.0 - np.cos(np.linspace(0.0, np.pi, 17))) / 2.0
+    level = hollow.level(hollow.capacity * root**2) - hollow.bottom
+    first, second, third = root ** np.arange(1, POWERS + 1)[:, None]
+    lower, *_ = np.linalg.lstsq(
+        np.stack([first - third, second - third], axis=-1), level - level[-1] * third, rcond=None
+    )
+    return np.append(lower, level[-1] - lower.sum())
 
 
 def _plane_through(points: Array, x: Array, y: Array) -> Array:

@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from softground_addon.core.after.hollows import hollows
 from softground_addon.core.after.weather import DEGREE_DAY, SNOW, WATER_DENSITY, Span, matter_of
 from softground_addon.core.after.weather_course import Weather, course_of
-from softground_addon.core.after.weather_places import KNOTS, NOT_YET, SIGMAS, WeatherPlaces, section_of, weather_places
+from softground_addon.core.after.weather_places import (
+    NOT_YET,
+    POWERS,
+    SIGMAS,
+    WeatherPlaces,
+    rise_of,
+    section_of,
+    weather_places,
+)
+from softground_addon.core.ground.display_blur import blurred_window
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.record.footprints import recompose
 from tests.core.after.weathered_ground import weathered
@@ -148,10 +158,10 @@ def test_a_print_is_gone_under_a_night_of_snow(left):
     assert heights[-1][away] == pytest.approx(cover, rel=1e-9)
 
 
-def lone(depth, *, capacity=0.0, rises=(0.0,) * KNOTS):
+def lone(depth, *, capacity=0.0, rise=(0.0,) * POWERS):
     """A flat-bottomed print of a depth, deep within it, made at the first frame."""
     times = np.array([[1.0, 1.0, depth]])
-    pool, levels = np.array([[capacity, depth, 1.0]]), np.array([[*rises, 1.0]])
+    pool, levels = np.array([[capacity, depth, 1.0]]), np.array([[*rise, 1.0]])
     return WeatherPlaces(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), times, pool, levels, *never(1))
 
 
@@ -179,7 +189,7 @@ def test_a_print_stands_up_as_a_pedestal_in_a_thaw():
 
 def test_water_from_below_comes_up_to_its_table_in_seconds():
     matter, span = matter_of("wet_sand", 0.3, 0.01), Span(1.0, 600.0, RATE)
-    places = lone(0.05, capacity=0.03, rises=(0.01,) * KNOTS)  # 5 cm deep
+    places = lone(0.05, capacity=0.03, rise=(0.05, 0.0, 0.0))  # 5 cm deep
     for table, full in ((0.02, 0.03), (0.06, 0.0)):
         for seconds in (0.0, 5.0, 30.0):
             frame = 1.0 + seconds * RATE
@@ -229,10 +239,22 @@ def test_puddles_are_level_while_they_fill(left):
     _, relief, places = left
     rain = at(left, Weather(rain=30e-3 / HOUR, time_scale=20.0), 400.0, "mud")
     wet = rain.water > 0
-    surface, since = (relief + rain.height).ravel()[wet.ravel()], places.levels[wet.ravel(), KNOTS]
+    surface, since = (relief + rain.height).ravel()[wet.ravel()], places.levels[wet.ravel(), POWERS]
     assert 0.0 < rain.water.max() < 0.5 * np.ptp(relief)
     for one in np.unique(since):
         assert np.ptp(surface[since == one]) < 1e-9
+
+
+def test_the_water_level_of_a_print_is_that_of_its_volume_curve(track):
+    ground = recompose(track[0])
+    for footprint in track[0]:
+        compression, rim = blurred_window(ground, footprint.window.expanded(1), BLUR)
+        for hollow in hollows(rim - compression, CELL**2):
+            full = np.linspace(0.0, 1.0, 200)
+            level = np.sqrt(full)[:, None] ** np.arange(1, POWERS + 1) @ rise_of(hollow)
+            wanted = hollow.level(full * hollow.capacity) - hollow.bottom
+            np.testing.assert_allclose(level, wanted, rtol=0, atol=0.01 * wanted[-1])
+            assert level[-1] == pytest.approx(wanted[-1])
 
 
 def test_a_section_is_that_of_the_prints(track):

@@ -16,9 +16,9 @@ from softground_addon.core.after.weather import Span
 from softground_addon.core.after.weather_course import Course, Weather, course_of
 from softground_addon.core.after.weather_places import (
     COVERED,
-    KNOTS,
     LEAST_RANGE,
     NEAR,
+    POWERS,
     WeatherPlaces,
     shares,
     soaking_shares,
@@ -110,12 +110,12 @@ def _standing(places: WeatherPlaces, height: Array, weather: Weather, matter: w.
     if matter.soaking is None:
         return np.zeros_like(height)
     capacity, above, left = places.pool.T
-    since, rises = places.levels[:, KNOTS], places.levels[:, :KNOTS]
+    since, rise = places.levels[:, POWERS], places.levels[:, :POWERS]
     low, high = soaking_shares(places)
     at_low, at_high = (course.since(since, course.excess(share)) for share in (low, high))
     excess = at_low + (at_high - at_low) * np.clip((left - low) / max(high - low, LEAST_RANGE), 0.0, 1.0)
     full = np.sqrt(np.clip(np.divide(excess, capacity, out=np.zeros_like(height), where=capacity > 0), 0.0, 1.0))
-    rain = (np.clip(full[:, None] * KNOTS - np.arange(KNOTS), 0.0, 1.0) * rises).sum(axis=-1)
-    seep = np.maximum(rises.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)
+    rain = (full[:, None] ** np.arange(1, POWERS + 1) * rise).sum(axis=-1)
+    seep = np.maximum(rise.sum(axis=-1) - weather.water_table, 0.0) * course.since(since, course.seeped)
     level = np.maximum(rain, seep)
     return np.where(level > 0, np.maximum(level - above - height, 0.0), 0.0)
