@@ -21,6 +21,8 @@ SLIPS = 0.5
 """A contact that slips faster than this share of the fastest slip of its parts brushes."""
 ALONE = 0.5
 """What bears alone for this share of its time bears the body."""
+UNEVEN = 0.0075
+"""The ground lies at most this far off the level at which skin is most often, in body heights."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,14 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     if (groups >= 0).any():
         parts = yield from track_parts.slices(skin, groups, level)
         bears = without_glimpses(bearing(parts, level, drift), parts)
+        level = _shared_level(parts, bears, level)
     return SkinContacts(level * skin.height, drift * skin.height, groups, bears, tracks)
+
+
+def _shared_level(tracks: PartTracks, bears: Mask, level: float) -> float:
+    """The ground between contacts that rest at different heights, however long each does [H]."""
+    rests = [np.median(tracks.low[on, contact]) for contact, on in enumerate(bears.T) if on.any()]
+    return level + float(np.clip(np.median(rests) - level, -UNEVEN, UNEVEN)) if rests else level
 
 
 def _numbered(groups: Indices) -> Indices:

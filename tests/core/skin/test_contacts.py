@@ -304,6 +304,15 @@ def test_what_is_near_the_ground_and_still_comes_down_has_not_landed() -> None:
     assert np.flatnonzero(bearing(tracks, 0.0, np.zeros(2))[:, 0]).tolist() == [4, 5, 6, 7]
 
 
+@pytest.mark.parametrize(("apart", "level"), [(0.006, -0.003), (0.012, -0.006)])
+def test_the_ground_lies_between_feet_that_stand_at_different_heights(apart: float, level: float) -> None:
+    skin, stands = animal(2, duty=0.6, stride=0.6)
+    skin.positions[:, skin.part == 1, 2] -= apart
+    found = find_contacts(skin)
+    assert found.level == pytest.approx(level, abs=0.001)
+    assert_gait(found, stands)
+
+
 @pytest.mark.parametrize("rate", [24.0, 60.0])
 def test_what_is_near_the_ground_and_goes_up_has_left(rate: float) -> None:
     """A foot that stands for a quarter of a second and then rises faster and faster."""
