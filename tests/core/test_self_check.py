@@ -107,7 +107,7 @@ def test_feet_of_one_body_that_float_by_more_than_two_centimetres_apart(apart, t
     findings = found(loads)
     assert ("feet_apart" in findings) == told
     if told:
-        assert f"'right' of 'walker' is {apart * 100:.1f} cm higher" in findings["feet_apart"].message
+        assert f"'right' of 'walker' is planted {apart * 100:.1f} cm higher" in findings["feet_apart"].message
 
 
 @pytest.mark.parametrize(("height", "remedy"), [(178.0, "by 0.01"), (0.0178, "by 100"), (3.0, ""), (0.1, "")])

@@ -56,6 +56,8 @@ MOST_PIECES = 4000
 """Of a step: what is more is drawn as larger ones."""
 LANDING_TIME = 0.1
 """What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
+BREADTH = 0.3
+"""Breadth of what a sole sheds from, over the length between its landmarks: these lie along its middle."""
 
 KINDS = ("landing", "push", "shed")  # a slide is a push
 """Where a piece comes from."""
@@ -386,7 +388,8 @@ def _from_sole(throw: Throw, which: NDArray[np.intp], random: np.random.Generato
     points, velocities = (part[which] for part in throw.followed())
     weights = random.dirichlet(np.ones(points.shape[1]), len(which))
     start = np.einsum("nl,nli->ni", weights, points)
-    start[:, :2] += 0.02 * (random.random((len(which), 2)) - 0.5)
+    length = np.linalg.norm(np.ptp(points, axis=1), axis=1)
+    start[:, :2] += BREADTH * length[:, None] * (random.random((len(which), 2)) - 0.5)
     velocity = np.einsum("nl,nli->ni", weights, velocities)
     return start, velocity * (0.7 + 0.5 * random.random(len(which)))[:, None]
 

@@ -249,6 +249,9 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     assert heard.birth.min() >= lifted.motion.frames[99]
     shed = np.sort(heard.birth - heard.birth.min()) / 120
     assert np.median(shed) == pytest.approx(0.1, abs=0.06)
+    for side in (0.15, -0.15):  # where the feet are; their landmarks lie along their middle
+        across = heard.start[np.sign(heard.start[:, 1]) == np.sign(side), 1] - side
+        assert 0.02 < np.abs(across).max() < 0.06
 
 
 def test_flights_come_down_on_uneven_ground():
