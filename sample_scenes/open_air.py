@@ -14,6 +14,7 @@ from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
+from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
 
@@ -77,15 +78,17 @@ def bake_walk(
     preset: str,
     cell_size: float | None,
     options: Options | None,
+    motion: BodyMotion | None = None,
 ) -> Bake:
-    """A hiker who walks along the way toward -y, from y = `start` [m], in prints as fine as close-ups ask for.
+    """A hiker who goes along the way toward -y, from y = `start` [m], in prints as fine as close-ups ask for.
 
-    The camera is there first: relief is fine where it comes near.
+    He walks, unless another `motion` of so many frames is given. The camera is there first: relief is fine where it
+    comes near.
     """
     body = Body()
     walker = create_character("Hiker", body, scene.collection)
     walker.location = (0.0, start, 0.0)
-    write_action(walker, walk(body, Gait(), frames, scene.render.fps), "Walk")
+    write_action(walker, motion or walk(body, Gait(), frames, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, frames
     chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "detail": "ALWAYS", "sink_feet": "true"}
     chosen |= dict(options or {})
