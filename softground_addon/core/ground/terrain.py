@@ -19,9 +19,9 @@ UPWARD = 0.05
 """Smallest z of a face's unit normal that still counts as ground; steeper faces are walls."""
 
 CROWDED = 10
-"""Triangles per bin from which smaller bins are worth their table: those of a grid have 8 each, where the mesh's faces
-are slivers, as at the pole of a sphere, each has hundreds."""
-LARGEST_TABLE = 1 << 17
+"""Triangles per bin from which smaller bins are worth their table: those of a grid have 8 each. Where the mesh's faces
+are slivers, as at the pole of a sphere, or are fine along a trail and coarse beyond, each has hundreds."""
+LARGEST_TABLE = 1 << 21
 """Triangles in all bins, each as often as it is in one, up to which the bins are made smaller."""
 
 PLACES_AT_ONCE = 1 << 14
@@ -179,7 +179,10 @@ def _bins(corners: Array) -> Slices[tuple[Array, Array, Indices, Indices, Indice
         from_bin = np.floor((low - origin) / size).astype(np.intp)
         span = np.floor((high - origin) / size).astype(np.intp) - from_bin + 1
         members = span.prod(axis=1).sum()
-        if members <= CROWDED * shape.prod() or members > LARGEST_TABLE / 4:  # half the size: up to four times
+        middle = np.floor(((low + high) / 2 - origin) / size).astype(np.intp)
+        near = np.bincount(middle[:, 1] * shape[0] + middle[:, 0])
+        crowd = max(members / shape.prod(), near @ near / len(corners))  # on average, and where the triangles are
+        if crowd <= CROWDED or members > LARGEST_TABLE / 4:  # half the size: up to four times
             break
         size = size / 2
     triangle, within = enumerated(span.prod(axis=1))

@@ -56,6 +56,19 @@ def test_slivers_do_not_crowd_the_bins():
     assert (terrain.first[number + 1] - terrain.first[number]).mean() < 50
 
 
+def test_a_trail_that_is_fine_does_not_crowd_the_bins_of_what_is_coarse_beside_it():
+    x = np.concatenate([np.linspace(-10.0, -0.5, 40), np.linspace(-0.45, 0.45, 181), np.linspace(0.5, 10.0, 40)])
+    y = np.linspace(0.0, 1.0, 201)
+    vertices = np.stack([*map(np.ravel, np.meshgrid(x, y)), np.zeros(len(x) * len(y))], axis=-1)
+    corner = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
+    right, above = corner + 1, corner + len(x)
+    triangles = np.concatenate([np.stack([corner, right, above], -1), np.stack([right, above + 1, above], -1)])
+    terrain = MeshTerrain.from_mesh(vertices, triangles)
+    at = np.floor((vertices[np.abs(vertices[:, 0]) < 0.4, :2] - terrain.origin) / terrain.bin_size).astype(int)
+    number = at[:, 1] * terrain.shape[0] + at[:, 0]
+    assert (terrain.first[number + 1] - terrain.first[number]).mean() < 50
+
+
 def slab(z):
     vertices = np.array([[x, y, h] for h in (z - 1.0, z) for y in (0.0, 2.0) for x in (0.0, 2.0)])
     top, bottom = [[4, 5, 7], [4, 7, 6]], [[0, 3, 1], [0, 2, 3]]
