@@ -200,7 +200,7 @@ def test_an_absurd_cell_size_is_refused_with_the_estimate(scene, capfd, monkeypa
     monkeypatch.setattr("softground_addon.core.loads.cell_limits.machine_memory", lambda: 2e9)
     said = refused(capfd, "--cell-size", "0.0001")
     assert "GB of memory" in said
-    size = float(said.partition("at least ")[2].partition(" mm")[0]) / 1e3
+    size = float(said.partition("at least ")[2].partition(" cm")[0]) / 1e2
     assert 1e-4 < size < 5e-3
     assert dry_run("--cell-size", max(size, 2e-3)) == 0
 

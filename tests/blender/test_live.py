@@ -240,7 +240,7 @@ CHANGES = {
     "softer": lambda options: setattr(options.material, "youngs_modulus", options.material.youngs_modulus / 4),
     "heel to toe": lambda options: setattr(options, "pressure", "CENTRE_OF_PRESSURE"),
     "heavier": lambda options: setattr(options.characters[0], "mass", 2 * options.characters[0].mass),
-    "another preset": lambda _: bpy.ops.softground.load_preset(name="Mud"),
+    "another preset": lambda _: bpy.ops.softground.load_preset(name="Paper Mud"),  # without debris, whose rims lack it
     "smoother": lambda options: setattr(options.material, "blur_sigma", 0.02),
     "coarser": lambda options: setattr(options, "cell_size", 0.015),
 }
