@@ -2,7 +2,7 @@
 
 import pytest
 
-pytestmark = [pytest.mark.gui, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gui, pytest.mark.alone, pytest.mark.timeout(900)]
 
 
 @pytest.fixture

@@ -35,6 +35,7 @@ class StepPreview:
         self._bake, self._name = bake, settings.name_of(shown)
         unit_scale = bake.made_with.unit_scale_m
         self._place = ground_mesh.rest_vertices(shown, unit_scale)[:, :2]
+        self._along = tuple(np.ascontiguousarray(self._place.T))  # axis by axis: looked through at each move
         self._up = ground_mesh.up_of(shown, unit_scale)
         self._before = ground_mesh.displayed_positions(shown)
         self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
@@ -72,7 +73,8 @@ class StepPreview:
         for window in windows:
             low = np.array(window[:2]) * size - margin
             high = (np.array(window[:2]) + window[2:]) * size + margin
-            inside |= ((self._place >= low) & (self._place <= high)).all(axis=1)
+            x, y = self._along
+            inside |= (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
         return np.flatnonzero(inside)
 
     def _write(self, positions: NDArray[np.float32]) -> None:
