@@ -136,7 +136,7 @@ def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, un
     points.vertices.foreach_get("co", place)
     time, drag = values(nodes.FLIGHT), values(nodes.DRAG)
     wind = compat.read_input(modifier, inputs_of(modifier)["Wind"]) if modifier else None
-    drift = np.outer(time + drag * np.expm1(-time / drag), tuple(wind or (0.0, 0.0, 0.0))[:2])
+    drift = np.outer(time - flight.coasting(drag, time), tuple(wind or (0.0, 0.0, 0.0))[:2])
     landed = values(nodes.BIRTH) / time_stretch + time * frame_rate
     down = time < flight.LONGEST_FLIGHT - 1e-3
     at = place.reshape(-1, 3)[:, :2].astype(np.float64) * unit_scale + drift

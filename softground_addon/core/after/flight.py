@@ -26,6 +26,19 @@ LONGEST_FLIGHT = 6.0
 """What has not come down by then is gone [s]."""
 
 
+def coasting(drag_time: Array, time: Array) -> Array:
+    """How long a piece would fly as fast as at first to get as far as it does against drag, (N,) [s].
+
+    What is left of the time, it goes with the flow: falls as it settles, and drifts as the wind blows.
+
+    Parameters
+    ----------
+    drag_time, time
+        As of `position`.
+    """
+    return np.asarray(-drag_time * np.expm1(-time / drag_time))
+
+
 def position(start: Array, velocity: Array, drag_time: Array, time: Array, gravity: float) -> Array:
     """Places after times in the air, (N, 3) [m].
 
@@ -46,7 +59,7 @@ def position(start: Array, velocity: Array, drag_time: Array, time: Array, gravi
     >>> rise.round(3)  # without drag: 0.2 m ahead, 0.4 - 9.81/2·0.04 up
     array([[0.2  , 0.   , 0.204]])
     """
-    passed = -drag_time * np.expm1(-time / drag_time)
+    passed = coasting(drag_time, time)
     place = start + velocity * passed[:, None]
     place[:, 2] -= gravity * drag_time * (time - passed)
     return place
