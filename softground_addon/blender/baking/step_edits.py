@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
+from ...core.record.footprints import extent
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..after import debris_object
@@ -150,11 +151,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
 
 def _extent(left: record.BakeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lower and upper corner of all prints [m]."""
-    boxes = [
-        (np.array(step.window[:2]) * step.cell_size, (np.array(step.window[:2]) + step.window[2:]) * step.cell_size)
-        for step in (*left.footprints, *left.edited)
-    ]
-    if not boxes:
+    footprints = (*left.footprints, *left.edited)
+    if not footprints:
         raise InputError("The bake has no steps to edit: check that the feet touch the ground, and bake again.")
-    lows, highs = zip(*boxes, strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+    return extent(footprints)

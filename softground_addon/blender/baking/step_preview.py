@@ -34,8 +34,8 @@ class StepPreview:
         shown = baked_ground.display_mesh_of(ground)
         self._bake, self._name = bake, settings.name_of(shown)
         unit_scale = bake.made_with.unit_scale_m
-        self._place = ground_mesh.rest_vertices(shown, unit_scale)[:, :2]
-        self._along = tuple(np.ascontiguousarray(self._place.T))  # axis by axis: looked through at each move
+        place = ground_mesh.rest_vertices(shown, unit_scale)
+        self._x, self._y = np.ascontiguousarray(place.T[:2])  # axis by axis: looked through at each move
         self._up = ground_mesh.up_of(shown, unit_scale)
         self._before = ground_mesh.displayed_positions(shown)
         self._rest = ground_mesh.rest_positions(ground_mesh.mesh_of(shown))
@@ -52,8 +52,7 @@ class StepPreview:
         self._changed = windows
         positions = self._before.copy()
         made_with = self._bake.made_with
-        x, y = self._place[near].T
-        sample = sample_at(left.edited, x, y, **at_the_end(made_with))
+        sample = sample_at(left.edited, self._x[near], self._y[near], **at_the_end(made_with))
         positions[near] = self._rest[near] + (sample.display[:, None] * self._up).astype(np.float32)
         self._write(positions)
 
@@ -69,12 +68,11 @@ class StepPreview:
             return np.zeros(0, np.intp)
         size = self._bake.made_with.cell_size_m
         margin = REACH * self._bake.made_with.material.blur_sigma
-        inside = np.zeros(len(self._place), bool)
+        inside = np.zeros(len(self._x), bool)
         for window in windows:
-            low = np.array(window[:2]) * size - margin
-            high = (np.array(window[:2]) + window[2:]) * size + margin
-            x, y = self._along
-            inside |= (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+            low, high = window.corners(size)
+            low, high = low - margin, high + margin
+            inside |= (self._x >= low[0]) & (self._x <= high[0]) & (self._y >= low[1]) & (self._y <= high[1])
         return np.flatnonzero(inside)
 
     def _write(self, positions: NDArray[np.float32]) -> None:

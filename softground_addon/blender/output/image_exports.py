@@ -17,7 +17,7 @@ from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
 from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
-from ...core.record.footprints import NEVER, Footprint
+from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
 from ...core.relief_plan import relief_at
 from .. import settings
@@ -154,7 +154,7 @@ def _farthest(footprints: Sequence[Footprint], place: Array) -> float:
     """How far from the box around all footprints something lies, `FARTHEST_FALLOUT` at most [m]."""
     if not footprints or not len(place):
         return 0.0
-    low, high = _box(footprints)
+    low, high = extent(footprints)
     away = np.maximum(low - place, place - high).max(axis=1)
     return float(np.clip(away[away <= FARTHEST_FALLOUT].max(initial=0.0) + FINEST_FALLOUT, 0.0, FARTHEST_FALLOUT))
 
@@ -220,23 +220,9 @@ def _near_footprints(footprints: Sequence[Footprint], reach: float, place: Array
     """Which triangles (T, 3, 2) come near the box around all footprints."""
     if not footprints:
         return np.zeros(len(place), dtype=bool)
-    low, high = _box(footprints)
+    low, high = extent(footprints)
     inside = (place.max(axis=1) > low - reach) & (place.min(axis=1) < high + reach)
     return np.asarray(inside.all(axis=1))
-
-
-def _box(footprints: Sequence[Footprint]) -> tuple[Array, Array]:
-    """Lower and upper corner (2,) of the cells of footprints [m]."""
-    low = np.min([(one.window.column * one.cell_size, one.window.row * one.cell_size) for one in footprints], axis=0)
-    high = np.max(
-        [
-            ((w.column + w.columns) * one.cell_size, (w.row + w.rows) * one.cell_size)
-            for one in footprints
-            for w in (one.window,)
-        ],
-        axis=0,
-    )
-    return low, high
 
 
 @contextmanager

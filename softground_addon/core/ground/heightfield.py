@@ -108,6 +108,11 @@ class Window(NamedTuple):
         row = np.floor(y / cell_size).astype(np.intp) - self.row
         return np.clip(row, 0, self.rows - 1), np.clip(column, 0, self.columns - 1)
 
+    def corners(self, cell_size: float) -> tuple[Array, Array]:
+        """Lower and upper corner of its cells in the plane, (2,) each [m]."""
+        first, size = np.array((self.column, self.row)), np.array((self.columns, self.rows))
+        return first * cell_size, (first + size) * cell_size
+
     def holds(self, row: Indices, column: Indices) -> Mask:
         """Whether cells lie within the window."""
         right, down = column - self.column, row - self.row

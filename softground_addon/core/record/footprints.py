@@ -256,6 +256,12 @@ class FootprintRecorder:
         return np.concatenate(gathered), np.array([len(cells) for cells in cells_of_windows], np.intp)
 
 
+def extent(footprints: Iterable[Footprint]) -> tuple[Array, Array]:
+    """Lower and upper corner of the box around all footprints, of which there are some, (2,) each [m]."""
+    lows, highs = zip(*(one.window.corners(one.cell_size) for one in footprints), strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
 def recompose(footprints: Iterable[Footprint], frame: float = np.inf, *, cell_size: float | None = None) -> HeightField:
     """The ground at any frame, from the record and without simulating.
 
