@@ -57,7 +57,7 @@ MOST_PIECES = 4000
 LANDING_TIME = 0.1
 """What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
 BREADTH = 0.3
-"""Breadth of what a sole sheds from, over the length between its landmarks: these lie along its middle."""
+"""Breadth of what a foot sheds from, over the length between its landmarks: these lie along its middle."""
 
 KINDS = ("landing", "push", "shed")  # a slide is a push
 """Where a piece comes from."""
@@ -384,12 +384,18 @@ def _corona(source: Source, random: np.random.Generator, count: int, gravity: fl
 
 
 def _from_sole(throw: Throw, which: NDArray[np.intp], random: np.random.Generator) -> tuple[Array, Array]:
-    """Places under a sole at samples, and its speed there."""
+    """Places under a sole at samples, and its speed there: all over a foot; of all else, on its lower half."""
     points, velocities = (part[which] for part in throw.followed())
-    weights = random.dirichlet(np.ones(points.shape[1]), len(which))
+    if throw.is_foot:
+        weights = random.dirichlet(np.ones(points.shape[1]), len(which))
+    else:
+        is_low = points[..., 2] <= points[..., 2].mean(axis=1, keepdims=True) + 1e-9
+        picked = np.where(is_low, random.random(is_low.shape), -1.0).argmax(axis=1)
+        weights = np.eye(points.shape[1])[picked]
     start = np.einsum("nl,nli->ni", weights, points)
-    length = np.linalg.norm(np.ptp(points, axis=1), axis=1)
-    start[:, :2] += BREADTH * length[:, None] * (random.random((len(which), 2)) - 0.5)
+    if throw.is_foot:
+        length = np.linalg.norm(np.ptp(points, axis=1), axis=1)
+        start[:, :2] += BREADTH * length[:, None] * (random.random((len(which), 2)) - 0.5)
     velocity = np.einsum("nl,nli->ni", weights, velocities)
     return start, velocity * (0.7 + 0.5 * random.random(len(which)))[:, None]
 

@@ -13,6 +13,7 @@ from softground_addon.core.record import throws
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord, dump, load
+from tests.core.prop_bodies import prop_sole, sphere
 from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed
 
 SAND = find("dry_sand").material
@@ -252,6 +253,24 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
     for side in (0.15, -0.15):  # where the feet are; their landmarks lie along their middle
         across = heard.start[np.sign(heard.start[:, 1]) == np.sign(side), 1] - side
         assert 0.02 < np.abs(across).max() < 0.06
+
+
+def test_a_ball_that_bounces_sheds_from_the_lower_half_of_its_surface():
+    radius, time = 0.1, np.arange(121) / 120
+    path = np.stack([0 * time, 0 * time, radius + np.maximum(time - 0.5, 0.0) * 2.0], -1)
+    touching = (time <= 0.5)[:, None]
+    ball = prop_sole(*sphere(radius, rings=16))
+    loads = loads_of([ball], [pose(path)[:, None]], np.where(touching, 300.0, 0.0), touching, 120.0)
+    loads.contacts.touching[:60] = False  # it has come, before it leaves
+    _, record = pressed(loads, SAND, cell_size=0.02)
+    heard = Heard([loads], BakeRecord(record, {}), surface="wet_sand")
+    shed = heard.kind == 2
+    assert shed.sum() > 20
+    middle = np.stack([np.interp(heard.birth[shed], loads.motion.frames, path[:, axis]) for axis in range(3)], -1)
+    below = heard.start[shed] - middle
+    assert np.linalg.norm(below, axis=1) == pytest.approx(radius, abs=0.02)  # a step goes 2 cm
+    assert below[:, 2].max() < 0.02
+    assert np.ptp(below[:, 0]) > radius
 
 
 def test_flights_come_down_on_uneven_ground():
