@@ -117,8 +117,9 @@ def build(scene: bpy.types.Scene) -> None:
         for surface in presets.SURFACES:
             shapes = debris_shapes.collection_of(surface)
             scene.collection.children.link(shapes)
+            apart = 1.1 * max(max(piece.dimensions) for piece in shapes.objects)
             for number, piece in enumerate(shapes.objects):
-                piece.location = (2.6 * (number % 2), 2.6 * (number // 2), 0.0)
+                piece.location = (apart * (number % 2), apart * (number // 2), 0.0)
             bpy.context.view_layer.update()
             stage.frame_points(camera, _corners(shapes.objects), VIEW)
             _mark(shapes, "Debris", "Pieces of radius 1 that steps throw: choose them in the debris' Shapes")

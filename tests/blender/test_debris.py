@@ -337,7 +337,8 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     obj = debris_object.of(ground)
     place = np.empty((len(obj.data.vertices), 3), np.float32)
     obj.data.vertices.foreach_get("co", place.ravel())
-    middle = place[:, :2].mean(axis=0)
+    pixel = side / resolution
+    middle = np.round(place[:, :2].mean(axis=0) / pixel) * pixel  # each square has a pixel in its middle
     corners = np.empty((len(ground.data.loops), 2), np.float32)
     vertex = np.empty(len(ground.data.loops), np.int32)
     ground.data.loops.foreach_get("vertex_index", vertex)
@@ -372,7 +373,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
     blown = debris_object.at_rest(obj, frame_rate=24.0, time_stretch=1.0, unit_scale=1.0).place
     there = wanted(obj, 1e4, (3, 0, 0))
-    assert len(there) - len(blown) == (there[:, 2] < -10).sum() < 10  # what fell beside the ground lies nowhere
+    assert len(there) - len(blown) == (there[:, 2] < -10).sum() < 30  # what fell beside the ground lies nowhere
     assert KDTree(there[:, :2]).query(blown)[0].max() < 1e-4
 
 

@@ -9,6 +9,7 @@ each in every frame whatever they are [measured]; all else becomes round points,
 
 from __future__ import annotations
 
+from math import pi
 from typing import Any
 
 import bpy
@@ -109,13 +110,15 @@ def _points(graph: _Graph, geometry: Any, material: Any) -> Any:
 
 
 def _pieces(graph: _Graph, geometry: Any, selection: Any, collection: Any) -> Any:
-    """Some points as instances of shapes, which turn as long as they fly."""
+    """Some points as instances of shapes, which turn as long as they fly, and come to lie on their flat side."""
     info = graph.node("GeometryNodeCollectionInfo")
     info.inputs["Separate Children"].default_value = True
     info.inputs["Reset Children"].default_value = True
     graph.link(collection, info.inputs["Collection"])
     time = graph.math("MINIMUM", graph.attribute(AGE), graph.attribute(FLIGHT))
-    turn = graph.scaled(graph.random_turn(0), graph.math("ADD", time, 1.0))
+    left = graph.math("SUBTRACT", graph.attribute(FLIGHT), time)
+    heading = graph.random((0.0, 0.0, 0.0), (0.0, 0.0, 2 * pi), 4, "FLOAT_VECTOR")
+    turn = graph.vector("ADD", graph.scaled(graph.random_turn(0), left), heading)
     on_points = graph.node("GeometryNodeInstanceOnPoints")
     on_points.inputs["Pick Instance"].default_value = True
     for source, socket in (

@@ -48,10 +48,16 @@ PUSH_SPEED, PUSH_ANGLES = 0.7, (30.0, 50.0)
 """Speed of what it throws over its own, and between which angles [deg]."""
 SHEDDING = 0.2
 """Time in which a sole sheds what it carries, but for 1/e [s]."""
+SHED_SCATTER = 0.15
+"""How much the speed of what is shed varies in each direction, over that of the sole."""
+LUMP = 0.01
+"""How far from the middle of a lump its pieces are at most, along each axis [m]."""
 LONGEST_SHED = 0.6
 """After that it is clean [s]."""
 SIZE_FALL = 2.5
 """Exponent with which the number of pieces falls over their size."""
+LARGEST_SHARE = 0.25
+"""Of what a step throws in one phase, in its largest piece."""
 MOST_PIECES = 4000
 """Of a step: what is more is drawn as larger ones."""
 LANDING_TIME = 0.1
@@ -331,14 +337,20 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
     random = np.random.default_rng(int.from_bytes(digest[:8], "big"))
     radius = _radii(source.volume, matter, random)
     count, weights = len(radius), throw.samples[:, WEIGHT].astype(np.float64)
-    which = random.choice(len(weights), count, p=weights / weights.sum())
+    lumps = matter.lumps if throw.kind == 2 else 0
+    which = random.choice(len(weights), lumps or count, p=weights / weights.sum())
+    of_lump = random.choice(lumps, count, p=random.dirichlet(np.ones(lumps))) if lumps else np.arange(count)
+    which, wholes = which[of_lump], which
     frames = throw.first + (which + random.random(count)) * throw.spacing
     if throw.kind == 0:
         start, velocity = _corona(source, random, count, gravity)
     else:
-        start, velocity = _from_sole(throw, which, random)
+        start, velocity = (part[of_lump] for part in _from_sole(throw, wholes, random))
         if throw.kind == 1:
             velocity = _backward(throw.samples[which, AIM].astype(np.float64), velocity, random)
+        else:
+            start += (LUMP if lumps else 0.0) * (2 * random.random(start.shape) - 1)
+            velocity = _scattered(velocity, random)
     low, high = matter.settling
     part = np.sqrt(np.clip((2 * radius - matter.sizes[0]) / np.ptp(matter.sizes), 0.0, 1.0))
     settling = (low + (high - low) * part) * (0.8 + 0.4 * random.random(count))
@@ -356,6 +368,7 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
 def _radii(volume: float, matter: ThrownMatter, random: np.random.Generator) -> Array:
     """Radii of pieces whose spheres have a volume together [m]: their number falls as d^-2.5."""
     low, high = matter.sizes
+    high = max(min(high, (6 / np.pi * LARGEST_SHARE * volume) ** (1 / 3)), 2 * low)
     power = 1.0 - SIZE_FALL
     # mean of d³ over the distribution
     mean = power / (power + 3) * (high ** (power + 3) - low ** (power + 3)) / (high**power - low**power)
@@ -397,7 +410,14 @@ def _from_sole(throw: Throw, which: NDArray[np.intp], random: np.random.Generato
         length = np.linalg.norm(np.ptp(points, axis=1), axis=1)
         start[:, :2] += BREADTH * length[:, None] * (random.random((len(which), 2)) - 0.5)
     velocity = np.einsum("nl,nli->ni", weights, velocities)
-    return start, velocity * (0.7 + 0.5 * random.random(len(which)))[:, None]
+    velocity = velocity * (0.7 + 0.5 * random.random(len(which)))[:, None]
+    return start, _scattered(velocity, random) if throw.kind == 2 else velocity
+
+
+def _scattered(velocity: Array, random: np.random.Generator) -> Array:
+    """Velocities that vary by `SHED_SCATTER`."""
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    return np.asarray(velocity + SHED_SCATTER * speed * random.standard_normal(velocity.shape))
 
 
 def _backward(aim: Array, slide: Array, random: np.random.Generator) -> Array:

@@ -16,7 +16,9 @@ class ThrownMatter:
     repose : float
         Angle of repose: what pushes along the ground harder than that throws it [deg].
     film : float
-        Thickness of what a sole carries as it leaves [m].
+        Thickness of what a sole sheds after it has left, over its area [m]: what stays on it is no debris.
+    lumps : int
+        In how many lumps it comes off, which break as they do; 0 where it trickles.
     sizes : (float, float)
         Smallest and largest diameter [m]; their number falls as d^-2.5.
     settling : (float, float)
@@ -26,15 +28,18 @@ class ThrownMatter:
     density: float
     repose: float
     film: float
+    lumps: int
     sizes: tuple[float, float]
     settling: tuple[float, float]
 
 
 MATTER = {
-    "snow": ThrownMatter(150.0, 34.0, 1.0e-3, (2.0e-3, 15.0e-3), (0.7, 4.0)),
-    "sand": ThrownMatter(1500.0, 34.0, 0.1e-3, (1.0e-3, 5.0e-3), (2.0, 6.0)),
-    "wet_sand": ThrownMatter(1800.0, 45.0, 2.0e-3, (2.0e-3, 12.0e-3), (5.0, 9.0)),
-    "mud": ThrownMatter(1700.0, 15.0, 4.0e-3, (2.0e-3, 10.0e-3), (5.0, 8.0)),
-    "soil": ThrownMatter(1300.0, 38.0, 0.3e-3, (2.0e-3, 30.0e-3), (3.0, 12.0)),
+    "snow": ThrownMatter(150.0, 34.0, 1.0e-3, 0, (2.0e-3, 15.0e-3), (0.7, 4.0)),
+    "sand": ThrownMatter(1500.0, 34.0, 0.1e-3, 0, (1.0e-3, 5.0e-3), (2.0, 6.0)),
+    "wet_sand": ThrownMatter(1800.0, 45.0, 0.4e-3, 8, (2.0e-3, 12.0e-3), (5.0, 9.0)),
+    "mud": ThrownMatter(1700.0, 15.0, 0.3e-3, 6, (2.0e-3, 20.0e-3), (5.0, 9.0)),
+    "soil": ThrownMatter(1300.0, 38.0, 0.3e-3, 0, (2.0e-3, 30.0e-3), (3.0, 12.0)),
 }
-"""By surface. Film of mud: yield stress over density and the acceleration of a sole, 200 Pa/(1700 kg/m³·30 m/s²)."""
+"""By surface. A sole keeps what its yield stress holds against the swing: of mud 200 Pa/(1700 kg/m³·30 m/s²), 4 mm; of
+wet sand, with a capillary cohesion of about 1 kPa, more than it carries. What hangs on loosely comes off: 5 to 15 g
+of a boot, by eye."""

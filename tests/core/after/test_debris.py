@@ -14,7 +14,7 @@ from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord, dump, load
 from tests.core.prop_bodies import prop_sole, sphere
-from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed
+from tests.core.walkers import GRAVITY, MASS, foot_sole, loads_of, pose, pressed, walk
 
 SAND = find("dry_sand").material
 
@@ -255,6 +255,24 @@ def test_a_sole_that_leaves_sheds_its_film_as_it_swings():
         assert 0.02 < np.abs(across).max() < 0.06
 
 
+def test_boots_leave_mud_with_a_few_drops_of_many_sizes_in_lumps():
+    """5 to 15 g of each, most of it in the larger half of the sizes, none in a single piece; lumps lie apart."""
+    loads = walk(steps=6)
+    _, record = pressed(loads, SAND, cell_size=0.02)
+    heard = Heard([loads], BakeRecord(record, {}), surface="mud")
+    places = flight.position(heard.start, heard.velocity, heard.drag_time, heard.time, GRAVITY)
+    for number in np.unique(heard.step[heard.kind == 2]):
+        own = (heard.step == number) & (heard.kind == 2)
+        grams = 4 / 3 * np.pi * heard.radius[own] ** 3 * MATTER["mud"].density * 1e3
+        assert 5 < grams.sum() < 15
+        assert grams.max() < 0.5 * grams.sum()
+        assert 20 < own.sum() < 200
+        assert len(np.unique(np.round(heard.birth[own] * 4))) <= 2 * MATTER["mud"].lumps
+        assert np.ptp(places[own, 1]) > 0.1  # a foot is as wide
+    diameter = 2e3 * heard.radius[heard.kind == 2]
+    assert np.percentile(diameter, 99) > 4 * np.percentile(diameter, 10)
+
+
 def test_a_ball_that_bounces_sheds_from_the_lower_half_of_its_surface():
     radius, time = 0.1, np.arange(121) / 120
     path = np.stack([0 * time, 0 * time, radius + np.maximum(time - 0.5, 0.0) * 2.0], -1)
@@ -268,9 +286,9 @@ def test_a_ball_that_bounces_sheds_from_the_lower_half_of_its_surface():
     assert shed.sum() > 20
     middle = np.stack([np.interp(heard.birth[shed], loads.motion.frames, path[:, axis]) for axis in range(3)], -1)
     below = heard.start[shed] - middle
-    assert np.linalg.norm(below, axis=1) == pytest.approx(radius, abs=0.02)  # a step goes 2 cm
+    assert np.linalg.norm(below, axis=1) == pytest.approx(radius, abs=0.03)  # a step goes 2 cm, and lumps are 2 cm wide
     assert below[:, 2].max() < 0.02
-    assert np.ptp(below[:, 0]) > radius
+    assert np.ptp(below[:, 0]) > radius / 2
 
 
 def test_flights_come_down_on_uneven_ground():
