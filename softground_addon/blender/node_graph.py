@@ -39,17 +39,20 @@ class NodeGraph:
     def __init__(self, tree: Any) -> None:
         self.tree = tree
         self._place = [0.0, 0.0]
+        self._places: list[float] = []
 
     def finish(self, geometry: Any) -> None:
         node = self.node("NodeGroupOutput")
         self.link(geometry, node.inputs["Geometry"])
+        # All at once: after each that is set on its own, Blender goes through the whole group.
+        self.tree.nodes.foreach_set("location", self._places)
 
     def next_row(self) -> None:
         self._place = [2 * COLUMN, self._place[1] - ROW]
 
     def node(self, kind: str) -> Any:
         node = self.tree.nodes.new(kind)
-        node.location = self._place
+        self._places += self._place
         node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
         self._place[0] += COLUMN
         return node

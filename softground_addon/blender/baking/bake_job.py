@@ -135,9 +135,7 @@ def bake(
         report.build,
         inputs=inputs,
         input_hash=input_hash,
-        footprints=footprints,
-        pressed_again=left.pressed_again,
-        thrown=left.thrown,
+        steps=left.steps,
         edits=left.edits,
         offsets_mm=bake_report.offsets_mm(loads),
         forces=forces,
@@ -153,7 +151,7 @@ def bake(
     written: Written | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
-        written = yield from write_prints(scene, wanted, shot, replace(left, about=about), sole_length)
+        written = yield from write_prints(scene, wanted, shot, left.with_about(about), sole_length)
         findings += written.findings
         debris_job.put(written.ground, debris, wanted)
     if write and wanted.output != "PRINTS":

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..loads.estimate import CharacterLoads
-from ..record import throws
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
 from ..record.throws import AIM, WEIGHT, Throw
@@ -131,7 +130,7 @@ def thrown_share(speed: float, radius: float, gravity: float) -> float:
 
 
 def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], *, surface: str) -> list[Throw]:
-    """How the steps of a bake throw, rounded to what the record keeps of it.
+    """How the steps of a bake throw.
 
     Parameters
     ----------
@@ -152,7 +151,7 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
             number = _footprint_of(character, phase, footprints)
             if number is not None:
                 found += _throws(character, phase, number, MATTER[surface], sliding)
-    return [throws.from_json(throws.to_json(one), len(footprints)) for one in found]
+    return found
 
 
 def sources(thrown: Sequence[Throw], steps: Sequence[EditableStep], *, surface: str, gravity: float) -> list[Source]:

@@ -14,8 +14,7 @@ import numpy as np
 from ..findings import Finding, worst_first
 from ..numerics.slices import Slices, sliced
 from ..record.edits import UNCHANGED, StepEdit, edit_as_json, to_json
-from ..record.footprints import Footprint
-from ..record.record import EditableStep, steps_of
+from ..record.record import EditableStep
 from ..record.typical_depth import typical_of
 
 SCHEMA_VERSION = 1
@@ -25,8 +24,7 @@ def build(
     *,
     inputs: Mapping[str, object],
     input_hash: str,
-    footprints: Sequence[Footprint],
-    pressed_again: Mapping[int, Footprint | None] = MappingProxyType({}),
+    steps: Sequence[EditableStep],
     edits: Mapping[str, StepEdit] = MappingProxyType({}),
     offsets_mm: Mapping[str, Mapping[str, float]],
     timings: Mapping[str, float],
@@ -37,7 +35,6 @@ def build(
     worst_gaps: Sequence[Mapping[str, object]] = (),
     suggested_speed: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, object]] = (),
-    thrown: Mapping[int, Mapping[str, float]] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Everything that is said of a bake, ready for JSON.
 
@@ -47,10 +44,10 @@ def build(
         The settings of the bake, in SI units.
     input_hash : str
         From `hash_inputs`, of all inputs but the edits: with these, it is equal for bakes with equal inputs.
-    footprints : sequence of Footprint
-        In the order of their first contact, as they were baked.
-    pressed_again, edits
-        Of the `BakeRecord`: what stands for some of them, and why. Steps of which nothing is left have `left_out`.
+    steps : sequence of EditableStep
+        Of the `BakeRecord`. Those of which nothing is left have `left_out`.
+    edits : mapping
+        Of the `BakeRecord`: why they are not as they were baked.
     offsets_mm : mapping of character to (sole to mm)
         Constant float (positive) or sink of the source animation that was taken out of each sole.
     timings : mapping
@@ -69,18 +66,15 @@ def build(
         Speed that people would choose on this ground, over that on hard ground, by character.
     events : sequence of mapping
         From `core.after.events`.
-    thrown : mapping, optional
-        Of the `BakeRecord`: what steps have thrown out of their rims.
     """
-    left = steps_of(footprints, edits, pressed_again, thrown)
-    steps = [_step(step) for step in left]
-    counted = [step for step in steps if not step.get("left_out")]
-    shown = [step.left for step in left if step.left]
+    rows = [_step(step) for step in steps]
+    counted = [row for row in rows if not row.get("left_out")]
+    shown = [step.left for step in steps if step.left]
     report: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "inputs": dict(inputs),
         "input_hash": hash_inputs(input_hash, to_json(edits)) if edits else input_hash,
-        "steps": steps,
+        "steps": rows,
         "totals": {
             "steps": len(counted),
             "peak_force_n": max((step["peak_force_n"] for step in counted), default=0.0),
@@ -88,7 +82,7 @@ def build(
             "typical_depth_m": typical_of(shown),
             "compressed_m3": sum(step["compressed_m3"] for step in counted),
             "rim_m3": sum(step["rim_m3"] for step in counted),
-            "thrown_m3": sum(sum(step.thrown.values()) for step in left),
+            "thrown_m3": sum(sum(step.thrown.values()) for step in steps),
         },
         "events": [dict(event) for event in events],
         "source_offset_mm": {name: dict(soles) for name, soles in offsets_mm.items()},

@@ -8,6 +8,7 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -108,6 +109,12 @@ class BakeRecord:
         """The footprints as the artist left them, in their order: those that the ground is made from."""
         left = [step.left for step in self.steps if step.left is not None]
         return sorted(left, key=lambda footprint: footprint.start_frame) if self.edits else left
+
+    def with_about(self, about: Mapping[str, Any]) -> BakeRecord:
+        """The same steps, of which nothing is worked out again, and something else about them."""
+        twin = copy(self)
+        object.__setattr__(twin, "about", about)
+        return twin
 
     @cached_property
     def steps(self) -> list[EditableStep]:

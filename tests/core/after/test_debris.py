@@ -184,6 +184,7 @@ def test_what_is_thrown_comes_back_with_the_record_and_forged_rows_are_refused(r
     again = load(content)
     assert dump(again) == content
     assert again.thrown == left.thrown
+    assert [throws.to_json(one) for one in again.throws] == [throws.to_json(one) for one in left.throws]
     for one, other in zip(left.throws, again.throws, strict=True):
         assert np.array_equal(one.samples, other.samples)
     row = throws.to_json(left.throws[0])
