@@ -8,7 +8,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
+from mathutils import Euler, Matrix, Vector
 from scipy.spatial import KDTree
 
 from sample_scenes.body import Body
@@ -77,6 +77,11 @@ def values(obj, name, field="value", size=1):
     return out.reshape(-1, size) if size > 1 else out
 
 
+def places_of(obj):
+    """Where its points come to rest."""
+    return mesh_arrays.positions(obj.data) + np.array(obj.location)
+
+
 def pieces(obj):
     """Places of all shapes and of all round points that are seen."""
     graph = bpy.context.evaluated_depsgraph_get()
@@ -100,7 +105,7 @@ def shown(obj):
 
 def wanted(obj, frame, wind=(0.0, 0.0, 0.0)):
     """The same by the closed form of the core."""
-    start = values(obj, "softground_start", "vector", 3)
+    start = values(obj, "softground_start", "vector", 3) + np.array(obj.location)
     since = (frame - values(obj, "softground_birth")) / 24.0
     born = since >= 0
     drag, time = values(obj, "softground_drag")[born], np.minimum(since, values(obj, "softground_flight"))[born]
@@ -223,6 +228,26 @@ def test_a_run_in_dry_sand_throws_a_plume_at_each_landing(baked, scene):
     assert 0.08 < rise.max() < 0.4
 
 
+def test_debris_goes_with_the_ground_and_has_its_origin_so_that_no_line_runs_between_them(addon):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    runner(scene)
+    scene.softground.debris = True
+    bpy.ops.softground.create_ground()
+    ground = scene.softground.ground
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    scene.frame_set(20)
+    before, obj = shown(debris_object.of(ground)), debris_object.of(ground)
+    assert ground.location.length > 0.1
+    assert np.abs(np.sort(before, axis=0) - np.sort(wanted(obj, 20), axis=0)).max() < 1e-4
+    turned = Matrix.LocRotScale((1.0, 2.0, 3.0), Euler((0.1, 0.2, 0.3)), (2.0, 2.0, 2.0))
+    ground.matrix_world = turned @ ground.matrix_world
+    bpy.context.view_layer.update()
+    after = np.array([tuple(turned @ Vector(place)) for place in before])
+    assert KDTree(shown(obj)).query(after)[0].max() < 1e-4
+    assert (obj.matrix_world.translation - ground.matrix_world.translation).length < 1e-5
+
+
 def test_clear_takes_all_of_it_away_and_gives_the_bytes_back(addon):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -301,8 +326,7 @@ def test_only_the_largest_have_a_shape_and_the_rest_are_round(scene):
 
 def test_points_lie_where_they_come_to_rest(scene):
     obj = debris_object.of(scene.softground.ground)
-    rest = np.empty((len(obj.data.vertices), 3), np.float32)
-    obj.data.vertices.foreach_get("co", rest.ravel())
+    rest = places_of(obj)
     there = wanted(obj, 1e4)
     assert len(rest) == len(there)  # of two that lie side by side, either may be sorted first
     assert max(KDTree(rest).query(there)[0].max(), KDTree(there).query(rest)[0].max()) < 1e-4
@@ -335,8 +359,7 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     """All of the volume that has landed by a frame, around where it lies."""
     ground, side, resolution = scene.softground.ground, 8.0, 1024
     obj = debris_object.of(ground)
-    place = np.empty((len(obj.data.vertices), 3), np.float32)
-    obj.data.vertices.foreach_get("co", place.ravel())
+    place = places_of(obj)
     pixel = side / resolution
     middle = np.round(place[:, :2].mean(axis=0) / pixel) * pixel  # each square has a pixel in its middle
     corners = np.empty((len(ground.data.loops), 2), np.float32)

@@ -77,13 +77,15 @@ def put(
     remove(ground)
     if debris is None or not len(debris.birth):
         return None
-    points = _points(debris, time_stretch, gravity, unit_scale)
+    origin = ground.matrix_world.translation  # of both, or a line would be drawn from one to the other
+    points = _points(debris, np.array(origin) * unit_scale, time_stretch, gravity, unit_scale)
     obj = bpy.data.objects.new(NAME, points)
     obj[nodes.MARK] = True
     for collection in ground.users_collection:
         collection.objects.link(obj)
     obj.parent = ground
     obj.matrix_parent_inverse = ground.matrix_world.inverted()
+    obj.location = origin
     ground[THROWN] = obj
     shapes = debris_shapes.collection_of(surface)
     group = nodes.build(
@@ -139,7 +141,7 @@ def at_rest(obj: bpy.types.Object, *, frame_rate: float, time_stretch: float, un
     drift = np.outer(time - flight.coasting(drag, time), tuple(wind or (0.0, 0.0, 0.0))[:2])
     landed = values(nodes.BIRTH) / time_stretch + time * frame_rate
     down = time < flight.LONGEST_FLIGHT - 1e-3
-    at = place.reshape(-1, 3)[:, :2].astype(np.float64) * unit_scale + drift
+    at = (place.reshape(-1, 3) + np.array(obj.location))[:, :2] * unit_scale + drift
     return AtRest(at[down], values(nodes.RADIUS)[down] * unit_scale, landed[down])
 
 
@@ -177,9 +179,12 @@ def _modifier_of(obj: bpy.types.Object) -> Any:
     return modifier_with(obj, lambda group: bool(group.get(nodes.MARK)))
 
 
-def _points(debris: Debris, time_stretch: float, gravity: float, unit_scale: float) -> bpy.types.Mesh:
-    """Points where the pieces come to rest, with what lets them fly there."""
-    rest = flight.position(debris.start, debris.velocity, debris.drag_time, debris.time, gravity)
+def _points(
+    debris: Debris, origin: NDArray[np.float64], time_stretch: float, gravity: float, unit_scale: float
+) -> bpy.types.Mesh:
+    """Points where the pieces come to rest as seen from an origin (3,) [m], with what lets them fly there."""
+    start = debris.start - origin
+    rest = flight.position(start, debris.velocity, debris.drag_time, debris.time, gravity)
     rank = np.empty(len(debris.radius))
     rank[np.argsort(-debris.radius, kind="stable")] = np.arange(len(rank))
     order = np.argsort(rank >= nodes.SHAPED, kind="stable")  # then what is seen is one run of points, copied as such
@@ -192,7 +197,7 @@ def _points(debris: Debris, time_stretch: float, gravity: float, unit_scale: flo
         (nodes.DRAG, "FLOAT", "value", debris.drag_time),
         (nodes.RADIUS, "FLOAT", "value", debris.radius / unit_scale),
         (nodes.RANK, "FLOAT", "value", rank),
-        (nodes.START, "FLOAT_VECTOR", "vector", debris.start / unit_scale),
+        (nodes.START, "FLOAT_VECTOR", "vector", start / unit_scale),
         (nodes.LAUNCH, "FLOAT_VECTOR", "vector", debris.velocity / unit_scale),
         (nodes.KIND, "INT", "value", debris.kind),
         (nodes.STEP, "INT", "value", debris.step),
