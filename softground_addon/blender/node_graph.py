@@ -33,41 +33,86 @@ def inputs_of(modifier: Any) -> dict[str, str]:
     return {socket.name: socket.identifier for socket in sockets if socket.in_out == "INPUT"}
 
 
-class NodeGraph:
-    """A node group while it is built, laid out in rows."""
+class OtherGraphError(Exception):
+    """A group has other nodes or links than those that it is to have."""
 
-    def __init__(self, tree: Any) -> None:
+
+def build(tree: Any, fill: Callable[[NodeGraph], None]) -> None:
+    """Fill a group, in place of what is in it; where that has the same nodes and links, only numbers are set.
+
+    After each change Blender goes through the whole group, which takes seconds for one of some hundred nodes.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    fill : callable
+        Makes the nodes of a graph, and finishes it.
+    """
+    try:
+        fill(NodeGraph(tree, known=True))
+    except OtherGraphError:
+        tree.nodes.clear()
+        fill(NodeGraph(tree))
+
+
+class NodeGraph:
+    """A node group while it is built, laid out in rows.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    known : bool
+        Whether it has all nodes and links already, which are then looked at in their order; `OtherGraphError` if not.
+    """
+
+    def __init__(self, tree: Any, *, known: bool = False) -> None:
         self.tree = tree
         self._place = [0.0, 0.0]
         self._places: list[float] = []
+        self._known = iter(tree.nodes[:]) if known else None
+        self._links: set[tuple[Any, Any]] = set()
 
     def finish(self, geometry: Any) -> None:
         node = self.node("NodeGroupOutput")
         self.link(geometry, node.inputs["Geometry"])
+        if self._known is not None:
+            links = {(link.from_socket, link.to_socket) for link in self.tree.links}
+            if next(self._known, None) is not None or links != self._links:
+                raise OtherGraphError
         # All at once: after each that is set on its own, Blender goes through the whole group.
         self.tree.nodes.foreach_set("location", self._places)
 
     def next_row(self) -> None:
         self._place = [2 * COLUMN, self._place[1] - ROW]
 
-    def node(self, kind: str) -> Any:
-        node = self.tree.nodes.new(kind)
+    def node(self, kind: str, **properties: Any) -> Any:
+        if self._known is None:
+            node = self.tree.nodes.new(kind)
+            node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
+        else:
+            node = next(self._known, None)
+            if node is None or node.bl_idname != kind or node.mute:
+                raise OtherGraphError
         self._places += self._place
-        node.hide = kind not in ("NodeGroupInput", "NodeGroupOutput")
         self._place[0] += COLUMN
+        for name, value in properties.items():
+            if getattr(node, name) != value:
+                setattr(node, name, value)
         return node
 
     def link(self, source: Any, socket: Any) -> None:
         """Connect an output, or set a number or vector."""
-        if isinstance(source, bpy.types.NodeSocket):
+        if not isinstance(source, bpy.types.NodeSocket):
+            if not _is(socket.default_value, source):
+                socket.default_value = source
+        elif self._known is None:
             self.tree.links.new(source, socket)
         else:
-            socket.default_value = source
+            self._links.add((source, socket))
 
     def attribute(self, name: str, kind: str = "FLOAT") -> Any:
-        node = self.node("GeometryNodeInputNamedAttribute")
-        node.data_type = kind
-        node.inputs["Name"].default_value = name
+        node = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
+        self.link(name, node.inputs["Name"])
         return node.outputs["Attribute"]
 
     def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
@@ -89,9 +134,8 @@ class NodeGraph:
 
     def store(self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT") -> Any:
         """Give the selected vertices another value of that name."""
-        node = self.node("GeometryNodeStoreNamedAttribute")
-        node.data_type, node.domain = kind, "POINT"
-        node.inputs["Name"].default_value = name
+        node = self.node("GeometryNodeStoreNamedAttribute", data_type=kind, domain="POINT")
+        self.link(name, node.inputs["Name"])
         self.link(geometry, node.inputs["Geometry"])
         self.link(selection, node.inputs["Selection"])
         self.link(value, node.inputs["Value"])
@@ -107,8 +151,7 @@ class NodeGraph:
         return geometry
 
     def math(self, operation: str, first: Any, second: Any = 0.0) -> Any:
-        node = self.node("ShaderNodeMath")
-        node.operation = operation
+        node = self.node("ShaderNodeMath", operation=operation)
         self.link(first, node.inputs[0])
         self.link(second, node.inputs[1])
         return node.outputs["Value"]
@@ -120,22 +163,19 @@ class NodeGraph:
         return self.logic("OR", first, second)
 
     def logic(self, operation: str, *operands: Any) -> Any:
-        node = self.node("FunctionNodeBooleanMath")
-        node.operation = operation
+        node = self.node("FunctionNodeBooleanMath", operation=operation)
         for operand, socket in zip(operands, node.inputs, strict=False):  # for one there may be two sockets
             self.link(operand, socket)
         return node.outputs["Boolean"]
 
     def compare(self, operation: str, first: Any, second: Any) -> Any:
-        node = self.node("FunctionNodeCompare")
-        node.data_type, node.operation = "FLOAT", operation
+        node = self.node("FunctionNodeCompare", data_type="FLOAT", operation=operation)
         self.link(first, node.inputs["A"])
         self.link(second, node.inputs["B"])
         return node.outputs["Result"]
 
     def scaled(self, vector: Any, factor: Any) -> Any:
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = "SCALE"
+        node = self.node("ShaderNodeVectorMath", operation="SCALE")
         self.link(vector, node.inputs[0])
         self.link(factor, node.inputs["Scale"])
         return node.outputs["Vector"]
@@ -147,8 +187,7 @@ class NodeGraph:
 
     def sample(self, splines: Any, number: Any, length: Any) -> Any:
         """A node that looks at one of the splines, at a length along it."""
-        node = self.node("GeometryNodeSampleCurve")
-        node.mode, node.data_type, node.use_all_curves = "LENGTH", "FLOAT", False
+        node = self.node("GeometryNodeSampleCurve", mode="LENGTH", data_type="FLOAT", use_all_curves=False)
         self.link(splines, node.inputs["Curves"])
         self.link(length, node.inputs["Length"])
         self.link(number, node.inputs["Curve Index"])
@@ -156,15 +195,13 @@ class NodeGraph:
 
     def accumulated(self, parts: Any, kind: str = "FLOAT") -> Any:
         """A node with sums of a field over points: those before each, those up to and with it, and of all."""
-        node = self.node("GeometryNodeAccumulateField")
-        node.data_type, node.domain = kind, "POINT"
+        node = self.node("GeometryNodeAccumulateField", data_type=kind, domain="POINT")
         self.link(parts, node.inputs["Value"])
         return node
 
     def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
         """What a field is at one of a geometry's points, or at the last of them."""
-        node = self.node("GeometryNodeSampleIndex")
-        node.data_type, node.domain, node.clamp = kind, "POINT", True
+        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT", clamp=True)
         self.link(geometry, node.inputs["Geometry"])
         self.link(value, node.inputs["Value"])
         self.link(index, node.inputs["Index"])
@@ -175,8 +212,10 @@ class NodeGraph:
     ) -> Any:
         """What a geometry becomes by so many steps, each from it and a number to the next of both."""
         begin, end = self.node("GeometryNodeRepeatInput"), self.node("GeometryNodeRepeatOutput")
-        begin.pair_with_output(end)
-        end.repeat_items.new("FLOAT", "Number")
+        if begin.paired_output != end:
+            begin.pair_with_output(end)
+        if "Number" not in end.repeat_items:
+            end.repeat_items.new("FLOAT", "Number")
         for value, name in ((count, "Iterations"), (geometry, "Geometry"), (number, "Number")):
             self.link(value, begin.inputs[name])
         changed, following = step(begin.outputs["Geometry"], self.number(begin.outputs["Number"]))
@@ -193,8 +232,7 @@ class NodeGraph:
 
     def choose(self, kind: str, switch: Any, when_false: Any, when_true: Any) -> Any:
         """One or the other; a number is true if it is above 0."""
-        node = self.node("GeometryNodeSwitch")
-        node.input_type = kind
+        node = self.node("GeometryNodeSwitch", input_type=kind)
         self.link(switch, node.inputs["Switch"])
         self.link(when_false, node.inputs["False"])
         self.link(when_true, node.inputs["True"])
@@ -202,8 +240,7 @@ class NodeGraph:
 
     def vector(self, operation: str, *vectors: Any, output: str = "Vector") -> Any:
         """An operation on vectors."""
-        node = self.node("ShaderNodeVectorMath")
-        node.operation = operation
+        node = self.node("ShaderNodeVectorMath", operation=operation)
         for vector, socket in zip(vectors, node.inputs, strict=False):
             self.link(vector, socket)
         return node.outputs[output]
@@ -218,6 +255,13 @@ class NodeGraph:
     def number(self, source: Any) -> Number:
         """An output, or a number, to calculate with."""
         return Number(self, source)
+
+
+def _is(value: Any, other: Any) -> bool:
+    """Whether a socket's value is another one, as Blender rounds numbers."""
+    if isinstance(other, bool | int | float) or (isinstance(other, tuple | list) and value is not None):
+        return np.array_equal(np.asarray(value, np.float32), np.asarray(other, np.float32))
+    return bool(value == other)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from softground_addon.blender.ground import baked_ground, ground_mesh, weather, 
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
-from softground_addon.core.after.weather import MOMENTS, matter_of
+from softground_addon.core.after.weather import MOMENTS, matter_of, span_of
 from softground_addon.core.after.weather_course import Weather
 from softground_addon.core.after.weather_places import NOT_YET, WeatherPlaces, section_of, weather_places
 from tests.blender import weathered_shots
@@ -407,6 +407,57 @@ def test_each_preset_has_something_to_show(opened, preset):
 
 
 @pytest.mark.slow
+def content_of(tree):
+    """All that a node group is: its nodes with their properties and values, and its links."""
+    names = {node: number for number, node in enumerate(tree.nodes)}
+
+    def value_of(socket):
+        value = getattr(socket, "default_value", None)
+        return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+    held = [
+        (
+            node.bl_idname,
+            tuple(getattr(node, name, None) for name in ("operation", "data_type", "domain", "mode", "input_type")),
+            [value_of(socket) for socket in (*node.inputs, *node.outputs)],
+            tuple(node.location),
+        )
+        for node in tree.nodes
+    ]
+    links = {
+        (names[link.from_node], link.from_socket.identifier, names[link.to_node], link.to_socket.identifier)
+        for link in tree.links
+    }
+    return held, links
+
+
+def changed_value(tree):
+    next(node for node in tree.nodes if node.bl_idname == "ShaderNodeMath").operation = "TANGENT"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda tree: None,
+        changed_value,
+        lambda tree: tree.nodes.remove(tree.nodes[40]),
+        lambda tree: tree.nodes.new("NodeFrame"),
+        lambda tree: tree.links.remove(tree.links[100]),
+        lambda tree: setattr(tree.nodes[50], "mute", True),
+    ],
+    ids=["as it was", "a value", "a node less", "a node more", "a link less", "a muted node"],
+)
+def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon, change):
+    matter, others = matter_of("sand", 0.2, 0.005), matter_of("sand", 0.2, 0.008)
+    about = {"up": (0.0, 0.0, 1.0), "span": span_of(1.0, 60.0, 24.0)}
+    older, fresh = nodes.new(), nodes.new()
+    nodes.build(older, matter=matter, soaking=(0.3, 0.9), **about)
+    change(older)
+    nodes.build(older, matter=others, soaking=(0.2, 0.8), **about)
+    nodes.build(fresh, matter=others, soaking=(0.2, 0.8), **about)
+    assert content_of(older) == content_of(fresh)
+
+
 def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened):
     scene = opened()
     bpy.ops.softground.clear_bake()

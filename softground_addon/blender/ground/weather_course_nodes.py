@@ -54,7 +54,7 @@ class PointTable:
 
     def __init__(self, graph: NodeGraph, count: int) -> None:
         points = graph.node("GeometryNodePoints")
-        points.inputs["Count"].default_value = count
+        graph.link(count, points.inputs["Count"])
         self._graph, self.geometry = graph, points.outputs[0]
 
     def keep(self, name: str, *numbers: Number) -> list[Number]:
@@ -152,20 +152,20 @@ class CourseNodes:
         return named
 
     def _value(self, name: str, value: float) -> Number:
-        node = self.graph.node("ShaderNodeValue")
-        node.name = node.label = name
-        node.outputs[0].default_value = value
+        node = self.graph.node("ShaderNodeValue", name=name, label=name)
+        self.graph.link(value, node.outputs[0])
         return self.graph.number(node.outputs[0])
 
     def _rate(self, name: str, given: Number) -> Number:
         """An input, or what its keys say of each part."""
         graph = self.graph
-        curve = graph.node("ShaderNodeFloatCurve")
-        curve.name = curve.label = keys_of(name)
-        curve.mapping.use_clip = False
+        curve = graph.node("ShaderNodeFloatCurve", name=keys_of(name), label=keys_of(name))
+        if curve.mapping.use_clip:
+            curve.mapping.use_clip = False
         graph.link(self._through.socket, curve.inputs["Value"])
         chosen = graph.choose("FLOAT", False, given.socket, curve.outputs["Value"])
-        chosen.node.name = chosen.node.label = switch_of(name)
+        if chosen.node.name != switch_of(name):
+            chosen.node.name = chosen.node.label = switch_of(name)
         return graph.number(chosen)
 
     def _sum(self, rates: Mapping[str, Number]) -> None:

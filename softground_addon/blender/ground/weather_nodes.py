@@ -11,6 +11,7 @@ what `core.after.weather_places` found.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +19,7 @@ import bpy
 
 from ...core.after.weather import Matter, Span
 from ...core.after.weather_places import BOUNDS, COVERED, NEAR, POWERS
+from .. import node_graph
 from ..node_graph import NodeGraph, Number, new_group
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
 from .weather_course_nodes import CourseNodes
@@ -136,7 +138,7 @@ def build(
     felt: bool = False,
     again: bool = False,
 ) -> None:
-    """Fill a group, in place of what is in it; its inputs stay.
+    """Fill a group, in place of what is in it; its inputs stay. See `node_graph.build`.
 
     Parameters
     ----------
@@ -155,8 +157,21 @@ def build(
     again : bool
         Whether there are steps into earlier prints.
     """
-    tree.nodes.clear()
-    graph = NodeGraph(tree)
+    fill = partial(_fill, matter=matter, up=up, span=span, soaking=soaking, felt=felt, again=again)
+    node_graph.build(tree, fill)
+
+
+def _fill(
+    graph: NodeGraph,
+    *,
+    matter: Matter,
+    up: Sequence[float],
+    span: Span,
+    soaking: tuple[float, float],
+    felt: bool,
+    again: bool,
+) -> None:
+    """Make the nodes of a group; see `build`."""
     group = graph.node("NodeGroupInput")
     said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
     course = CourseNodes(graph, said, matter, span, soaking)

@@ -14,6 +14,8 @@ Grid = TypeVar("Grid", bound=SparseGrid)
 
 Array = NDArray[np.float64]
 
+WIDE = TILE // 4
+"""Cells on each side of a kernel beyond which it costs less to blur all in one direction, and that in the other."""
 CUT_OFF = 4.0
 """The Gaussian ends at so many standard deviations, where it has fallen to 0.03 % of its peak."""
 
@@ -78,15 +80,33 @@ def blurred(field: Grid, sigma: float) -> Grid:
     sigma : float
         Standard deviation [m].
     """
-    result = copy(field)
-    result.tiles = {}
-    spread = -(-(len(gaussian_kernel(sigma / field.cell_size)) // 2) // TILE)  # tiles that a touched one blurs into
+    kernel = gaussian_kernel(sigma / field.cell_size)
+    margin = len(kernel) // 2
+    spread = -(-margin // TILE)  # tiles that a touched one blurs into
     around = range(-spread, spread + 1)
+    if margin > WIDE:
+        upright, result = _empty(field), _empty(field)
+        band = _band(kernel, TILE)
+        for column, row in sorted({(column, row + j) for column, row in field.tiles for j in around}):
+            high = Window(column * TILE, row * TILE - margin, TILE, TILE + 2 * margin)
+            upright.tiles[column, row] = band @ field.read(high)
+        for column, row in sorted({(column + i, row) for column, row in upright.tiles for i in around}):
+            wide = Window(column * TILE - margin, row * TILE, TILE + 2 * margin, TILE)
+            result.write(Window(column * TILE, row * TILE, TILE, TILE), upright.read(wide) @ band.T)
+        return result
+    result = _empty(field)
     places = {(column + i, row + j) for column, row in field.tiles for i in around for j in around}
     for column, row in sorted(places):
         window = Window(column * TILE, row * TILE, TILE, TILE)
         result.write(window, blurred_window(field, window, sigma))
     return result
+
+
+def _empty(field: Grid) -> Grid:
+    """A grid like another, with nothing in it."""
+    twin = copy(field)
+    twin.tiles = {}
+    return twin
 
 
 def _band(kernel: Array, size: int) -> Array:
