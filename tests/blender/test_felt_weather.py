@@ -79,7 +79,8 @@ def test_what_is_thrown_lies_on_the_new_snow_of_its_time(opened):
     ground = opened.softground.ground
     left = record.load(bytes(baked_ground.stored_record(ground)))
     obj = debris_object.of(ground)
-    lies, born = positions(obj.data).astype(float), np.empty(len(obj.data.vertices), np.float32)
+    lies = positions(obj.data) + np.array(obj.matrix_world.translation)
+    born = np.empty(len(obj.data.vertices), np.float32)
     obj.data.attributes["softground_birth"].data.foreach_get("value", born)
     away = np.min([np.linalg.norm(lies[:, :2] - one.position[:2], axis=1) for one in left.edited], axis=0) > 0.3
     weathering = weathering_of(felt_in(left.about["inputs"]), opened.softground.material.layer_depth)
