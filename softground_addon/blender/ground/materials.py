@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ..shader_graph import Colour, Graph, Socket
 from .own_data import COMPRESSION, RIM, SOLE, WATER
 from .weather_look import bare, under_weather
 from .weather_nodes import FRESH
@@ -38,98 +39,6 @@ WIDE = 5.0
 
 RIPPLE, RIPPLE_HEIGHT, LEE = 0.085, 0.0055, 0.68
 """From crest to crest of wind ripples, their height [m], and the part of a wave that faces the wind."""
-
-Colour = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Socket:
-    """An output of a node, with the arithmetic of shader graphs."""
-
-    graph: Graph
-    output: Any
-
-    def __add__(self, other: Socket | float) -> Socket:
-        return self.graph.math("ADD", self, other)
-
-    def __mul__(self, other: Socket | float) -> Socket:
-        return self.graph.math("MULTIPLY", self, other)
-
-
-class Graph:
-    """Writes nodes into a material, each at the right of those that it reads."""
-
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
-        self._tree = tree
-        self._depth: dict[str, int] = {}
-        self._rows: dict[int, int] = {}
-
-    def node(self, kind: str, inputs: Mapping[Any, Any] | None = None, **properties: Any) -> Any:
-        """A node with its properties set and its inputs, given by identifier or position, linked or set."""
-        node: Any = self._tree.nodes.new(kind)
-        for name, value in properties.items():
-            setattr(node, name, value)
-        depth = 0
-        for key, value in (inputs or {}).items():
-            socket = _input(node, key)
-            if isinstance(value, Socket):
-                self._tree.links.new(value.output, socket)
-                depth = max(depth, self._depth[value.output.node.name] + 1)
-            else:
-                socket.default_value = value
-        row = self._rows.get(depth, 0)
-        self._depth[node.name], self._rows[depth] = depth, row + 1
-        node.location = (220 * depth, -260 * row)
-        return node
-
-    def out(self, node: Any, index: int = 0) -> Socket:
-        """An output by its position: names of outputs differ between Blender versions."""
-        return Socket(self, node.outputs[index])
-
-    def math(self, operation: str, a: Socket | float, b: Socket | float) -> Socket:
-        """a operation b."""
-        return self.out(self.node("ShaderNodeMath", {0: a, 1: b}, operation=operation))
-
-    def normal(self) -> Socket:
-        """The smooth normal of the mesh."""
-        return self.out(self.node("ShaderNodeNewGeometry"), 1)
-
-    def attribute(self, name: str) -> Socket:
-        """A float attribute of the mesh; 0 where the mesh has none."""
-        return self.out(self.node("ShaderNodeAttribute", attribute_name=name), 2)
-
-    def ramp(self, value: Socket, low: float, high: float, start: float = 0.0, end: float = 1.0) -> Socket:
-        """From `start` at `low` to `end` at `high`, smoothly, and level outside."""
-        inputs = {0: value, 1: low, 2: high, 3: start, 4: end}
-        return self.out(self.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP"))
-
-    def noise(self, place: Socket, size: float, detail: float = 2.0, roughness: float = 0.5) -> Socket:
-        """Noise around 0.5 whose features are about `size` [m] large."""
-        inputs = {"Vector": place, "Scale": 1.0 / size, "Detail": detail, "Roughness": roughness}
-        return self.out(self.node("ShaderNodeTexNoise", inputs))
-
-    def cells(self, place: Socket, size: float) -> Any:
-        """Voronoi cells of about `size` [m]: outputs are distance to the centre [cells], random colour."""
-        return self.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": 1.0 / size})
-
-    def mix(self, factor: Socket, a: Socket | Colour, b: Socket | Colour) -> Socket:
-        """Colour a at factor 0, b at factor 1."""
-        inputs = {"Factor_Float": factor, "A_Color": _rgba(a), "B_Color": _rgba(b)}
-        return self.out(self.node("ShaderNodeMix", inputs, data_type="RGBA"), 2)
-
-    def blend(self, factor: Socket, a: Socket | float, b: Socket | float) -> Socket:
-        """Number a at factor 0, b at factor 1."""
-        return self.out(self.node("ShaderNodeMix", {"Factor_Float": factor, "A_Float": a, "B_Float": b}))
-
-
-def _rgba(colour: Socket | Colour) -> Any:
-    return colour if isinstance(colour, Socket) else (*colour, 1.0)
-
-
-def _input(node: Any, key: str | int) -> Any:
-    if isinstance(key, int):
-        return node.inputs[key]
-    return next(socket for socket in node.inputs if key in (socket.identifier, socket.name))
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,10 @@ Where a mesh has no weather its attributes are 0, and every surface is as withou
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..shader_graph import Graph, Socket
 from .weather_nodes import DRIED, FRESH, WATER, WETNESS
-
-if TYPE_CHECKING:
-    from .materials import Graph, Socket
 
 NEW_SNOW = (0.915, 0.935, 0.96)
 SOAKED = (0.42, 0.38, 0.34)

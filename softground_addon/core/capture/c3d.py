@@ -9,13 +9,14 @@ samples, in the number formats of three families of processors.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .c3d_parameters import Parameters
 from .captured import Capture, metres
 from .plates import plates_of
 
@@ -24,8 +25,6 @@ Array = NDArray[np.float64]
 _BLOCK = 512
 _KEY = 0x50
 _INTEL, _DEC, _SGI = 84, 85, 86
-_LONGEST_LABEL_LIST = 256
-"""Parameters `LABELS2`, `LABELS3`, ... that go on where one list of 255 names is full."""
 
 
 @dataclass(frozen=True)
@@ -48,33 +47,6 @@ class _Numbers:
         # VAX F-float: the halves of an IEEE number in turn, its exponent greater by two.
         halves = np.frombuffer(content, "<u2").reshape(-1, 2)
         return np.ascontiguousarray(halves[:, ::-1]).view("<f4")[:, 0].astype(float) / 4
-
-
-@dataclass
-class Parameters:
-    """The parameters of a C3D file, by group and name in capitals; each is a list of texts or an array."""
-
-    values: dict[tuple[str, str], Any] = field(default_factory=dict)
-
-    def texts(self, group: str, name: str) -> list[str]:
-        """All texts of a parameter, with those of the ones that continue it."""
-        names = [name, *(f"{name}{number}" for number in range(2, _LONGEST_LABEL_LIST))]
-        found = (self.values.get((group, each), []) for each in names)
-        return [text for value in found if isinstance(value, list) for text in value]
-
-    def text(self, group: str, name: str, missing: str = "") -> str:
-        """The first text of a parameter."""
-        return next(iter(self.texts(group, name)), missing)
-
-    def array(self, group: str, name: str) -> Array:
-        """Numbers of a parameter in Fortran's order, as the manual writes them; empty where there is none."""
-        value = self.values.get((group, name))
-        return value if isinstance(value, np.ndarray) else np.zeros(0)
-
-    def number(self, group: str, name: str, missing: float = 0.0) -> float:
-        """The first number of a parameter."""
-        values = self.array(group, name)
-        return float(values.flat[0]) if values.size else missing
 
 
 def read(content: bytes) -> Capture:

@@ -7,15 +7,11 @@ The C3D file format, a technical user manual, "Force platform parameters": types
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from .c3d_parameters import Parameters
 from .captured import LENGTHS, Plate
-
-if TYPE_CHECKING:
-    from .c3d import Parameters
 
 Array = NDArray[np.float64]
 
