@@ -11,12 +11,12 @@ import bpy
 
 from ..core.after.felt_weather import FeltWeather
 from ..core.after.weather import span_of
+from ..core.composers.relief_plan import IMAGE
 from ..core.errors import InputError
 from ..core.ground import presets
 from ..core.ground.material import MATERIAL_RANGES, GroundMaterial
 from ..core.ground.presets import Preset
 from ..core.motion.motion import shortest_length
-from ..core.relief_plan import IMAGE
 from ..core.response.foot_holds import FootHold
 from ..core.response.performance import Performance
 from ..core.response.response import GroundingOptions, TiltOptions

@@ -12,8 +12,8 @@ import pytest
 
 from softground_addon.blender.ground import created_ground
 from softground_addon.blender.live import live
+from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.ground.heightfield import FlatTerrain
-from softground_addon.core.ground_plan import GroundPlan
 from tests.blender.shots import walker
 
 pytestmark = pytest.mark.benchmark

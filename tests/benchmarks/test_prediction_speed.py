@@ -5,9 +5,9 @@ from time import thread_time
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.prediction import contact_loads, typical_depth
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.prediction import contact_loads, typical_depth
 from tests.core.walkers import walk
 
 LIMITS = {50: 15e-3, 1000: 15e-3}

@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
@@ -12,7 +13,6 @@ from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.numerics.key_reduction import kept_samples
 from softground_addon.core.response.grounding import responding
 from softground_addon.core.response.response import GroundingOptions, TiltOptions, at_scene_frames, gaps, respond
-from softground_addon.core.simulation import simulate
 from tests.core.response.test_grounding import walk
 
 SNOW = GroundMaterial(youngs_modulus=375e3, poisson_ratio=0.05, characteristic_time=0.2)

@@ -27,7 +27,7 @@ from softground_addon.blender.command_line import cli
 from softground_addon.blender.ground import baked_ground, ground_mesh
 from softground_addon.blender.interface import panels, response_panel
 from softground_addon.blender.response import response_job
-from softground_addon.core.edited_steps import EditedSteps
+from softground_addon.core.composers.edited_steps import EditedSteps
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground import presets
 from softground_addon.core.ground.heightfield import FlatTerrain

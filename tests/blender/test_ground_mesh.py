@@ -8,9 +8,9 @@ from mathutils import Euler
 from softground_addon.blender import compat
 from softground_addon.blender.ground import created_ground, display_key, ground_checks, ground_mesh, still_ground
 from softground_addon.blender.ground.display_key import DISPLAY_KEY
+from softground_addon.core.composers.ground_plan import GroundPlan
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
-from softground_addon.core.ground_plan import GroundPlan
 from softground_addon.core.record.pressed_ground import GroundSample
 from tests.blender import fingerprints, shots
 from tests.tiers import slow_but_one

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender.response import response_job
-from softground_addon.core import ground_plan
+from softground_addon.core.composers import ground_plan
 from softground_addon.core.loads import estimate
 from softground_addon.core.loads.contacts import detect_contacts
 from tests.blender import responders, shots

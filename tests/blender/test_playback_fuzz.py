@@ -5,11 +5,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.playback.ramps import TOLERANCE
 from softground_addon.core.record.footprints import recompose
-from softground_addon.core.simulation import simulate
 from tests.blender.test_playback import bake_onto, evaluated, recorded, world_positions
 from tests.core.walkers import walk
 

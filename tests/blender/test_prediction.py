@@ -8,8 +8,8 @@ from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.interface import prediction
 from softground_addon.blender.live import live
 from softground_addon.blender.reading import analysis
+from softground_addon.core.composers.prediction import ContactLoads
 from softground_addon.core.errors import InputError
-from softground_addon.core.prediction import ContactLoads
 from tests.blender.shots import walker
 from tests.tiers import slow_but_one
 

@@ -11,10 +11,10 @@ from scipy.spatial import KDTree
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.baking import bake_job
 from softground_addon.blender.reading import analysis
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record.typical_depth import typical_of
-from softground_addon.core.simulation import simulate
 from tests.blender import shots
 from tests.blender.responders import source_motion
 

@@ -7,8 +7,8 @@ import pytest
 from softground_addon.blender import settings, tread_images
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
+from softground_addon.core.composers.relief_plan import asked_of
 from softground_addon.core.errors import InputError
-from softground_addon.core.relief_plan import asked_of
 from tests.blender import shots
 from tests.blender.grounds import bake, heights
 

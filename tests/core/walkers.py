@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
@@ -14,7 +15,6 @@ from softground_addon.core.loads.estimate import CharacterLoads
 from softground_addon.core.loads.forces import ContactForces
 from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch, steps_per_frame
 from softground_addon.core.pressing.deformation import target_compression
-from softground_addon.core.simulation import simulate
 
 MASS = 77.5
 GRAVITY = 9.81

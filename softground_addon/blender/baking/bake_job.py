@@ -18,10 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.events import as_edited, events
-from ...core.edited_steps import with_edits
+from ...core.composers.edited_steps import with_edits
+from ...core.composers.ground_plan import GroundPlan
+from ...core.composers.relief_plan import with_shoe_treads
+from ...core.composers.self_check import self_check
+from ...core.composers.simulation import simulate
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.ground_plan import GroundPlan
 from ...core.loads.cell_limits import check_cell_size
 from ...core.loads.estimate import CharacterLoads
 from ...core.meshing.refinement import refine
@@ -30,10 +33,7 @@ from ...core.record import record
 from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
-from ...core.relief_plan import with_shoe_treads
-from ...core.self_check import self_check
 from ...core.settings import Acts, BakeSettings
-from ...core.simulation import simulate
 from .. import settings
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail, weather
 from ..ground.baked_ground import EVENTS

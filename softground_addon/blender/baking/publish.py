@@ -11,13 +11,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.relief_plan import BARS, relief_at, shod_of
 from ...core.playback.playback_curves import playback_curves_at
 from ...core.record import record
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import sample_at
 from ...core.record.sole_marks import sole_marks
 from ...core.relief.steps import StepRelief, all_together, water_at
-from ...core.relief_plan import BARS, relief_at, shod_of
 from ...core.settings import BakeSettings
 from .. import settings
 from ..ground import baked_ground, display_key, ground_mesh, playback

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.felt_weather import felt_in
-from ...core.edited_steps import EditedSteps
+from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
 from ...core.record import record

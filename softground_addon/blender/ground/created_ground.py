@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.ground_plan import GroundPlan
 from ...core.ground.heightfield import Terrain
 from ...core.ground.material import GroundMaterial
-from ...core.ground_plan import GroundPlan
 from ...core.meshing.graded_grid import Blocks, GradedGrid, graded_grid
 from ...core.settings import BakeSettings
 from ..settings import find, name_of

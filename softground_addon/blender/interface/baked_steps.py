@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.edited_contacts import swapped
+from ...core.composers.edited_contacts import swapped
 from ...core.errors import InputError
 from ...core.numerics.rigid import rotation
 from ...core.record import record

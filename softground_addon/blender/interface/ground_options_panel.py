@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
+from ...core.composers.relief_plan import IMAGE
 from ...core.loads.cell_limits import BYTES_PER_CELL
-from ...core.relief_plan import IMAGE
 from ...core.settings import spacing_of
 from .. import settings
 from ..after import debris_object

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...core.composers.prediction import matching_modulus
 from ...core.errors import InputError
-from ...core.prediction import matching_modulus
 from .. import jobs, session, settings
 from ..live import live
 from ..reading import analysis

@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.playhead import Playhead
 from ...core.ground.display_blur import blurred_window, gaussian_kernel
 from ...core.ground.heightfield import TILE, HeightField, Window
 from ...core.numerics import bilinear
-from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.footprints import NEVER
 from ...core.record.pressed_ground import GroundSample

@@ -16,16 +16,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.ground_plan import plan_ground
+from ...core.composers.playhead import Playhead
+from ...core.composers.relief_plan import with_shoe_treads
 from ...core.errors import InputError
 from ...core.ground.heightfield import Window
-from ...core.ground_plan import plan_ground
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
 from ...core.numerics.cell_keys import cells_at, keys_at
-from ...core.playhead import Playhead
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
-from ...core.relief_plan import with_shoe_treads
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..baking import bake_report, debris_job

@@ -13,11 +13,11 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...core.composers.relief_plan import relief_at
 from ...core.errors import InputError
 from ...core.files import point_cache
 from ...core.files.files import check_not_full, check_room, replacing
 from ...core.playback.vertex_histories import vertex_histories
-from ...core.relief_plan import relief_at
 from ..after import debris_object
 from ..ground import baked_ground, display_key, ground_mesh, own_data, playback, weather_modifier
 from . import debris_points

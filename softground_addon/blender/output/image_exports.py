@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.fallout import Fallout
+from ...core.composers.relief_plan import relief_at
 from ...core.errors import InputError
 from ...core.files.files import replacing
 from ...core.meshing.uv_raster import Pixels, rasterise
@@ -19,7 +20,6 @@ from ...core.numerics.triangles import barycentric
 from ...core.playback.vertex_histories import VertexHistories, vertex_histories
 from ...core.record.footprints import NEVER, Footprint, extent
 from ...core.relief.steps import water_at
-from ...core.relief_plan import relief_at
 from .. import settings
 from ..after import debris_object
 from ..ground import baked_ground, ground_mesh, refined_mesh, weathered_points

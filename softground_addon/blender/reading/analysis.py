@@ -16,16 +16,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.prediction import (
+    FEW,
+    TAKES_NO_PRINT,
+    ContactLoads,
+    contact_loads,
+    matching_modulus,
+    typical_depth,
+)
+from ...core.composers.simulation import simulate
 from ...core.errors import InputError
 from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import check_cell_size, pressed_area
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_velocity
-from ...core.prediction import FEW, TAKES_NO_PRINT, ContactLoads, contact_loads, matching_modulus, typical_depth
 from ...core.record.typical_depth import typical_of
 from ...core.settings import Acts, BakeSettings
-from ...core.simulation import simulate
 from .. import jobs, settings
 from ..ground import ground_mesh
 from . import staleness

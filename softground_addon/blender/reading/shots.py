@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.felt_weather import weathering_of
+from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
+from ...core.composers.relief_plan import IMAGE
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
-from ...core.ground_plan import GroundPlan, extent, plan_ground
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
-from ...core.relief_plan import IMAGE
 from ...core.settings import BakeSettings
 from .. import settings, tread_images
 from ..characters.control_poses import PoseRecorder

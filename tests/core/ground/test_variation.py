@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain, Window
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.ground.terrain import MeshTerrain
 from softground_addon.core.ground.variation import SOFTEST, PaintedSurface, VariationTiles
 from softground_addon.core.record.footprints import QUANTUM, recompose
-from softground_addon.core.simulation import simulate
 from tests.core.pressing.test_ground_invariants import random_loads
 from tests.core.walkers import box_sole, equilibrium_depth, standing, walk
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softground_addon.core.pressing.deformation as deformation_module
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record.footprints import QUANTUM, recompose
-from softground_addon.core.simulation import simulate
 from tests.core.walkers import box_sole, foot_sole, loads_of, pose, walk
 
 PAPER = {

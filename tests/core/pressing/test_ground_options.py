@@ -7,13 +7,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.pressing.deformation import compress, compression_rate, target_compression
 from softground_addon.core.pressing.rim import LEANING_DISTANCE, in_contact, lean_of_landing, leaning, rim_weights
 from softground_addon.core.record.footprints import QUANTUM, recompose
-from softground_addon.core.simulation import simulate
 from tests.core.pressing.test_ground_invariants import Hills, random_loads
 from tests.core.pressing.test_pressure import rolling
 from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk

@@ -8,13 +8,13 @@ import scipy.optimize
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from softground_addon.core.composers.prediction import contact_loads, matching_modulus
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.numerics.intervals import runs
-from softground_addon.core.prediction import contact_loads, matching_modulus
 from softground_addon.core.pressing.pressure import KERN, pressure_field
-from softground_addon.core.simulation import simulate
 from tests.core.walkers import box_sole, equilibrium_depth, foot_sole, standing, walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)

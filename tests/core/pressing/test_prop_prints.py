@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
+from softground_addon.core.composers.prediction import contact_loads
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
 from softground_addon.core.motion.motion import CharacterMotion, SoleMotion
 from softground_addon.core.numerics.rigid import rotation
-from softground_addon.core.prediction import contact_loads
 from softground_addon.core.pressing.indentation import Springs, stress
 from tests.core.character import Slope
 from tests.core.prop_bodies import box, prop_sole, sphere, wheel
@@ -209,7 +209,7 @@ def test_a_long_track_is_cut_into_prints_that_join_without_a_seam(hardening, mon
     material = replace(GROUND, hardening=hardening)
     loads = rolling(24, speed=2.0)
     ground, prints = pressed(loads, material)
-    monkeypatch.setattr("softground_addon.core.simulation.LONGEST_TRACK", 1.0)
+    monkeypatch.setattr("softground_addon.core.composers.simulation.LONGEST_TRACK", 1.0)
     cut, pieces = pressed(loads, material)
     assert len(prints) == 1
     assert len(pieces) > 3

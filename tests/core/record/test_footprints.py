@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain, Window
 from softground_addon.core.ground.material import GroundMaterial
@@ -20,7 +21,6 @@ from softground_addon.core.record.footprints import (
     recompose,
 )
 from softground_addon.core.record.pressed_ground import PressedGround, sample_at
-from softground_addon.core.simulation import simulate
 from tests.core.walkers import box_sole, loads_of, pose, pressed, walk
 
 MUD = GroundMaterial(0.3e6, 0.35, 0.15)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
@@ -10,7 +11,6 @@ from softground_addon.core.loads.estimate import estimate_loads
 from softground_addon.core.record import ground_history
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.ground_history import GroundHistory
-from softground_addon.core.simulation import simulate
 from tests.core.response.test_grounding import walk
 
 SAND = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.4, characteristic_time=0.1)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.relief_plan import asked_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.relief import tread_map
 from softground_addon.core.relief.amounts import Amounts, Tread
 from softground_addon.core.relief.print_relief import relief_of_print
 from softground_addon.core.relief.print_shape import shape_of
 from softground_addon.core.relief.tread import LENGTH, PATTERNS, SoleTread, Under, bare, of_map
-from softground_addon.core.relief_plan import asked_of
 from tests.core.relief.test_steps import MATERIALS, steps_on
 
 HEIGHT = 3.0

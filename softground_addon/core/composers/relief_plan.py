@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .ground.presets import SURFACES
-from .motion.motion import CharacterMotion
-from .numerics.slices import Slices, sliced
-from .record.footprints import Footprint
-from .relief import amounts, tread_map
-from .relief.steps import ReliefSettings, StepRelief, relief_of_steps
-from .relief.tread import PATTERNS, SoleTread, of_map
-from .settings import BakeSettings
+from ..errors import InputError
+from ..ground.presets import SURFACES
+from ..motion.motion import CharacterMotion
+from ..numerics.slices import Slices, sliced
+from ..record.footprints import Footprint
+from ..relief import amounts, tread_map
+from ..relief.steps import ReliefSettings, StepRelief, relief_of_steps
+from ..relief.tread import PATTERNS, SoleTread, of_map
+from ..settings import BakeSettings
 
 Array = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.prediction import FEW, TYPICAL, contact_loads
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
-from softground_addon.core.prediction import FEW, TYPICAL, contact_loads
 from softground_addon.core.record.typical_depth import main_contacts, typical_of
-from softground_addon.core.simulation import simulate
 from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
 from tests.core.prop_bodies import prop_sole, sphere

@@ -11,7 +11,8 @@ from softground_addon.core.after.felt_weather import FeltWeather, PrintsInWeathe
 from softground_addon.core.after.weather import PARTS, Span
 from softground_addon.core.after.weather_course import course_of
 from softground_addon.core.after.weather_places import section_of, weather_places
-from softground_addon.core.edited_steps import EditedSteps, with_edits
+from softground_addon.core.composers.edited_steps import EditedSteps, with_edits
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.display_blur import blurred_window
 from softground_addon.core.ground.heightfield import FlatTerrain, HeightField, SparseGrid, Window
 from softground_addon.core.ground.material import GroundMaterial
@@ -21,7 +22,6 @@ from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
-from softground_addon.core.simulation import simulate
 from tests.core.after.weathered_ground import weathered
 from tests.core.walkers import box_sole, loads_of, pose, walk
 

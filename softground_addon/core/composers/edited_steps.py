@@ -13,23 +13,23 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
+from ..ground.heightfield import HeightField, Window
+from ..ground.soft_ground import SoftGround
+from ..numerics.cell_keys import ROW, Keys, among
+from ..pressing.contact_layout import ContactLayout
+from ..pressing.ground_cells import Imprints, Timing, UndisturbedCells
+from ..pressing.open_contact import OpenContact
+from ..pressing.prop_layout import PropLayout
+from ..pressing.sole_layout import SoleLayout
+from ..pressing.sole_points import SolePoints, sole_points
+from ..pressing.solver import GroundSolver
+from ..record.contact_steps import PressingSole, Steps
+from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
+from ..record.footprints import QUANTUM, Footprint
+from ..record.mesh_sole import MeshSole
+from ..record.record import BakeRecord
 from .edited_contacts import edited_contact
-from .errors import InputError
-from .ground.heightfield import HeightField, Window
-from .ground.soft_ground import SoftGround
-from .numerics.cell_keys import ROW, Keys, among
-from .pressing.contact_layout import ContactLayout
-from .pressing.ground_cells import Imprints, Timing, UndisturbedCells
-from .pressing.open_contact import OpenContact
-from .pressing.prop_layout import PropLayout
-from .pressing.sole_layout import SoleLayout
-from .pressing.sole_points import SolePoints, sole_points
-from .pressing.solver import GroundSolver
-from .record.contact_steps import PressingSole, Steps
-from .record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
-from .record.footprints import QUANTUM, Footprint
-from .record.mesh_sole import MeshSole
-from .record.record import BakeRecord
 
 Array = NDArray[np.float64]
 Change = tuple[int, StepEdit]

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.self_check import WALK_RATIO, self_check
 from softground_addon.core.findings import Finding, worst_first
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.motion.motion import LowSkin
-from softground_addon.core.self_check import WALK_RATIO, self_check
 from tests.core.character import Slope
 from tests.core.walkers import GRAVITY, MASS, box_sole, pose, pressed, standing, walk
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .ground.heightfield import HeightField, SparseGrid, Window
-from .ground.soft_ground import SoftGround
-from .loads.estimate import CharacterLoads
-from .numerics.intervals import runs
-from .pressing.ground_cells import UndisturbedCells
-from .record.footprints import Footprint
+from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.soft_ground import SoftGround
+from ..loads.estimate import CharacterLoads
+from ..numerics.intervals import runs
+from ..pressing.ground_cells import UndisturbedCells
+from ..record.footprints import Footprint
 from .simulation import FrameResult, Simulation
 
 Array = NDArray[np.float64]

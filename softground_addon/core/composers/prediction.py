@@ -13,18 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .ground.heightfield import Terrain
-from .ground.material import GroundMaterial, Pressure
-from .ground.variation import Variation
-from .loads.estimate import CharacterLoads
-from .numerics.slices import Slices, sliced
-from .predicting.resting_props import depth_under, prop_poses
-from .predicting.sinking_soles import ContactTable, SinkingSoles
-from .predicting.sole_contacts import NEVER_LANDS, SoleContact, sole_contacts, square_sizes
-from .pressing.ground_cells import UndisturbedCells
-from .pressing.prop_imprint import GroundUnder
-from .record.typical_depth import main_contacts, median_depth
+from ..errors import InputError
+from ..ground.heightfield import Terrain
+from ..ground.material import GroundMaterial, Pressure
+from ..ground.variation import Variation
+from ..loads.estimate import CharacterLoads
+from ..numerics.slices import Slices, sliced
+from ..pressing.ground_cells import UndisturbedCells
+from ..pressing.prop_imprint import GroundUnder
+from ..record.typical_depth import main_contacts, median_depth
+from .resting_props import depth_under, prop_poses
+from .sinking_soles import ContactTable, SinkingSoles
+from .sole_contacts import NEVER_LANDS, SoleContact, sole_contacts, square_sizes
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.ground_plan import _slope, plan_ground
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
-from softground_addon.core.ground_plan import _slope, plan_ground
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.estimate import estimate_loads
 from tests.core.character import character, flat_sole

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
-from .loads.contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
-from .loads.missed_steps import advice, missed_steps
-from .motion.motion import CharacterMotion, SoleMotion, shortest_length
-from .motion.props import posed
-from .numerics.cell_keys import Keys, cells_at, cells_of, keys_of
-from .numerics.slices import Slices, sliced
+from ..ground.heightfield import FlatTerrain, SlopingTerrain, Terrain
+from ..loads.contacts import REST_SPEED, TOUCH_HEIGHT, detect_contacts
+from ..loads.missed_steps import advice, missed_steps
+from ..motion.motion import CharacterMotion, SoleMotion, shortest_length
+from ..motion.props import posed
+from ..numerics.cell_keys import Keys, cells_at, cells_of, keys_of
+from ..numerics.slices import Slices, sliced
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

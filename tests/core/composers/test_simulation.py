@@ -7,6 +7,7 @@ from math import inf
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.simulation import Simulation, simulate
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain, Window
 from softground_addon.core.ground.material import GroundMaterial
@@ -14,7 +15,6 @@ from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.pressing.sole_points import TOLERANCE
 from softground_addon.core.record.footprints import recompose
-from softground_addon.core.simulation import Simulation, simulate
 from tests.core.character import Slope
 from tests.core.walkers import (
     GRAVITY,

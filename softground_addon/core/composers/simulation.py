@@ -9,21 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .ground.heightfield import HeightField, Window
-from .ground.soft_ground import SoftGround
-from .loads.estimate import CharacterLoads
-from .motion.motion import Sole, SoleMotion
-from .numerics.intervals import runs
-from .pressing.contact_layout import ContactLayout
-from .pressing.ground_cells import Timing, UndisturbedCells
-from .pressing.open_contact import OpenContact
-from .pressing.prop_layout import PropLayout
-from .pressing.sole_layout import SoleLayout
-from .pressing.sole_points import SolePoints, flat_pose, sole_points
-from .pressing.solver import GroundSolver
-from .record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
-from .record.footprints import Footprint
+from ..errors import InputError
+from ..ground.heightfield import HeightField, Window
+from ..ground.soft_ground import SoftGround
+from ..loads.estimate import CharacterLoads
+from ..motion.motion import Sole, SoleMotion
+from ..numerics.intervals import runs
+from ..pressing.contact_layout import ContactLayout
+from ..pressing.ground_cells import Timing, UndisturbedCells
+from ..pressing.open_contact import OpenContact
+from ..pressing.prop_layout import PropLayout
+from ..pressing.sole_layout import SoleLayout
+from ..pressing.sole_points import SolePoints, flat_pose, sole_points
+from ..pressing.solver import GroundSolver
+from ..record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole, kept_steps
+from ..record.footprints import Footprint
 
 Array = NDArray[np.float64]
 

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .findings import Finding
-from .ground.heightfield import Terrain
-from .loads.estimate import CharacterLoads
-from .loads.missed_steps import advice, missed_steps
-from .loads.sliding import treadmill_speed
-from .motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin, shortest_length
-from .numerics.slices import Slices, sliced
-from .pressing.sole_points import places, sole_points
-from .record.footprints import Footprint
-from .skin.skin_motion import CALM_SPEED
+from ..findings import Finding
+from ..ground.heightfield import Terrain
+from ..loads.estimate import CharacterLoads
+from ..loads.missed_steps import advice, missed_steps
+from ..loads.sliding import treadmill_speed
+from ..motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin, shortest_length
+from ..numerics.slices import Slices, sliced
+from ..pressing.sole_points import places, sole_points
+from ..record.footprints import Footprint
+from ..skin.skin_motion import CALM_SPEED
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.playhead import Playhead
+from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
-from softground_addon.core.playhead import Playhead
 from softground_addon.core.record.footprints import recompose
-from softground_addon.core.simulation import simulate
 from tests.core.walkers import walk
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)

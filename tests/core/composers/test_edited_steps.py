@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softground_addon.core.edited_steps import EditedSteps, with_edits
+from softground_addon.core.composers.edited_steps import EditedSteps, with_edits
 from softground_addon.core.errors import InputError
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial

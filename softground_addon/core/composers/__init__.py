@@ -1,0 +1,1 @@
+"""What knows several stages: simulation, playhead, predictions, edited steps, plans and checks."""
