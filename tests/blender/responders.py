@@ -107,6 +107,27 @@ def moved_by_its_object(armature):
     return armature
 
 
+def with_feet_on_a_root(armature, frames=72):
+    """The same walk as game rigs have it whose IK was baked: feet hang on a root bone, and are keyed to their legs."""
+    feet, scene = ("foot.L", "foot.R"), bpy.context.scene
+    poses = np.linalg.inv(armature.matrix_world) @ world_matrices(scene, armature, feet, range(1, frames + 1))
+    bpy.ops.object.mode_set(mode="EDIT")
+    edit = armature.data.edit_bones
+    root = edit.new("root")
+    root.tail = (0.0, 0.2, 0.0)
+    for bone in ("hips", *feet):
+        edit[bone].use_connect = False
+        edit[bone].parent = root
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for frame, matrices in enumerate(poses, start=1):
+        for foot, matrix in zip(feet, matrices, strict=True):
+            bone = armature.pose.bones[foot]
+            bone.matrix_basis = bone.bone.matrix_local.inverted() @ bone.matrix_basis.__class__(matrix)
+            for path in ("location", "rotation_quaternion"):
+                bone.keyframe_insert(path, frame=frame)
+    return armature
+
+
 def key_steps(armature, body, feet, frames=72, stride=0.5, period=24, lift=0.10):
     """A plain walk along -Y on the controls of a rig, one key per frame: feet that lift, swing and stand."""
     half = period // 2

@@ -39,13 +39,13 @@ MAKE = {
     "mixamo": lambda scene: responders.as_mixamo(shots.walker(scene)),
     "scale of 0.01": lambda scene: responders.in_centimetres(shots.walker(scene)),
     "animated object": lambda scene: responders.moved_by_its_object(shots.walker(scene)),
+    "feet on a root": lambda scene: responders.with_feet_on_a_root(shots.walker(scene)),
     "ik": lambda scene: responders.with_ik(),
     "auto-rig pro": lambda scene: auto_rig_pro.walking(),
 }
 
-QUICK_AND_SLOW = [
-    rig if rig in ("walker", "ik") else pytest.param(rig, marks=pytest.mark.slow) for rig in (*MAKE, "rigify")
-]
+QUICK = ("walker", "feet on a root", "ik")
+QUICK_AND_SLOW = [rig if rig in QUICK else pytest.param(rig, marks=pytest.mark.slow) for rig in (*MAKE, "rigify")]
 
 
 @pytest.fixture

@@ -115,7 +115,10 @@ def _body_control(rig: _Rig, mapping: RigMapping) -> str:
 
 
 def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tuple[str, str, bool]]:
-    """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown."""
+    """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown.
+
+    In game rigs, whose IK was baked, feet often hang on the root: such a bone does not go where the shank takes it.
+    """
     thigh, shin, foot = names
     trunk = set(rig.behind(body))
     solver = next(
@@ -137,7 +140,11 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
     bones = [rig.origin(bone) for bone in (thigh, shin, foot)]
     if len(set(bones)) < 3 or not all(rig.is_free(bone) for bone in bones):
         return []
-    return [(bone, f"{part}_{side}", False) for bone, part in zip(bones, ("thigh", "shank", "foot"), strict=True)]
+    above = (body, *bones)
+    return [
+        (bone, f"{part}_{side}", above[i] not in rig.behind(bone))
+        for i, (bone, part) in enumerate(zip(bones, ("thigh", "shank", "foot"), strict=True))
+    ]
 
 
 def _arm_control(rig: _Rig, mapping: RigMapping, side: str) -> str:
