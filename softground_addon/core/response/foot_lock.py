@@ -21,6 +21,9 @@ Mask = NDArray[np.bool_]
 
 PLANTED = 0.01
 """Points of a sole bear that are this near to its lowest, in sole lengths (3 mm of an adult's shoe)."""
+YIELD = 0.0025
+"""A point bears 1/e as much so far above the lowest, in sole lengths (0.7 mm of an adult's shoe): with more, what bears
+creeps along while the foot rolls over its toes."""
 MOST = 0.5
 """A rigid piece of the sole bears that has this part as many points near the floor as the one with most of them."""
 AXLE = 0.01
@@ -86,11 +89,11 @@ class Underside:
     def bearing(self) -> Array:
         """How much each point bears (F, Q), 1 in all of a frame.
 
-        Those near the lowest do, of the piece with most of them: where the toes lie flat, the ball of the foot that
+        Those at the lowest do, of the piece with most of them: where the toes lie flat, the ball of the foot that
         bends up from them rolls off the floor.
         """
         above = self.heights - self.lowest()[:, None]
-        bears = np.exp(-above / (PLANTED * max(self.length, 1e-9))) * self._of_bearing_piece(above)
+        bears = np.exp(-above / (YIELD * max(self.length, 1e-9))) * self._of_bearing_piece(above)
         return np.asarray(bears / bears.sum(axis=1, keepdims=True))
 
     def planted(self) -> Mask:

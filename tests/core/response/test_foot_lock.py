@@ -80,3 +80,16 @@ def test_between_contacts_the_correction_passes_smoothly_from_one_to_the_next():
 def test_without_a_contact_nothing_moves():
     rim = sole((level(PART), np.zeros((FRAMES, 3))))
     np.testing.assert_array_equal(lock(rim, ~TOUCHING), np.broadcast_to(np.eye(4), (FRAMES, 4, 4)))
+
+
+@pytest.mark.parametrize("frames", [4, 8, 16])
+def test_a_sole_that_rolls_over_a_rounded_toe_does_not_creep(frames):
+    radius, touching = 0.08, np.ones(frames, bool)
+    turn, angle = pitched(np.radians(60.0) * np.linspace(0.0, 1.0, frames) ** 2), np.linspace(0.0, 0.5 * np.pi, 40)
+    toe = np.stack([radius * np.sin(angle), 0 * angle, radius * (1.0 - np.cos(angle))], axis=-1)
+    flat = np.stack([np.linspace(radius - LENGTH, 0.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
+    rest = np.concatenate([part + np.array((0.0, y, 0.0)) for part in (flat, toe) for y in (-0.04, 0.04)])
+    points = rest @ np.swapaxes(turn, -1, -2)
+    heights = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
+    rolling = Underside(points, heights, np.zeros(len(rest), int), LENGTH)
+    assert slides(locked(rolling, touching), touching).max() < 3e-4
