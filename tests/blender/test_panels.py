@@ -141,6 +141,9 @@ def test_the_cells_to_expect_are_those_that_a_bake_prints(shot):
     assert known.area / shot.softground.cell_size**2 == pytest.approx(printed, rel=0.3)
     assert ground_options_panel.estimate(0.4, 0.01) == "About 4,000 cells printed, 4 MB"
     assert ground_options_panel.estimate(0.123, 0.002) == "About 31,000 cells printed, 31 MB"
+    assert ground_options_panel.vertices(0.4, 0.0025, 2_000_000) == "About 190,000 vertices along the whole trail"
+    over = "About 190,000 vertices along the whole trail, over Max Vertices"
+    assert ground_options_panel.vertices(0.4, 0.0025, 100_000) == over
 
 
 def test_the_depth_to_expect_follows_the_sliders(shot):

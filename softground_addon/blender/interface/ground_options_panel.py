@@ -54,7 +54,8 @@ class SOFTGROUND_PT_material(_Closed, bpy.types.Panel):
                 row = layout.row()
                 row.active = False
                 spacing = spacing_of(settings.typed(options.cell_size), options.relief)
-                row.label(text=vertices(predicted.analysis.area, spacing), icon="INFO", translate=False)
+                text = vertices(predicted.analysis.area, spacing, options.relief_vertices)
+                row.label(text=text, icon="INFO", translate=False)
         layout.prop(options, "debris")
         if options.debris and options.ground is not None:
             _wind(layout, options.ground)
@@ -123,9 +124,11 @@ AROUND_SOLES = 3.0
 """Area that is fine around soles over the area that they cover, about."""
 
 
-def vertices(area: float, spacing: float) -> str:
-    """Vertices of a close-up along all of a trail, from the area that soles cover [m²]."""
-    return f"About {rounded(AROUND_SOLES * area / spacing**2):,.0f} vertices along the whole trail"
+def vertices(area: float, spacing: float, most: int) -> str:
+    """Vertices of a close-up along all of a trail, from the area that soles cover [m²], and if there may be fewer."""
+    wanted = AROUND_SOLES * area / spacing**2
+    text = f"About {rounded(wanted):,.0f} vertices along the whole trail"
+    return text if wanted <= most else f"{text}, over Max Vertices"
 
 
 def estimate(area: float, cell_size: float) -> str:
