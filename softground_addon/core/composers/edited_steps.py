@@ -37,8 +37,9 @@ Change = tuple[int, StepEdit]
 
 VISIBLE = 5e-5
 """Change of a print that makes those meet it that come later be pressed again [m]: a quarter of what playback keeps."""
-MOST_CELLS = 2**26
-"""Most cells that one step is pressed in: 40 m along each side, where they suit a foot."""
+MOST_CELLS, MOST_PRINTS = 2**22, 64
+"""A step is pressed in at most so many cells (10 m along each side, where they suit a foot), or so many times those of
+its print, at the scale of that: what is stored of one with more is damaged."""
 _DAMAGE = (ArithmeticError, IndexError, MemoryError, ValueError, np.linalg.LinAlgError)
 """What pressing steps may raise that a stranger's file says: soles of no area, poses that are none."""
 _SAME_TIME = 1e-3
@@ -315,7 +316,8 @@ class EditedSteps:
             layout = PropLayout(footprint.character, sole, steps, strength=strength)
         else:
             layout = SoleLayout(footprint.character, sole, steps, self._points_of(pressing), strength=strength)
-        if layout.window(self._solver.cells).cells > MOST_CELLS:
+        most = max(MOST_CELLS, MOST_PRINTS * footprint.window.cells) * max(1.0, edit.scale**2)
+        if layout.window(self._solver.cells).cells > most:
             raise InputError(
                 f"The stored print of '{footprint.character}', {footprint.sole}, at frame "
                 f"{footprint.start_frame:.0f} is larger than it can be: clear the bake and bake again."

@@ -16,6 +16,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.record import record
+from softground_addon.core.record.contact_steps import LENGTH
 from softground_addon.core.record.edits import StepEdit, from_json, step_id, to_json, without_sole
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.mesh_sole import MeshSole
@@ -339,6 +340,20 @@ def test_a_print_of_which_too_little_is_kept_can_only_be_muted():
     assert edited(old, {1: StepEdit(mute=True)}).pressed_again == {1: None}
     with pytest.raises(InputError, match=r"foot.R, at frame 21 .*can only be muted: bake again"):
         edited(old, {1: StepEdit(strength=0.5)})
+
+
+@pytest.mark.parametrize("row", [3, -3])
+def test_a_forged_print_whose_sole_is_thrown_far_away_is_refused_in_no_time(row):
+    """Steps are kept as second differences: a single forged number moves all that come later, some metres in each."""
+    _, left = baked()
+    kept = left.footprints[1].pressed_by
+    coded = kept.coded.reshape(-1, kept.width).copy()
+    coded[row, :2] += round(30.0 / LENGTH / (len(coded) - row % len(coded)))
+    forged = replace(left.footprints[1], pressed_by=replace(kept, coded=coded.reshape(-1)))
+    started = time.process_time()
+    with pytest.raises(InputError, match=r"foot.R, at frame 21 is larger than it can be: clear"):
+        edited(replace(left, footprints=[left.footprints[0], forged]), {1: StepEdit(move_m=(0.1, 0.0))})
+    assert time.process_time() - started < 2.0  # 20 s is a hang
 
 
 @pytest.mark.alone
