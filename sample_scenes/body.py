@@ -57,7 +57,7 @@ BONES: Bones = (
 
 @dataclass(frozen=True)
 class Foot:
-    """A shod foot in its side's frame: x forward from the point below the ankle, z up from the ground.
+    """A foot, shod or bare, in its side's frame: x forward from the point below the ankle, z up from the ground.
 
     Attributes
     ----------
@@ -65,10 +65,13 @@ class Foot:
         From the back of the heel to the tip of the toes [m].
     width : float
         Widest place, at the ball [m].
+    bare : bool
+        Without a shoe.
     """
 
     length: float = 0.28
     width: float = 0.098
+    bare: bool = False
 
     @property
     def back(self) -> float:

@@ -1,4 +1,4 @@
-"""The shape of a hiker: cap, head, hands, jacket, trousers and shoes over a `Body`, with bone weights."""
+"""The shape of a hiker: cap, head, hands, jacket, trousers, shoes or bare feet over a `Body`, with bone weights."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sample_scenes.body import BONES, SIDES, Array, Body
+from sample_scenes.body import BONES, SIDES, Array, Body, Foot
 from sample_scenes.motion import Skeleton
 from sample_scenes.shoe import shoe_mesh
 from sample_scenes.solids import Solid, cut, ellipsoid, mesh_of, round_cone, union
@@ -49,14 +49,14 @@ Piece = tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]
 
 @cache
 def hiker(body: Body, coarseness: float = 1.0) -> Figure:
-    """A dressed figure of the given proportions; its vertices are so many times further apart, but for the shoes'."""
+    """A dressed figure of the given proportions; its vertices are so many times further apart, but for the feet's."""
     garments = [_head(body), _cap(body), _jacket(body), _trousers(body), *(_hand(body, side) for side in SIDES)]
     size = coarseness * body.stature / 1.78
     pieces = [
         surface(body, part, solid, low, high, spacing * size, bones)
         for part, solid, low, high, spacing, bones in garments
     ]
-    return joined([*pieces, *(_shoe(body, side) for side in SIDES)])
+    return joined([*pieces, *(_foot(body, side) for side in SIDES)])
 
 
 def joined(pieces: Sequence[Piece]) -> Figure:
@@ -265,13 +265,58 @@ def _hand(body: Body, side: str) -> tuple:
     )
 
 
-def _shoe(body: Body, side: str) -> Piece:
-    vertices, quads, sole = shoe_mesh(body.foot)
+def _foot(body: Body, side: str) -> Piece:
+    if body.foot.bare:
+        vertices, quads = _bare_foot(body.foot)
+        parts = np.full(len(quads), PARTS.index("skin"))
+    else:
+        vertices, quads, sole = shoe_mesh(body.foot)
+        parts = np.where(sole == 1, PARTS.index("sole"), PARTS.index("shoe"))
     names = list(BONES)
     bend = np.clip((vertices[:, 0] - body.foot.ball) / (0.06 * body.foot.length) + 0.5, 0.0, 1.0)
     weights = np.zeros((len(vertices), len(names)))
     weights[:, names.index(f"foot.{side}")], weights[:, names.index(f"toe.{side}")] = 1 - bend, bend
-    if SIDES[side] > 0:  # the shoe is built for the side whose inner edge is at +y: the right
+    if SIDES[side] > 0:  # a foot is built for the side whose inner edge is at +y: the right
         vertices, quads = vertices * (1, -1, 1), quads[:, ::-1]
     vertices = vertices + np.array((0, body.joints[f"ankle.{side}"][1], 0))
-    return vertices, quads, np.where(sole == 1, PARTS.index("sole"), PARTS.index("shoe")), weights
+    return vertices, quads, parts, weights
+
+
+_TOES = ((0.27, 0.80, 0.935, 0.047), (0.06, 0.80, 0.950, 0.031), (-0.12, 0.77, 0.915, 0.029))
+_TOES += ((-0.28, 0.74, 0.865, 0.028), (-0.42, 0.70, 0.810, 0.027))
+"""Across in widths of the foot; root, tip and radius in its lengths, from the heel."""
+
+
+def _bare_foot(foot: Foot) -> tuple[Array, NDArray[np.intp]]:
+    """Vertices and quads of a bare foot whose inner side faces +y, on heel, outer edge, ball and toes."""
+    length, width = foot.length, foot.width
+
+    def at(along: float, across: float, up: float) -> Array:
+        return np.array((foot.back + along * length, across * width, up * length))
+
+    def pad(along: float, across: float, long: float, wide: float, high: float) -> Solid:
+        return ellipsoid(at(along, across, 0.9 * high), (long * length, wide * width, high * length))
+
+    sole = [
+        pad(0.125, 0.0, 0.125, 0.33, 0.10),
+        round_cone(at(0.15, -0.12, 0.055), at(0.62, -0.27, 0.050), 0.062 * length, 0.056 * length),
+        pad(0.69, 0.17, 0.115, 0.30, 0.060),
+        pad(0.64, -0.25, 0.105, 0.26, 0.052),
+        round_cone(at(0.20, 0.0, 0.17), at(0.66, 0.10, 0.105), 0.11 * length, 0.070 * length),
+        round_cone(at(0.22, 0.0, 0.20), at(0.22, 0.0, 0.45), 0.13 * length, 0.13 * length),
+    ]
+    toes = [
+        union(
+            [
+                round_cone(
+                    at(root, 0.9 * across, 0.075), at(tip, across, 0.05), 0.85 * radius * length, 0.8 * radius * length
+                ),
+                pad(tip, across, 1.2 * radius, radius * length / width, radius),
+            ],
+            0.008,
+        )
+        for across, root, tip, radius in _TOES
+    ]
+    solid = cut(union([union(sole, 0.02), *toes], 0.006), (0, 0, 0), (0, 0, -1.0), 0.003)
+    low, high = at(-0.03, -0.65, -0.03), at(1.05, 0.65, 0.62)
+    return mesh_of(solid, low, high, 0.0028 * length / 0.26)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import atan, pi, radians
 
 import bpy
@@ -17,6 +18,7 @@ from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
+from softground_addon.blender.shader_graph import Graph
 
 NEAR, FAR = 9.0, 600.0
 """Half the width of the ground that is even, and of all of it [m]."""
@@ -79,13 +81,14 @@ def bake_walk(
     cell_size: float | None,
     options: Options | None,
     motion: BodyMotion | None = None,
+    body: Body | None = None,
 ) -> Bake:
     """A hiker who goes along the way toward -y, from y = `start` [m], in prints as fine as close-ups ask for.
 
     He walks, unless another `motion` of so many frames is given. The camera is there first: relief is fine where it
     comes near.
     """
-    body = Body()
+    body = body or Body()
     walker = create_character("Hiker", body, scene.collection)
     walker.location = (0.0, start, 0.0)
     write_action(walker, motion or walk(body, Gait(), frames, scene.render.fps), "Walk")
@@ -126,6 +129,72 @@ def add_camera(
     camera.data.dof.aperture_fstop = f_stop
     scene.camera = camera
     return camera
+
+
+_FILM = 0.9
+"""How far beyond the shore sand shines from the last wave [m]."""
+
+
+def add_sea(scene: bpy.types.Scene, shore: Callable[[Array], Array], level: float, ground: terrain.Field) -> None:
+    """Water from a shore x(y) toward -x and to the horizon, at a level [m]: a thin sheet with foam where it runs up."""
+    out = np.concatenate([np.arange(-_FILM, 8.0, 0.05), np.geomspace(8.0, FAR, 30)])
+    out, along = np.meshgrid(out, places(-30.0, 4.0))
+    x = shore(along) - out
+    swell = 0.06 * np.clip(out / 6.0 - 0.3, 0.0, 1.0) * np.sin(1.7 * x + 0.6 * np.sin(0.35 * along))
+    sheet = ground(x, along) + 0.0015 + 0.004 * np.clip(out / 0.15, 0.0, 1.0)
+    rows, columns = x.shape
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    mesh = bpy.data.meshes.new("Sea")
+    mesh.from_pydata(
+        np.stack([x, along, np.maximum(sheet, level + swell)], axis=-1).reshape(-1, 3).tolist(),
+        [],
+        (corner[:, None] + [0, columns, columns + 1, 1]).tolist(),
+    )
+    mesh.shade_smooth()
+    there = np.where(out < -1e-6, 0.0, 1.0)
+    fields = {
+        "film": np.clip(1.0 + out / _FILM, 0.0, 1.0),
+        "body": np.clip((out - 0.2) / 2.5, 0.0, 1.0),
+        "foam": there
+        * (
+            np.exp(-out / 0.12)
+            + 0.75 * np.exp(-(((out - 0.55) / 0.45) ** 2))
+            + 0.8 * np.exp(-(((out - 3.2) / 0.35) ** 2))
+        ),
+    }
+    for name, values in fields.items():
+        mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", values.astype(np.float32).ravel())
+    mesh.materials.append(_water())
+    scene.collection.objects.link(bpy.data.objects.new("Sea", mesh))
+
+
+def _water() -> bpy.types.Material:
+    """Ripples that mirror the sky, clear where they are thin, and a lace of foam."""
+    material = stage.plain_material("SoftGround Sample sea", (0.015, 0.06, 0.07), 0.08)
+    tree = material.node_tree
+    graph = Graph(tree)
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    film, body, foam = (graph.attribute(name) for name in ("film", "body", "foam"))
+    ragged = graph.noise(place, 0.25, 3.0) * 0.9
+    bubbles = graph.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": 16.0}, feature="DISTANCE_TO_EDGE")
+    lace = graph.ramp(foam + ragged + graph.out(bubbles) * -1.6, 0.62, 0.95)
+    ripples = graph.node(
+        "ShaderNodeBump", {"Height": graph.noise(place, 0.5, 3.0), "Distance": 0.05, "Strength": body * 0.6}
+    )
+    colour = graph.mix(lace, (0.02, 0.075, 0.085), (0.85, 0.84, 0.80))
+    sea = graph.node(
+        "ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": 0.08, "Normal": graph.out(ripples)}
+    )
+    mirror = graph.out(graph.node("ShaderNodeFresnel", {"IOR": 1.33}))
+    wet = graph.node("ShaderNodeBsdfGlossy", {"Roughness": 0.12, "Color": (1.0, 1.0, 1.0, 1.0)})
+    clear = graph.node("ShaderNodeBsdfTransparent")
+    thin = graph.node(
+        "ShaderNodeMixShader", {0: mirror * graph.ramp(film, 0.0, 1.0), 1: graph.out(clear), 2: graph.out(wet)}
+    )
+    cover = graph.math("MAXIMUM", graph.ramp(body, 0.0, 1.0), lace)
+    mixed = graph.node("ShaderNodeMixShader", {0: cover, 1: graph.out(thin), 2: graph.out(sea)})
+    tree.links.new(mixed.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    return material
 
 
 def add_conifers(

@@ -116,6 +116,24 @@ def test_soles_follow_foot_and_toe_bones_only(body):
     assert (toes[x > ball + 0.05 * body.foot.length] == 1).all()
 
 
+def test_a_bare_foot_stands_on_heel_ball_and_five_toes_but_not_on_its_arch():
+    foot = Foot(0.26, 0.098, bare=True)
+    body = Body(foot=foot)
+    figure = hiker(body)
+    edges = {tuple(edge) for edge in directed_edges(figure.quads)}
+    assert edges == {(b, a) for a, b in edges}
+    assert not {PARTS.index("shoe"), PARTS.index("sole")} & set(figure.parts)
+
+    x, y, z = (figure.vertices - (0, body.joints["ankle.R"][1], 0)).T
+    down = (z < 0.001) & (y > -foot.width)  # of the right foot: its inner side is at +y
+    along = (x - foot.back) / foot.length
+    assert z.min() == pytest.approx(0.0, abs=1e-3)
+    assert (down & (along < 0.2)).any()
+    assert not (down & (abs(along - 0.42) < 0.06) & (y > 0.0) & (y < 0.5 * foot.width)).any()
+    toes = np.sort(y[down & (along > 0.76) & (y < 0.5 * foot.width)])
+    assert (np.diff(toes) > 0.003).sum() >= 3  # gaps between the toes
+
+
 class TestInBlender:
     @pytest.fixture
     def walker(self, scene):
