@@ -80,6 +80,8 @@ def register() -> None:
     """Register classes, `scene.softground` and the command `softground`: all of it, or on an error nothing."""
     with ExitStack() as undo:
         for cls in CLASSES:
+            if issubclass(cls, bpy.types.Operator):  # Blender shows docstrings as tooltips, with their line breaks
+                cls.bl_description = " ".join((cls.__doc__ or "").split())
             bpy.utils.register_class(cls)
             undo.callback(bpy.utils.unregister_class, cls)
         for owner, group in _SETTINGS:

@@ -55,6 +55,14 @@ def test_everything_has_a_tooltip_and_search_finds_it(addon):
                 assert setting.description, f"{group.__name__}.{setting.identifier}"
 
 
+def test_tooltips_of_buttons_are_sentences_without_the_breaks_of_the_source(addon):
+    for cls in operators():
+        group, name = cls.bl_idname.split(".")
+        tooltip = getattr(getattr(bpy.ops, group), name).get_rna_type().description
+        assert tooltip == " ".join(tooltip.split()), cls.bl_idname
+        assert not tooltip.endswith("."), cls.bl_idname
+
+
 LABEL, CHECKBOX = 88, 112
 """Widest names that are whole beside a field and beside a checkbox, in a sidebar as wide as Blender makes it [px]."""
 

@@ -282,7 +282,7 @@ class SOFTGROUND_OT_duplicate_step(OnStep, bpy.types.Operator):
 
 
 class SOFTGROUND_OT_add_step(OnStep, bpy.types.Operator):
-    """Press this step at the 3D cursor too, starting at the current frame. Adjust Last Operation has its sole"""
+    """Press this step at the 3D cursor too, starting at the current frame. Choose its sole in Adjust Last Operation"""
 
     bl_idname = "softground.add_step"
     bl_label = "Add at Cursor"
