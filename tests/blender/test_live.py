@@ -261,6 +261,11 @@ def test_a_slider_presses_the_prints_that_are_shown_again_as_a_bake_would(live_s
     assert baked_heights(live_shot) == pytest.approx(shown, abs=1e-6)
 
 
+def test_a_redraw_looks_at_the_settings_for_a_refusal_only_after_one(live_shot, monkeypatch):
+    monkeypatch.setattr(live.settings, "snapshot", MagicMock(side_effect=AssertionError))
+    assert live.refusal() == ""
+
+
 @pytest.mark.slow
 def test_cells_that_nobody_waits_for_are_refused_in_words_and_the_prints_stay(live_shot):
     live_shot.frame_set(48)

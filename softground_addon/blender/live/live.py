@@ -108,7 +108,9 @@ def is_answering() -> bool:
 def refusal() -> str:
     """Why live mode does not press with the settings of the moment; empty where it does."""
     scene = _scene()
-    return _mode.refusal(settings.snapshot(scene)) if _mode is not None and scene is not None else ""
+    if _mode is None or scene is None or not _mode.has_refused:
+        return ""
+    return _mode.refusal(settings.snapshot(scene))
 
 
 def forget() -> None:

@@ -161,6 +161,11 @@ class LiveMode:
         last = self._wanted if self._answering is None else self._asked
         return last is None or (asked != last and _pressed_by(asked) != _pressed_by(last))
 
+    @property
+    def has_refused(self) -> bool:
+        """Whether there were settings that it did not press with."""
+        return self._refused is not None
+
     def refusal(self, asked: BakeSettings) -> str:
         """Why some settings are not pressed; empty where they are, or were not tried."""
         return self._refused[1] if self._refused is not None and self._refused[0] == asked else ""
