@@ -109,9 +109,9 @@ def test_forces_and_timing_are_within_the_bars(name, per_foot, total):
         ("opencap4_walking2", 0.047),
         ("opencap4_walkingTI1", 0.068),  # with the plates' own timing 0.060
         ("run_rajagopal", 0.050),
-        ("hamner04_run200", 0.123),
-        ("hamner04_run400", 0.099),
-        ("opencap4_DJ1", 0.110),
+        ("hamner04_run200", 0.102),
+        ("hamner04_run400", 0.083),
+        ("opencap4_DJ1", 0.093),
         ("opencap4_DJ2", 0.100),
         ("opencap4_DJAsym1", 0.150),  # half of its total's error alone is 0.096
         ("opencap4_squats1", 0.020),
@@ -129,6 +129,8 @@ def test_each_foot_is_as_near_as_the_docs_say(name, per_foot):
         ("opencap4_walking1", 0.026, 0.026),
         ("opencap4_walkingTI1", 0.031, 0.020),
         ("run_rajagopal", 0.035, 0.060),
+        ("hamner04_run200", 0.050, 0.045),
+        ("hamner04_run400", 0.065, 0.050),
         ("opencap4_squats1", 0.013, 0.030),
         ("opencap4_DJ1", 0.100, 0.060),
     ],

@@ -25,6 +25,9 @@ motion itself does not tell better."""
 PASSES = 1.07
 """Trunk, head and arms pass the low-pass twice, for the flesh on them follows the bones slowly; the legs, which bring
 the impacts, once. Two passes together cut lower than one: this raises the cut-off of each."""
+LAG = 0.007
+"""How long the flesh of trunk, head and arms comes after their joints in motions with flights, in times of the leg's
+pendulum: 2 ms."""
 SLOW_CUTOFF = 4.0
 """Cut-off that shows how a body leans while it stands, in the same unit (2 Hz)."""
 CUTOFF_RANGE = 2.0
@@ -130,7 +133,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
     flying = flights(airborne, body, motion.time_step) if airborne is not None else np.zeros(0, dtype=bool)
     if flying.any():
-        cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[1], usual)
+        cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[2], usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
     if cutoff_factor != 1:
         body = smoothed(body.cutoff * cutoff_factor)
@@ -154,13 +157,16 @@ def with_flight(
     pulled = ~airborne & (body.force[:, 2] < 0)
     if not (flying.any() or pulled.any()):
         return body
-    points, cutoff, fall = body.points, body.cutoff, motion.gravity
+    points, level, cutoff, fall = body.points, body.points, body.cutoff, motion.gravity
     if flying.any():
-        points, cutoff, fall = _falling_freely(motion, body, flying)
+        points, level, cutoff, fall = _falling_freely(motion, body, flying)
         cutoff *= cutoff_factor
     sampled, each = motion.on_frames, _of_each_pass(points, cutoff, motion.frame_step)
     path = np.zeros((len(sampled), 3))
-    path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff)
+    lag = LAG * motion.pendulum_time if flying.any() else 0.0
+    path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff, lag)
+    if level is not points:
+        path[sampled, :2] = _calmed(level, level.centre[:, :0], motion.frame_step, cutoff, lag)[:, :2]
     acted = fall
     while True:
         # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
@@ -188,15 +194,18 @@ def with_flight(
     return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 
 
-def _calmed(points: MassPoints, others: Array, step: float, cutoff: float) -> Array:
+def _calmed(points: MassPoints, others: Array, step: float, cutoff: float, lag: float = 0.0) -> Array:
     """The columns `others` (F, C), and the centre of mass (F, 3) with its trunk low-passed once: (F, C + 3).
+
+    The trunk comes later by `lag` [s].
 
     Where nothing shows what the legs do, all is as it was.
     """
     legs = points.legs_moment()
     path = np.concatenate([others, points.centre - legs], axis=1)
     if points.legs.any():
-        path, *_ = smooth_path(path, step, _of_each_pass(points, cutoff, step))
+        path, rate, _ = smooth_path(path, step, _of_each_pass(points, cutoff, step))
+        path[:, -3:] -= lag * rate[:, -3:]
     path[:, -3:] += legs
     return path
 
@@ -213,8 +222,11 @@ def _usual_cutoff(motion: CharacterMotion) -> float:
 
 def _falling_freely(
     motion: CharacterMotion, body: BodyDynamics, flying: Mask, stride: float = CUTOFF_STEP
-) -> tuple[MassPoints, float, float]:
-    """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and its fall [m/s²].
+) -> tuple[MassPoints, MassPoints, float, float]:
+    """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and how its joints fall [m/s²].
+
+    There are two bodies. Up and down, flesh moves less than joints: where only a part of the body moves with them, they
+    fall faster than it. Along the ground nothing tells that part, and what is second is the body all of which does.
 
     A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
     the shaking of soft tissue through: both show as a force where there is none.
@@ -225,14 +237,15 @@ def _falling_freely(
     highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
 
     @cache
-    def fitted(octaves: float) -> tuple[MassPoints, float]:
+    def fitted(octaves: float, whole: bool = False) -> tuple[MassPoints, float, float]:
         _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), step, usual * 2.0**octaves)
         falling = acceleration.reshape(parts.shape)[flying]
-        return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0))
+        return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0), whole=whole)
 
     start = np.log2(body.cutoff / usual)
-    best = _downhill(lambda octaves: fitted(octaves)[1], start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
-    return fitted(best)[0], usual * 2.0**best, fall
+    best = _downhill(lambda octaves: fitted(octaves)[2], start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
+    points, moving, _ = fitted(best)
+    return points, fitted(best, whole=True)[0], usual * 2.0**best, fall / moving
 
 
 def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:

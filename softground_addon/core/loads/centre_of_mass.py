@@ -169,12 +169,13 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
 
 
 def fitted_to_free_fall(
-    points: MassPoints, accelerations: Array, gravity: float, *, independent: float = 1.0
-) -> tuple[MassPoints, float]:
+    points: MassPoints, accelerations: Array, gravity: float, *, independent: float = 1.0, whole: bool = True
+) -> tuple[MassPoints, float, float]:
     """The same body with the mass fractions that make it fall freely when it does, and how far it is from that still.
 
     In flight the centre of mass falls with g whatever the limbs do, so that what it seems to do beside tells how the
-    body's mass differs from the table's. Least squares with the table as the prior.
+    body's mass differs from the table's. Least squares with the table as the prior. Markers and bones bounce more than
+    the flesh does: the fractions may also tell what share of the body moves as they do.
 
     Parameters
     ----------
@@ -185,32 +186,37 @@ def fitted_to_free_fall(
         [m/s²]
     independent : float
         Share of the M steps that tell something new: low-passed accelerations change slowly.
+    whole : bool
+        Whether all of the body moves as its joints do, as it also does where nothing shows the legs.
 
     Returns
     -------
     points : MassPoints
+    moving : float
+        The share of the body that moves as its joints do.
     misfit : float
         Sum of squares, in standard deviations, of what is not free fall and of the changes of the fractions.
     """
     prior = np.bincount(points.parts, weights=points.fractions)
     deviation = _FRACTION_DEVIATION * prior
-    excess = accelerations / gravity + (0.0, 0.0, 1.0)
-    rows = np.moveaxis(excess, 1, -1).reshape(-1, len(prior))
+    rows = np.moveaxis(accelerations / gravity, 1, -1).reshape(-1, len(prior))
     row_deviation = _FALL_DEVIATION / np.sqrt(independent)
     scaled = rows * deviation / row_deviation
     # `solve`, and `@` with a vector, would wake the threads of the BLAS library, which cost more than they save here.
-    missed = np.einsum("rp,p->r", rows, prior) / row_deviation
+    missed = (np.einsum("rp,p->r", rows, prior) + np.tile((0.0, 0.0, 1.0), len(accelerations))) / row_deviation
     pull = -np.einsum("rp,r->p", scaled, missed)
     # Least squares for the changes in deviations, the table being one more row for each of them.
     stiffness, modes = np.linalg.eigh(scaled.T @ scaled + np.eye(len(prior)))
     flexibility = (modes / stiffness) @ modes.T
-    # The force of a constraint keeps the sum of the fractions.
-    along = flexibility @ deviation
     change = flexibility @ pull
-    change -= along * (deviation @ change) / (deviation @ along)
+    if whole or not points.legs.any():
+        # The force of a constraint keeps the sum of the fractions.
+        along = flexibility @ deviation
+        change -= along * (deviation @ change) / (deviation @ along)
     misfit = ((missed + np.einsum("rp,p->r", scaled, change)) ** 2).sum() + (change**2).sum()
     fractions = points.fractions * (np.maximum(prior + deviation * change, 0.0) / prior)[points.parts]
-    return dataclasses.replace(points, fractions=fractions / fractions.sum()), float(misfit)
+    moving = float(fractions.sum())
+    return dataclasses.replace(points, fractions=fractions / moving), moving, float(misfit)
 
 
 class _Joints:

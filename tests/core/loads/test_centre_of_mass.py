@@ -122,6 +122,22 @@ def test_flight_tells_that_the_legs_are_heavier_than_the_table_says():
     random = np.random.default_rng(1)
     relative = random.normal(size=(400, len(table), 3)) * 5.0
     relative -= np.einsum("p,npc->nc", heavy, relative)[:, None]
-    fitted, _ = fitted_to_free_fall(parts, relative + np.array([0.0, 0.0, -9.81]), 9.81)
+    fitted, *_ = fitted_to_free_fall(parts, relative + np.array([0.0, 0.0, -9.81]), 9.81)
     assert np.bincount(fitted.parts, weights=fitted.fractions) == pytest.approx(heavy, abs=2e-3)
     assert fitted.fractions.sum() == pytest.approx(1.0)
+
+
+def test_flight_tells_that_the_flesh_bounces_less_than_the_joints():
+    """Joints that fall 1.2 times as fast as gravity: the part of the body that moves as they do is nearly 1/1.2."""
+    parts = mass_points(body(STANDING))
+    falling = np.tile((0.0, 0.0, -1.2 * 9.81), (400, parts.parts.max() + 1, 1))
+    fitted, moving, _ = fitted_to_free_fall(parts, falling, 9.81, whole=False)
+    assert moving == pytest.approx(1 / 1.2, abs=0.005)
+    assert fitted.fractions.sum() == pytest.approx(1.0)
+    assert fitted_to_free_fall(parts, falling, 9.81)[1] == pytest.approx(1.0)
+
+
+def test_a_body_whose_legs_nothing_shows_moves_as_a_whole():
+    parts = mass_points(body({name: STANDING[name] for name in ("hips", "neck")}))
+    falling = np.tile((0.0, 0.0, -1.2 * 9.81), (400, parts.parts.max() + 1, 1))
+    assert fitted_to_free_fall(parts, falling, 9.81, whole=False)[1] == pytest.approx(1.0)
