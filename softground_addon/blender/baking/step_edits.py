@@ -14,6 +14,7 @@ from ...core.after.felt_weather import felt_in
 from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import GroundMaterial
+from ...core.ground.presets import SURFACES
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
@@ -126,16 +127,18 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             for name, value in now.between(Acts.WRITING, Acts.WRITING).items()
             if name in inputs
         }
-        units = {key: float(inputs[key]) for key in ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m")}
+        units = baked_ground.units_of(inputs)
         first, last = map(int, inputs["frames"])
+        if inputs["surface"] not in SURFACES:
+            raise ValueError("there is no such surface")
         return replace(
             now,
             **on_ground,
             material=GroundMaterial(**inputs["material"]),
             pressure=inputs["pressure"],
             painted=tuple(inputs["painted"]),
-            cell_size_m=float(inputs["cell_size_m"]),
             frames=(first, last),
+            cell_size_m=units["cell_size_m"],
             frame_rate=units["frame_rate"],
             time_stretch=units["time_stretch"],
             gravity_m_s2=units["gravity_m_s2"],
@@ -143,7 +146,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs.get("shoe_treads", ())),
             weather=felt_in(inputs),
         )
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError(
             "The stored record of the footprints does not say what they were pressed with: bake again, and edit then."
         ) from None

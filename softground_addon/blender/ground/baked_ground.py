@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
+UNITS = ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m")
+LARGEST_UNIT = 1e12
+"""Of any of these, and 1 over the smallest: what is beyond is damage."""
 EVENTS = "events"
 """What is known about footprints: the table of their events."""
 
@@ -272,6 +275,20 @@ def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:
         return record.load(bytes(stored_record(ground))).edits
     except InputError:
         return {}
+
+
+def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:
+    """What the frames, lengths and forces of a bake are in, by the inputs that its record has.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, OverflowError
+        If they are damaged.
+    """
+    units = {name: float(inputs[name]) for name in UNITS}
+    if not all(1.0 / LARGEST_UNIT <= unit <= LARGEST_UNIT for unit in units.values()):
+        raise ValueError("it was baked in units that there are not")
+    return units
 
 
 def baked_with(about: dict[str, Any], value: str) -> float:

@@ -113,11 +113,11 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     footprints, about = baked_ground.load(ground)
     try:
         inputs = about["inputs"]
-        known = of_bake(inputs)
-        stretch, rate = known["time_stretch"], float(inputs["frame_rate"])
+        known, units = of_bake(inputs), baked_ground.units_of(inputs)
+        stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (float(frame) * stretch for frame in inputs["frames"])
-        unit_scale, matter = float(inputs["unit_scale_m"]), matter_on(footprints, inputs)
-    except (KeyError, TypeError, ValueError, IndexError):
+        matter = matter_on(footprints, inputs)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
@@ -136,11 +136,12 @@ def matter_on(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Mat
 
 
 def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """What `weather_places` takes of a bake's inputs."""
+    """What `weather_places` takes of a bake's inputs; what `baked_ground.units_of` raises where they are damaged."""
+    units = baked_ground.units_of(inputs)
     material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
     return {
-        "cell_size": float(inputs["cell_size_m"]),
-        "time_stretch": float(inputs["time_stretch"]),
+        "cell_size": units["cell_size_m"],
+        "time_stretch": units["time_stretch"],
         "felt": felt_in(inputs) is not None,
         **material,
     }

@@ -22,6 +22,9 @@ from .weather_places import SIGMAS, shares
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e9
+"""Of any number of a weather that is stored, in SI units and frames: what is larger is damage."""
+
 
 @dataclass(frozen=True)
 class FeltWeather(Weather):
@@ -48,14 +51,25 @@ def felt_in(inputs: Mapping[str, Any]) -> FeltWeather | None:
 
     Raises
     ------
-    TypeError, ValueError
+    TypeError, ValueError, OverflowError
         If they are damaged.
     """
     known = inputs.get("weather")
     if known is None:
         return None
-    values: Any = {name: tuple(map(float, one)) if isinstance(one, list) else one for name, one in known.items()}
-    return FeltWeather(**values)
+    if not isinstance(known, Mapping):
+        raise TypeError("the weather is no table")
+    values: Any = {
+        name: str(one) if name == "surface" else tuple(map(float, one)) if isinstance(one, list) else float(one)
+        for name, one in known.items()
+    }
+    weather = FeltWeather(**values)
+    numbers = [np.ravel(one) for name, one in values.items() if name != "surface"]
+    if not all((np.abs(one) <= LARGEST).all() and len(one) in (1, PARTS + 1) for one in numbers):
+        raise ValueError("the weather is of no such numbers")
+    if not (weather.first < weather.last and weather.frame_rate > 0):
+        raise ValueError("the weather takes no time")
+    return weather
 
 
 def weathering_of(weather: FeltWeather | None, layer_depth: float) -> PrintsInWeather | None:

@@ -19,6 +19,11 @@ LARGEST_TEXT = 2**24
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
+def most_of(size: int) -> int:
+    """Most that an archive of that size unpacks to, both in bytes."""
+    return LARGEST_RATIO * size + SPARE
+
+
 def check_directory(archive: zipfile.ZipFile, size: int) -> None:
     """Raise ValueError unless the directory of an archive of that size [bytes] announces what can be unpacked.
 
@@ -30,7 +35,7 @@ def check_directory(archive: zipfile.ZipFile, size: int) -> None:
         raise ValueError("two of its parts have one name")
     if any(member.compress_type not in _METHODS for member in archive.infolist()):
         raise ValueError("a part is compressed in another way")
-    if sum(member.file_size for member in archive.infolist()) > LARGEST_RATIO * size + SPARE:
+    if sum(member.file_size for member in archive.infolist()) > most_of(size):
         raise ValueError("its parts are larger than they can be")
 
 

@@ -214,7 +214,10 @@ def load(content: bytes) -> BakeRecord:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members.check_directory(archive, len(content))
-            text = json.loads(members.read(archive, _TEXT, members.LARGEST_TEXT))
+            stored = members.read(archive, _TEXT, members.LARGEST_TEXT)
+            text = json.loads(stored)
+            if b"\\u" in stored:  # half a character, which nothing can be written with
+                json.dumps(text, ensure_ascii=False).encode()
             version = text["format"]
             if version != FORMAT and version not in MIGRATIONS:
                 raise InputError(
@@ -230,7 +233,7 @@ def load(content: bytes) -> BakeRecord:
         names, about, edits = text["footprints"], dict(text["about"]), text["edits"]
         soles, again = text["soles"], [(number, there) for number, there in text["pressed_again"]]
         baked = _count_baked(len(names), again)
-        how_thrown = [step_throws.from_json(one, baked) for one in text["throws"]]
+        how_thrown = step_throws.from_json(text["throws"], baked, members.most_of(len(content)))
         thrown = _thrown(text["thrown"], baked)
     except _DAMAGE as error:
         raise InputError(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -26,9 +26,10 @@ _Part = TypeVar("_Part")
 WEIGHT, AIM, FOLLOWED = 0, slice(1, 4), 4
 """Columns of `Throw.samples`: see there."""
 _NUMBERS = ("first", "spacing", "speed", "landed_by")
-_LARGEST = 1e6
+_LARGEST = 1e9
 """Of any number that is stored: what is larger is damage."""
-_MOST_SAMPLES = 10_000
+_MOST_POINTS = 10_000
+"""Of a sole, as `contact_arrays` has them."""
 
 
 @dataclass(frozen=True)
@@ -110,26 +111,37 @@ def to_json(throw: Throw) -> dict[str, Any]:
     return about | {"shape": list(samples.shape), "samples": content}
 
 
-def from_json(content: Mapping[str, Any], count: int) -> Throw:
-    """The throw from what `to_json` gave.
+def from_json(contents: Sequence[Mapping[str, Any]], count: int, largest: int) -> list[Throw]:
+    """The throws from what `to_json` gave of each.
 
     Parameters
     ----------
-    content : mapping
+    contents : sequence of mapping
     count : int
         Of footprints that were baked.
+    largest : int
+        Most that their samples may take together [bytes]: no more than that is unpacked.
 
     Raises
     ------
     ValueError, KeyError, TypeError, zlib.error
         If it was forged or damaged.
     """
+    shapes = [one["shape"] for one in contents]
+    if any(type(size) is not int or size < 0 for shape in shapes for size in shape):
+        raise ValueError("it throws what has no size")
+    if sum(4 * rows * columns for rows, columns in shapes) > largest:
+        raise ValueError("it throws more than it can have")
+    return [_throw(one, count) for one in contents]
+
+
+def _throw(content: Mapping[str, Any], count: int) -> Throw:
     rows, columns = content["shape"]
     number, phase, kind, is_foot = (content[name] for name in ("number", "phase", "kind", "is_foot"))
-    kinds = (type(number), type(phase), type(kind), type(is_foot), type(rows), type(columns))
-    if kinds != (int, str, int, bool, int, int) or not (0 <= number < count and 0 <= kind < 3):
+    kinds = (type(number), type(phase), type(kind), type(is_foot))
+    if kinds != (int, str, int, bool) or not (0 <= number < count and 0 <= kind < 3):
         raise ValueError("it throws what no step of it does")
-    if not (0 < rows <= _MOST_SAMPLES and FOLLOWED + 6 <= columns <= FOLLOWED + 600) or (columns - FOLLOWED) % 6:
+    if not rows or not 0 < columns - FOLLOWED <= 6 * _MOST_POINTS or (columns - FOLLOWED) % 6:
         raise ValueError("it throws along no way")
     unpacking, size = zlib.decompressobj(), 4 * rows * columns
     packed = base64.b64decode(content["samples"], validate=True)

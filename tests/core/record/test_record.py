@@ -2,6 +2,7 @@
 
 import io
 import json
+import tracemalloc
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,8 @@ from softground_addon.core.record.edits import (
 )
 from softground_addon.core.record.footprints import recompose
 from softground_addon.core.record.record import BakeRecord
+from softground_addon.core.record.throws import Throw
+from softground_addon.core.record.throws import to_json as to_json_of_throw
 from tests.core.walkers import pressed, walk
 
 VERSION_1 = Path(__file__).with_name("version_1.record")
@@ -191,3 +194,48 @@ def test_an_edit_that_cannot_be_meant_is_named(step, said):
 def test_edits_that_are_none_are_refused(content, said):
     with pytest.raises(InputError, match=said):
         from_json(content, "edits.json")
+
+
+def thrown(samples, **values):
+    about = {"first": 1.0, "spacing": 1.0, "speed": 0.0, "landed_by": 1.0}
+    return Throw(0, "toe_off", 2, True, **about | values, samples=samples)
+
+
+def test_what_lasts_long_or_happens_late_throws_as_it_did(footprints):
+    """A crate that is dragged for minutes, in the last frames that Blender has."""
+    samples = np.random.default_rng(1).random((30_000, 4 + 6 * 2)).astype(np.float32)
+    stored = record.dump(BakeRecord(footprints, {}, throws=[thrown(samples, first=1_048_000.0)]))
+    (one,) = record.load(stored).throws
+    assert one.first == 1_048_000.0
+    assert (one.samples == samples).all()
+
+
+def test_throws_that_unpack_to_far_more_than_a_record_has_take_no_memory(footprints):
+    many = [to_json_of_throw(thrown(np.zeros((10_000, 604), np.float32)))] * 500
+    forged = with_text(record.dump(BakeRecord(footprints, {})), throws=many)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="clear the bake"):
+            record.load(zipped(forged))
+        assert tracemalloc.get_traced_memory()[1] < 2e8
+    finally:
+        tracemalloc.stop()
+
+
+def zipped(content):
+    """The record in as little space as it takes."""
+    buffer = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(content)) as source,
+        zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
+    ):
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+    return buffer.getvalue()
+
+
+def test_half_a_character_anywhere_is_damage(footprints):
+    stored = record.dump(BakeRecord(footprints, {}))
+    with pytest.raises(InputError, match="clear the bake"):
+        record.load(with_text(stored, about={"inputs": {"file": "\ud800"}}))
+    assert record.load(with_text(stored, about={"file": "\U0001f43e \\ud800"})).about["file"] == "\U0001f43e \\ud800"
