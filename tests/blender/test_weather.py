@@ -386,6 +386,18 @@ def test_what_is_blown_full_looks_trodden_no_more(opened):
     assert read(carrier(scene).data, "softground_compression").max() == before
 
 
+@pytest.mark.parametrize("seconds", [45.0, 600.0])
+def test_materials_see_the_edges_that_wind_has_left_and_no_sharper_ones(opened, seconds):
+    scene = opened("sand")
+    rest = ground_mesh.rest_positions(carrier(scene).data)
+    bpy.ops.softground.add_weather()
+    set_to(scene, **{"Wind": 9.0, "Time Scale": seconds * scene.render.fps / (300 - FRAMES[-2])})
+    now = shown(scene, 300)
+    compression, rim = (read(now, f"softground_{name}") for name in ("compression", "rim"))
+    np.testing.assert_allclose(rim - compression, (read(now, "position", 3) - rest)[:, 2], rtol=0, atol=1e-5)
+    assert min(compression.min(), rim.min()) >= 0.0
+
+
 @pytest.mark.slow
 def test_a_beach_turns_pale_as_it_dries(opened):
     scene = opened("wet_sand")

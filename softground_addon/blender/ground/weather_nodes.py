@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 
+from ...core.after import weather as w
 from ...core.after.weather import Matter, Span
 from ...core.after.weather_places import BOUNDS, COVERED, NEAR, POWERS
 from .. import node_graph
@@ -67,6 +68,9 @@ standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 
 STANDING = "softground_weather_standing"
 """Depth of standing water without the bake's own [m], there only while the group works."""
+
+WORN = "softground_weather_worn"
+"""Compression and rim under the weather [m], there only while the group works."""
 
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
@@ -234,10 +238,8 @@ class _Vertices:
             deep = graph.number(graph.attribute(COMPACTED)) * begun
             deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
             geometry = self._with(geometry, {COMPRESSION: deep}, acts["Snowfall"])
-        if matter.blown:  # what is blown full looks trodden no more
-            kept = self._number(self._kept, self._moment)
-            blown = {name: graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM)}
-            geometry = self._with(geometry, blown, acts["Wind"], selection=graph.attribute(MOVED, "BOOLEAN"))
+        if matter.blown:
+            geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, self._worn(geometry))
         return geometry
 
     def moved(self, geometry: Any) -> Any:
@@ -247,7 +249,7 @@ class _Vertices:
         cover = self._around("cover", self._not_full(self._inside))
         geometry = self._with(geometry, {FRESH: cover * (1.0 / COVERED)}, snow)
         relief = self._relief()
-        change = self._dot(self._blur, self._not_full(self._share), self._moment)
+        change = self._rounded()
         if matter.blown:
             change = change + (relief * self._number(self._course.aged["filled"], self._moment)).where(acts["Wind"])
         change = change.where(acts["Snowfall"], acts["Temperature"], acts["Wind"], acts["Rain"])
@@ -281,6 +283,21 @@ class _Vertices:
             pale = self._number(self._course.aged["pale"] * self._course.begun, self._moment_if_begun)
             dried = dried.at_least((halo * near * pale).where(acts["Halo"]))
         return self._with(geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
+
+    def _worn(self, geometry: Any) -> Any:
+        """The geometry that looks no more trodden than it is: blown full, and with the edges that are left."""
+        graph, selection = self._graph, self._graph.attribute(MOMENT, "INT")
+        kept = self._number(self._kept, self._moment)
+        compression, rim = (graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM))
+        left = graph.combined(*(one.socket for one in w.worn(compression, rim, self._rounded())), 0.0)
+        geometry = graph.store(geometry, WORN, left, selection, "FLOAT_VECTOR")
+        for name, value in zip((COMPRESSION, RIM), graph.parts(graph.attribute(WORN, "FLOAT_VECTOR")), strict=False):
+            geometry = graph.store(geometry, name, value.socket, selection)
+        return graph.forgotten(geometry, WORN)
+
+    def _rounded(self) -> Number:
+        """What edges that are lost change the height by [m]."""
+        return self._dot(self._blur, self._not_full(self._share), self._moment)
 
     def _standing(self, table: Number) -> Number:
         """Depth of water in hollows."""

@@ -198,6 +198,23 @@ def spread_rate(flux: Any, blown: Blown) -> Any:
     return 2.0 * HOP / blown.bulk_density * flux
 
 
+def worn(compression: Any, rim: Any, change: Any) -> tuple[Any, Any]:
+    """Compression and rim that are left where ground has risen by a change, or fallen [m].
+
+    What is laid down fills a hollow before it stands above the ground; what is taken goes from a rim first.
+
+    Examples
+    --------
+    >>> worn(np.array([4.0, 0.0]), np.array([0.0, 1.0]), np.array([5.0, -3.0]))
+    (array([0., 2.]), array([1., 0.]))
+    """
+    laid, taken = np.maximum(change, 0.0), np.maximum(np.multiply(change, -1.0), 0.0)
+    return (
+        np.maximum(compression - laid, 0.0) + np.maximum(taken - rim, 0.0),
+        np.maximum(rim - taken, 0.0) + np.maximum(laid - compression, 0.0),
+    )
+
+
 def soaked(wet: Any, soaking: Soaking) -> Any:
     """What open ground can have taken up after it was rained on for a time [s] [m]: the integral of Horton's rate."""
     more = (soaking.first - soaking.final) / soaking.decay
