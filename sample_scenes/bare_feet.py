@@ -26,12 +26,13 @@ FRAMES = 260
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
 EDGE, LEVEL = -1.0, -0.05  # m; where the water stands, and how high
+_SKY = (radians(13.0), 1.0)  # as high as the sun: pale gold at the horizon, where a lower one makes it mustard
 _HILLS = open_air.rolling(swell=0.10, hills=16.0, seed=8)
 
 
 def height(x: Array, y: Array) -> Array:
-    """Dunes on the left, and on the right a slope into the sea [m]."""
-    land = np.clip((x + 1.2) / 6.0, 0.0, 1.0)
+    """Dunes on the left, which rise the slower the farther away, and on the right a slope into the sea [m]."""
+    land = np.clip((x + 1.2) / (6.0 + 0.2 * np.abs(y)), 0.0, 1.0) ** 2
     return land * _HILLS(x, y) - 0.06 * np.clip(-0.8 - x, 0.0, 30.0)
 
 
@@ -70,7 +71,7 @@ def shoot(_built: BareFeet, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, with the sun over the sea."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(12), radians(13), (1.0, 0.70, 0.45), 6.5, 0.26)
+    open_air.add_low_sun(scene, radians(-18), radians(15), (1.0, 0.70, 0.45), 6.5, 0.11, _SKY)
     open_air.add_sea(scene, shore, LEVEL, height)
     chance = np.random.default_rng(5)
     spots = np.column_stack([5.5 + chance.gamma(1.5, 5.0, 700), 1.0 - chance.uniform(0.0, 60.0, 700)])

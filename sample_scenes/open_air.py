@@ -106,14 +106,23 @@ _OZONE = 3.0
 
 
 def add_low_sun(
-    scene: bpy.types.Scene, toward: float, elevation: float, colour: tuple[float, float, float], sun: float, sky: float
+    scene: bpy.types.Scene,
+    toward: float,
+    elevation: float,
+    colour: tuple[float, float, float],
+    sun: float,
+    sky: float,
+    of_sky: tuple[float, float] = (_SUN_OF_SKY, _OZONE),
 ) -> None:
-    """The sun of the other scenes, of another colour and strength [W/m²], below a sky in which it is lower still."""
+    """The sun of the other scenes, of another colour and strength [W/m²], below a sky in which it is lower still.
+
+    `of_sky` is how high the sky's own sun stands [rad], and its ozone in that of a clear day.
+    """
     stage.add_sun(scene, toward, elevation)
     light = next(lamp for lamp in bpy.data.lights if lamp.type == "SUN")
     light.energy, light.color, light.angle = sun, colour, _SUN_WIDTH
     nodes = {node.type: node for node in scene.world.node_tree.nodes}
-    nodes["TEX_SKY"].sun_elevation, nodes["TEX_SKY"].ozone_density = _SUN_OF_SKY, _OZONE
+    nodes["TEX_SKY"].sun_elevation, nodes["TEX_SKY"].ozone_density = of_sky
     nodes["BACKGROUND"].inputs[1].default_value = sky
 
 
@@ -151,7 +160,7 @@ def add_sea(scene: bpy.types.Scene, shore: Callable[[Array], Array], level: floa
         (corner[:, None] + [0, columns, columns + 1, 1]).tolist(),
     )
     mesh.shade_smooth()
-    there = np.where(out < -1e-6, 0.0, 1.0)
+    there = np.clip(out / 0.12, 0.0, 1.0)
     fields = {
         "film": np.clip(1.0 + out / _FILM, 0.0, 1.0),
         "body": np.clip((out - 0.2) / 2.5, 0.0, 1.0),
@@ -176,8 +185,11 @@ def _water() -> bpy.types.Material:
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
     film, body, foam = (graph.attribute(name) for name in ("film", "body", "foam"))
     ragged = graph.noise(place, 0.25, 3.0) * 0.9
-    bubbles = graph.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": 16.0}, feature="DISTANCE_TO_EDGE")
-    lace = graph.ramp(foam + ragged + graph.out(bubbles) * -1.6, 0.62, 0.95)
+    wide, fine = (
+        graph.out(graph.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": scale}, feature="DISTANCE_TO_EDGE"))
+        for scale in (16.0, 47.0)
+    )
+    lace = graph.ramp(foam + ragged + wide * -1.3 + fine * -0.9, 0.35, 1.25) * 0.9
     ripples = graph.node(
         "ShaderNodeBump", {"Height": graph.noise(place, 0.5, 3.0), "Distance": 0.05, "Strength": body * 0.6}
     )
