@@ -50,6 +50,10 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     -------
     (F, P) bool array
     """
+    if tracks.loops:
+        turn = len(tracks.low) - 1
+        around = bearing(tracks.turns(3), level, drift)
+        return _without_blips(around[turn : 2 * turn + 1], round(BLIP * tracks.rate))
     height, speed, slip = tracks.low - level, tracks.rise, tracks.slip(drift)
     fast = np.percentile(slip, 90, axis=0)
     limit = np.clip(SLIP_OF_REST * _usual_slip(height, speed, slip, tracks.calm), *(np.outer(SLIP_SHARES, fast)))

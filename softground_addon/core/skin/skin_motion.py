@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ BURIED = 0.015
 
 LOW = 0.15
 """A part lower than this above the lowest skin is low, in body heights."""
+
+LOOPS = 0.001
+"""A shot whose last pose is its first one to within this is one turn of a loop, in body heights."""
 
 _SLICE = 100_000
 """Places that are looked at in one slice."""
@@ -78,6 +81,8 @@ class PartTracks:
         A part that rises or falls slower than this may rest.
     rate : float
         [Hz]
+    loops : bool
+        Whether the shot is one turn of a loop: what bears at its end goes on at its beginning.
     """
 
     low: Array
@@ -86,6 +91,7 @@ class PartTracks:
     ways: Array
     calm: float
     rate: float
+    loops: bool = False
 
     @property
     def lowest(self) -> Array:
@@ -98,8 +104,23 @@ class PartTracks:
 
     def of(self, parts: Mask) -> PartTracks:
         """Some of the parts."""
-        return PartTracks(
-            self.low[:, parts], self.place[:, parts], self.rise[:, parts], self.ways[:, :, parts], self.calm, self.rate
+        return replace(
+            self,
+            low=self.low[:, parts],
+            place=self.place[:, parts],
+            rise=self.rise[:, parts],
+            ways=self.ways[:, :, parts],
+        )
+
+    def turns(self, count: int) -> PartTracks:
+        """Some turns of a loop in a row, (count·(F - 1), P)."""
+        return replace(
+            self,
+            low=np.tile(self.low[:-1], (count, 1)),
+            place=np.tile(self.place[:-1], (count, 1, 1)),
+            rise=np.tile(self.rise[:-1], (count, 1)),
+            ways=np.tile(self.ways[:, :-1], (1, count, 1, 1)),
+            loops=False,
         )
 
 
@@ -122,18 +143,20 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     first = np.flatnonzero(np.diff(part, prepend=-1))
     number = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(part))))
     count = len(skin.positions)
+    loops = count > 2 and bool(np.abs(skin.positions[-1] - skin.positions[0]).max() < LOOPS * skin.height)
     low, rise = np.empty((2, count, len(first)))
     middle, ways = np.empty((count, 2, len(first))), np.empty((2, count, 3, len(first)))
     frames = max(_SLICE // max(len(used), 1), 1)
     for start in range(0, count, frames):
         samples = np.arange(start - 1, min(start + frames, count) + 1)  # with the one before and the one after
-        around = np.swapaxes(skin.positions, 1, 2)[np.clip(samples, 0, count - 1)]
+        sampled = (samples - 1) % (count - 1) + 1 if loops else np.clip(samples, 0, count - 1)
+        around = np.swapaxes(skin.positions, 1, 2)[sampled]
         positions = np.take(around, used, axis=2) / skin.height
         steps = np.diff(positions, axis=0) * skin.rate
         # The first sample has no step before it and the last none after it: each has its one step on both sides.
-        if start == 0:
+        if start == 0 and not loops:
             steps[0] = steps[1]
-        if samples[-1] == count:
+        if samples[-1] == count and not loops:
             steps[-1] = steps[-2]
         here, positions = samples[1:-1], positions[1:-1]
         height = positions[:, 2]
@@ -151,7 +174,7 @@ def track_parts(skin: SkinMotion, group: Indices | None = None, floor: float = -
     near = low < low.min() + LOW
     speed = np.linalg.norm(ways, axis=2).min(axis=0)
     calm = max(CALM_SPEED, CALM_SHARE * float(np.percentile(speed[near], 95)))
-    return PartTracks(low, np.swapaxes(middle, 1, 2), rise, np.swapaxes(ways[:, :, :2], 2, 3), calm, skin.rate)
+    return PartTracks(low, np.swapaxes(middle, 1, 2), rise, np.swapaxes(ways[:, :, :2], 2, 3), calm, skin.rate, loops)
 
 
 def _sums(values: NDArray[np.floating], patch: Mask, first: Indices) -> Array:

@@ -340,3 +340,17 @@ def test_a_foot_that_slides_on_from_one_rest_to_the_next_has_not_left_the_ground
     assert not bears[41:49].any()
     raised = PartTracks(np.add(low, (0.01, 0.0)), tracks.place, rise, ways, 0.3, 24.0)
     assert not bearing(raised, 0.0, np.zeros(2))[15:25, 0].any()
+
+
+@pytest.mark.parametrize("loops", [False, True])
+def test_what_bears_at_the_end_of_a_loop_bears_on_at_its_beginning(loops: bool) -> None:
+    """A foot that is too fast at first to touch, not too fast to stay, beside one that stands on the belt."""
+    foot = np.repeat([0.0, 0.06, 0.0], [3, 7, 3])
+    low = np.stack([foot, np.zeros(13)], axis=-1)
+    ways = np.zeros((2, 13, 2, 2))
+    ways[..., 0] = np.where(low > 0, -8.0, 2.0)
+    ways[:, :3, 0, 0] = 0.2
+    tracks = PartTracks(low, ways[0], np.where(low > 0, 2.0, 0.0), ways, 0.3, 24.0, loops)
+    bears = bearing(tracks, 0.0, np.array([2.0, 0.0]))[:, 0]
+    assert bears[-3:].all()
+    assert bears[:3].all() == bears[:3].any() == loops
