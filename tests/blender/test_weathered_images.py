@@ -9,6 +9,7 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.blender.ground import baked_ground, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.output import image_exports
+from softground_addon.core.errors import InputError
 from tests.blender import weathered_shots
 from tests.blender.grounds import plane
 from tests.blender.images import read_image
@@ -134,3 +135,14 @@ def test_an_export_leaves_nothing_behind(opened, tmp_path):
     image_exports.export_images(scene, scene.softground.ground, tmp_path, 30, 31, resolution=32)
     assert there() == before
     assert len(list(tmp_path.glob("*_weather_*.exr"))) == 2
+
+
+@pytest.mark.parametrize("damage", [{"material": None}, {"time_stretch": 10**400}, {"frame_rate": 0.0}])
+def test_a_bake_whose_inputs_are_damaged_is_named(opened, tmp_path, monkeypatch, damage):
+    scene = opened("snow", Snowfall=2.0)
+    footprints, about = baked_ground.load(scene.softground.ground)
+    forged = footprints, about | {"inputs": about["inputs"] | damage}
+    monkeypatch.setattr(baked_ground, "load", lambda _: forged)
+    with pytest.raises(InputError, match=r"bake again"):
+        write(scene, tmp_path, 20)
+    assert not list(tmp_path.glob("*.exr"))

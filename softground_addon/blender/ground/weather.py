@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -111,14 +112,12 @@ def felt(wanted: BakeSettings) -> BakeSettings:
 def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) -> None:
     """Write what the group reads, and fill it."""
     footprints, about = baked_ground.load(ground)
-    try:
+    with damage_named(ground):
         inputs = about["inputs"]
         known, units = of_bake(inputs), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (float(frame) * stretch for frame in inputs["frames"])
         matter = matter_on(footprints, inputs)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
-        raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
     since = places.times[:, 1]
@@ -128,6 +127,15 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
     nodes.build(tree, **given, felt=known["felt"], again=nodes.AGAIN in mesh.attributes)
     tree[weather_keys.LAST] = span.last
+
+
+@contextmanager
+def damage_named(ground: bpy.types.Object) -> Iterator[None]:
+    """InputError in place of what the damaged inputs of a bake raise where they are read."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+        raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
 
 
 def matter_on(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Matter:

@@ -72,11 +72,17 @@ def weathered_points(
         Depth of the water that the bake itself has in its prints [m].
     unit_scale : float
         Metres per Blender unit.
+
+    Raises
+    ------
+    InputError
+        If the bake's inputs are damaged.
     """
     display_mesh = baked_ground.display_mesh_of(ground)
     footprints, about = baked_ground.load(ground)
-    known, count = weather.of_bake(about["inputs"]), len(position)
-    table = keyframe_tables(over_time)
+    with weather.damage_named(ground):
+        known, matter = weather.of_bake(about["inputs"]), weather.matter_on(footprints, about["inputs"])
+    count, table = len(position), keyframe_tables(over_time)
     start, end = np.full(count, NOT_YET), np.full(count, -NOT_YET)
     start[table.point] = known["time_stretch"] * table.frame[table.first[:-1]]
     end[table.point] = known["time_stretch"] * table.frame[table.first[1:] - 1]
@@ -85,9 +91,7 @@ def weathered_points(
     try:
         points.vertices.add(count)
         places = weather_places(footprints, position, final, start, end, **known)
-        weather.store(
-            points, places, weather.matter_on(footprints, about["inputs"]), weather_keys.moments_of(display_mesh)
-        )
+        weather.store(points, places, matter, weather_keys.moments_of(display_mesh))
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))
