@@ -6,8 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.baking import step_edits
 from softground_addon.blender.ground import ground_mesh, own_data
 from softground_addon.blender.live import live
+from softground_addon.core.errors import InputError
+from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
 from tests.blender.grounds import plane
 
@@ -49,6 +52,8 @@ def random_ground(chance, scene, folder):
     scene.softground.detail = chance.choice(["AUTO", "AUTO", "ALWAYS", "NEVER"])
     scene.softground.shape_keys = chance.random() < 0.5
     scene.softground.tread = chance.choice([0.0, 0.003])
+    for option in ("debris", "sink_feet", "steps_feel_weather"):
+        setattr(scene.softground, option, chance.random() < 0.5)
     return ground
 
 
@@ -72,6 +77,16 @@ def pressed(operator, **values):
     return False
 
 
+def edit_a_step(chance, scene):
+    """Change a step of the bake, where there is one that can be."""
+    try:
+        bake = step_edits.editable(scene)
+        name = step_id(chance.choice(bake.left.footprints))
+        step_edits.edit(scene, bake, {name: StepEdit(mute=chance.random() < 0.3, move_m=(0.05, 0.0), strength=0.5)})
+    except InputError:
+        pass
+
+
 def session(chance, folder):
     """A few bakes on one ground, then Clear; whether any was one."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -91,6 +106,10 @@ def session(chance, folder):
                 done = True
         else:
             done |= pressed(bpy.ops.softground.bake)
+        if done and chance.random() < 0.5:
+            pressed(bpy.ops.softground.add_weather)
+        if done and chance.random() < 0.5:
+            edit_a_step(chance, scene)
         scene.softground.detail = chance.choice(["AUTO", "ALWAYS", "NEVER"])
         scene.frame_set(1)
     if live.is_on():
