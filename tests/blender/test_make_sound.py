@@ -121,3 +121,15 @@ def test_own_sounds_come_from_a_folder_and_an_empty_one_is_named(scene, tmp_path
     assert bpy.ops.softground.make_sound(samples=str(folder)) == {"FINISHED"}
     heard = read(tmp_path / "shot_footsteps.wav")[:, 0]
     assert len(np.unique(heard)) < 10  # plateaus of the one recording
+
+
+def test_own_sounds_are_not_written_over(scene, tmp_path):
+    own = tmp_path / "mine" / "snow_1.wav"
+    own.parent.mkdir()
+    write_tone(own)
+    before = own.read_bytes()
+    (tmp_path / "again.wav").symlink_to(own)
+    for target in (own, tmp_path / "again.wav"):
+        options = ["export", "--format", "wav", "--samples", str(own.parent), "--output", str(target)]
+        assert cli.run_in_blender(options) == 2
+    assert own.read_bytes() == before

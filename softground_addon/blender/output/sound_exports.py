@@ -46,13 +46,13 @@ def write(
     Raises
     ------
     InputError
-        If there is no bake or it has no events, the folder has no recordings, there is no camera, or the file cannot
-        be written.
+        If there is no bake or it has no events, the folder has no recordings or the file is one of them, there is no
+        camera, or the file cannot be written.
     """
     rate = settings.frame_rate_of(scene)
     table = baked_ground.events_of(ground)
     footprints = {step.name: step.left for step in baked_ground.steps_of(ground) if step.left}
-    recordings = _recordings(samples) if samples else []
+    recordings = _recordings(samples, path) if samples else []
     steps = sound.steps_of(footprints, table, frame_rate=rate, first_frame=start)
     if stereo:
         steps = _seen_by_camera(scene, steps, footprints)
@@ -61,13 +61,17 @@ def write(
         partial.write_bytes(wave_file.dump(heard))
 
 
-def _recordings(folder: Path) -> list[tuple[str, np.ndarray]]:
-    """All WAV files of a folder, by name."""
+def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:
+    """All WAV files of a folder, by name; the sound is not to be written over one of them."""
     if not folder.is_dir():
         raise InputError(f"There is no folder '{folder}': choose one that holds WAV files of single steps.")
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".wav" and path.is_file())
     if not paths:
         raise InputError(f"There is no WAV file in '{folder}': choose a folder that holds recordings of single steps.")
+    if files.identity(target) in map(files.identity, paths):
+        raise InputError(
+            f"'{target.name}' is one of your own sounds and would be lost: choose a folder that holds them alone."
+        )
     return [(path.name, wave_file.read(path)) for path in paths]
 
 
