@@ -16,6 +16,7 @@ from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking import root_motion
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
+from softground_addon.blender.reading import analysis
 from tests.blender import fingerprints, responders, shots
 from tests.tiers import slow_but_one
 
@@ -58,6 +59,7 @@ def test_walks_get_the_speed_that_they_have_with_their_travel(scene, speed, hips
     strides = round(2 * gait.stride_time(Body()) * rate) / rate  # whole ones: hips surge within a stride
     travelling = walk(Body(), gait, round(strides * rate) + 1, rate)
     armature = on_the_spot(scene, travelling, speed, rate, hips_held=hips_held)
+    assert np.linalg.norm(analysis.read(scene).belts["Walker"]) == pytest.approx(speed, rel=WITHIN), "Walk Ahead"
     assert bpy.ops.softground.root_motion() == {"FINISHED"}
     assert root_motion.speed_of(armature) == pytest.approx(speed, rel=WITHIN)
     assert speed_of(scene, armature) == pytest.approx(speed, rel=WITHIN)

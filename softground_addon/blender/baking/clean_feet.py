@@ -14,7 +14,8 @@ from ...core.errors import InputError
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
-from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds
+from ...core.numerics.intervals import runs
+from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, standing
 from ...core.response.foot_lock import rim
 from ...core.response.grounding import leg_soles, responding
 from ...core.response.response import at_scene_frames, gaps
@@ -101,14 +102,16 @@ def _cleaned(
     for (motion, of_character, asked), rig in zip(rigged, shot.rigs, strict=True):
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        stands = yield from meanwhile(now, standing.slices(motion, touching, shot.terrain, asked.holds))
         response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds))
         missed += [
             f"'{hold.foot}' of '{motion.name}' is not planted at frame {hold.frame:g}: its foot lock was left out."
             for hold in missed_holds(motion, touching, asked.holds)
         ]
+        missed += _travels(motion, touching & ~stands)
         after = responding(motion, response)
         for when, moved in (("before", motion), ("after", after)):
-            faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain))
+            faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain, stands))
             feet[when][motion.name] = _statistics(faults)
         made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), rim))
         left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), rim))
@@ -135,6 +138,19 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
             f"'{motion.name}' walks on the spot, and planted feet would overstretch its legs: press Root Motion "
             "first, or key its travel."
         )
+
+
+def _travels(motion: CharacterMotion, travels: NDArray[np.bool_]) -> list[str]:
+    """What is said of feet that travel (F, S) along the floor."""
+    said = []
+    for sole, during in zip(motion.soles, travels.T, strict=True):
+        ways = ", ".join(f"{motion.frames[a]:g}-{motion.frames[b - 1]:g}" for a, b in zip(*runs(during), strict=True))
+        if ways:
+            said.append(
+                f"'{sole.sole.name}' of '{motion.name}' travels along the floor at frames {ways}, and was not held "
+                "there: hold it by a foot lock if it should stand."
+            )
+    return said
 
 
 def _left_out(wanted: BakeSettings, shot: Shot) -> tuple[str, ...]:

@@ -30,8 +30,9 @@ from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import check_cell_size, pressed_area
 from ...core.loads.estimate import CharacterLoads
-from ...core.loads.sliding import treadmill_velocity
+from ...core.loads.sliding import treadmill_speed
 from ...core.record.typical_depth import typical_of
+from ...core.response.root_motion import travel_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..ground import ground_mesh
@@ -79,9 +80,12 @@ class Analysis:
 
     @cached_property
     def belts(self) -> dict[str, Array]:
-        """Velocity of the belt on which each character walks on the spot, by its name, (2,) [m/s]."""
-        known = {one.motion.name: treadmill_velocity(one.motion, one.contacts) for one in self.loads}
-        return {name: velocity for name, velocity in known.items() if velocity.any()}
+        """Velocity of the belt on which each character walks on the spot, by its name, (2,) [m/s]: as Root Motion's."""
+        return {
+            one.motion.name: -travel_velocity(one.motion, one.contacts.touching, self.shot.terrain)
+            for one in self.loads
+            if treadmill_speed(one.motion, one.contacts) > 0
+        }
 
 
 _known: dict[int, Analysis] = {}

@@ -23,6 +23,7 @@ def treadmill_velocity(motion: CharacterMotion, contacts: Contacts) -> NDArray[n
     (2,) float array
         Horizontal: of the soles while they touch, the median. Feet that slide no faster than a standing one may
         (`contacts.REST_SPEED`) stand still; on skates and skis the body goes with them, and in a sprint ahead of them.
+        Where the body travels by more than half of what its feet slide back against it, as with Root Motion, they slip.
     """
     if motion.centre is not None or len(motion.frames) < 2:
         return np.zeros(2)
@@ -37,7 +38,8 @@ def treadmill_velocity(motion: CharacterMotion, contacts: Contacts) -> NDArray[n
     hips = motion.hips[[0, -1], :2]
     body = (hips[1] - hips[0]) / (motion.time_step * (len(motion.frames) - 1))
     moves = np.linalg.norm(belt) > REST_SPEED * motion.froude_speed
-    return belt * (moves and (belt - body) @ belt > belt @ belt / 2)
+    walked = belt - body
+    return belt * (moves and walked @ belt > max(belt @ belt, walked @ walked) / 2)
 
 
 def treadmill_speed(motion: CharacterMotion, contacts: Contacts) -> float:

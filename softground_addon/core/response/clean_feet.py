@@ -14,7 +14,7 @@ from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
-from .foot_lock import lock, moved, rim, slides, underside_on
+from .foot_lock import lock, moved, rim, slides, travelling, underside_on
 from .foot_placement import Placement, place_sole, posed_points
 from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
 
@@ -46,6 +46,18 @@ class FootFaults:
 
 
 @sliced
+def standing(motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: Sequence[FootHold] = ()) -> Slices[Mask]:
+    """When the legs' soles are to stand still, (F, S): while they touch and do not travel on purpose; see `clean`."""
+    floor, stands = GroundHistory(terrain), touching.copy()
+    for number in leg_soles(motion).values():
+        yield
+        sole, touches = motion.soles[number], touching[:, number]
+        travels = travelling(underside_on(sole, floor, motion.frames), touches, motion)
+        stands[:, number] = HeldContacts.of(holds, sole.sole.name, motion.frames, touches).standing(travels)
+    return stands
+
+
+@sliced
 def clean(
     motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: Sequence[FootHold] = ()
 ) -> Slices[Response]:
@@ -64,10 +76,11 @@ def clean(
     floor, frames = GroundHistory(terrain), motion.frames
     placements: dict[str, tuple[int, Placement]] = {}
     offsets = []
+    stands = yield from standing.slices(motion, touching, terrain, holds)
     for side, number in leg_soles(motion).items():
         sole, touches = motion.soles[number], touching[:, number]
         contacts = HeldContacts.of(holds, sole.sole.name, frames, touches)
-        held = contacts.held(frames)
+        held = contacts.held(frames, stands[:, number])
         yield
         turned = contacts.attitude(sole, floor, frames, held)
         first = place_sole(with_sole(motion, number, moved(sole, turned)), number, touches, floor, floor)
@@ -93,7 +106,7 @@ def clean(
         offsets.append((carried(carry, ankle) - ankle)[:, :2])
     yield
     soles = [number for number, _ in placements.values()]
-    level = hips_go_along(motion, soles, offsets, touching, HIPS_TIME)
+    level = hips_go_along(motion, soles, offsets, stands, HIPS_TIME)
     upright = np.zeros((len(motion.frames), 2))
     return (yield from settle.slices(motion, placements, touching, upright, level=level, source_pace=True))
 
@@ -108,15 +121,18 @@ def missed_holds(motion: CharacterMotion, touching: Mask, holds: Sequence[FootHo
 
 
 @sliced
-def foot_faults(motion: CharacterMotion, touching: Mask, terrain: Terrain) -> Slices[FootFaults]:
-    """How far the legs' soles slide, float and sink while they touch, by all points of their rims."""
+def foot_faults(
+    motion: CharacterMotion, touching: Mask, terrain: Terrain, stands: Mask | None = None
+) -> Slices[FootFaults]:
+    """How far the legs' soles float and sink while they touch (F, S), and slide while they stand (F, S), by default all
+    that time; by all points of their rims."""
     floor = GroundHistory(terrain)
     slid, gaps, frames = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for number in leg_soles(motion).values():
         yield
         sole, touches = motion.soles[number], touching[:, number]
         under = underside_on(sole, floor, motion.frames)
-        slid.append(slides(under, touches))
+        slid.append(slides(under, touches if stands is None else stands[:, number]))
         lowest = under.lowest()
         gaps.append(lowest[touches & np.isfinite(lowest)])
         frames.append(motion.frames[touches & np.isfinite(lowest)])

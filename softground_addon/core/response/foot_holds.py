@@ -68,6 +68,14 @@ class HeldContacts:
     contacts: tuple[tuple[slice, FootHold], ...] = ()
     missed: tuple[FootHold, ...] = ()
 
+    def standing(self, travels: Mask) -> Mask:
+        """When the foot is to stand still (F,): while it touches, but for when it travels (F,) in a contact that the
+        artist does not hold."""
+        stands = self.touching & ~travels
+        for during, _ in self.contacts:
+            stands[during] = self.touching[during]
+        return stands
+
     @staticmethod
     def of(holds: Sequence[FootHold], foot: str, frames: Array, touching: Mask) -> HeldContacts:
         """Those of a foot that touches (F,) at scene frames (F,); of two for one contact, the later in the list."""
@@ -83,9 +91,10 @@ class HeldContacts:
             found[number] = slice(int(starts[number]), int(ends[number])), hold
         return HeldContacts(touching, tuple(found[number] for number in sorted(found)), tuple(missed))
 
-    def held(self, frames: Array) -> Mask:
-        """When the foot is held, (F,): while it touches and is not eased; at one frame of each contact at least."""
-        held = self.touching.copy()
+    def held(self, frames: Array, standing: Mask) -> Mask:
+        """When the foot is held, (F,): while it stands (F,) and is not eased; at one frame of an eased contact at
+        least."""
+        held = standing.copy()
         for during, hold in self.contacts:
             since, until = frames[during] - frames[during][0], frames[during][-1] - frames[during]
             still = (since >= hold.ease_in) & (until >= hold.ease_out)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.motion import Sole, SoleMotion, SolePatch
+from ..loads.contacts import LEAVE_SPEED, REST_SPEED, TOUCH_SPEED
+from ..motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
 from .foot_placement import Pieces, PressedGround, between_contacts, posed_points
@@ -30,6 +31,8 @@ AXLE = 0.01
 """Points that bear within about this distance of each other are an axle, about which the foot may turn, in lengths."""
 TWIST = np.radians(25.0)
 """A foot that turns by more than this in one contact is meant to turn: it keeps its turn, about what bears [rad]."""
+TRAVEL = 0.15
+"""A foot that goes so far along the floor in a burst is meant to go there, in leg lengths (14 cm for an adult)."""
 STILL = 0.004
 """A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
 
@@ -212,6 +215,35 @@ def turned_level(turn: Array, points: Array) -> Array:
     cosine, sine = np.cos(turn), np.sin(turn)
     x, y = points[..., 0], points[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask:
+    """When a foot that touches goes along the floor on purpose, as in a lunge or on skates, (F,).
+
+    Somewhere on such a way it is faster than a foot that still touches and than half the body: one that skids, because
+    its walk is scaled wrongly, is slower than half the body. The way begins and ends where the foot stands, or with the
+    contact, and is no shorter than `TRAVEL`.
+
+    Parameters
+    ----------
+    sole : Underside
+    touching : (F,) bool array
+    motion : CharacterMotion
+        Whose sole it is, at the same frames.
+    """
+    body = np.linalg.norm(np.diff(motion.hips[:, :2], axis=0), axis=1)
+    unit = motion.froude_speed * motion.time_step
+    weight, found = sole.bearing(), np.zeros(len(touching), bool)
+    for first, end in zip(*runs(touching), strict=True):
+        step = rolled(sole.points[first:end, :, :2], weight[first:end])
+        length = np.linalg.norm(step, axis=1)
+        fast = length > np.maximum(LEAVE_SPEED * TOUCH_SPEED * unit, body[first : end - 1] / 2)
+        for start, stop in zip(*runs(length > REST_SPEED * unit), strict=True):
+            far = np.linalg.norm(np.cumsum(step[start:stop], axis=0), axis=1).max() > TRAVEL * motion.leg_length
+            if far and fast[start:stop].any():
+                begin, until = start + (start > 0), stop + (stop == len(step))
+                found[first + begin : first + max(until, begin + 1)] = True
+    return found
 
 
 def slides(sole: Underside, touching: Mask) -> Array:

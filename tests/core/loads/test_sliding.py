@@ -57,6 +57,14 @@ def test_feet_that_slide_forward_under_a_body_that_runs_ahead_are_on_no_belt():
     assert speed_of(carried(still, slide, hips=0.0 * slide)) == pytest.approx(1.2, rel=1e-6)
 
 
+def test_feet_that_slip_under_a_body_that_travels_are_on_no_belt():
+    motion = on_the_spot(walk(steps=6).motion)
+    speed = speed_of(motion)
+    ways = np.array([1.0, 0.0, 0.0]) * speed * np.array([0.7, 0.95, 1.2])[:, None]
+    assert [speed_of(carried(motion, way)) for way in ways] == [0.0] * 3
+    assert speed_of(carried(motion, ways[0] / 4)) == pytest.approx(speed - ways[0, 0] / 4, rel=0.05)
+
+
 def test_skates_that_take_the_body_along_are_no_belt():
     motion = walk(steps=1).motion
     still = replace(

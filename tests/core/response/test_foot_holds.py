@@ -11,7 +11,7 @@ from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.orientation import rotation_vectors
 from softground_addon.core.numerics.rigid import displacement, rotation
 from softground_addon.core.record.ground_history import GroundHistory
-from softground_addon.core.response.clean_feet import clean, missed_holds
+from softground_addon.core.response.clean_feet import clean, foot_faults, missed_holds, standing
 from softground_addon.core.response.foot_holds import MODES, FootHold, HeldContacts
 from softground_addon.core.response.foot_lock import underside_on
 from softground_addon.core.response.grounding import responding
@@ -53,6 +53,13 @@ def held(sliding, mode, **options):
     during = second_contact(*sliding)
     after = cleaned(sliding, FootHold("foot.L", sliding[0].frames[during][2], mode, **options))
     return after.soles[0].landmark_positions()[during], after.soles[0].transforms[during, 0]
+
+
+def along(sole, way):
+    """A sole that is carried by a way (F, 3) as well."""
+    poses = sole.transforms.copy()
+    poses[..., :3, 3] += way[:, None]
+    return replace(sole, transforms=poses)
 
 
 def level_travel(places):
@@ -116,11 +123,67 @@ def test_an_eased_contact_comes_to_rest_later_and_leaves_earlier(sliding):
     assert level_travel(eased[-3:, HEEL]) > 1e-3
 
 
+@pytest.fixture(scope="module")
+def lunging(sliding):
+    """The sliding walk with a left foot that goes 30 cm aside in six frames of its second contact, and stays there."""
+    motion, touching = sliding
+    at = second_contact(motion, touching).start + 5
+    part = np.clip((np.arange(len(motion.frames)) - at) / 6.0, 0.0, 1.0)
+    way = (part * part * (3 - 2 * part))[:, None] * (0.0, 0.3, 0.0)
+    joints = motion.joints | {f"{one}_l": motion.joints[f"{one}_l"] + way for one in ("ankle", "ball")}
+    left, right = motion.soles
+    return replace(motion, soles=(along(left, way), right), joints=joints), touching
+
+
+def test_a_foot_that_goes_along_the_floor_on_purpose_stands_before_and_after_and_gets_there(lunging):
+    motion, touching = lunging
+    during = second_contact(motion, touching)
+    stands = standing(motion, touching, FLOOR)
+    assert (touching & ~stands)[:, 1].sum() == 0, "the other foot stands"
+    gone = np.flatnonzero(touching[:, 0] & ~stands[:, 0]) - during.start
+    assert (gone[0], gone[-1]) == pytest.approx((6, 10), abs=1)
+    after = cleaned(lunging)
+    places = after.soles[0].landmark_positions()[during, HEEL]
+    assert places[-1, 1] - places[0, 1] == pytest.approx(0.3, abs=0.04)
+    assert foot_faults(after, touching, FLOOR, stands).slide.max() < 3e-3
+    assert foot_faults(motion, touching, FLOOR, stands).slide.max() > 0.02
+    assert foot_faults(after, touching, FLOOR).penetration.max() < 1e-6, "it is on the floor all the way"
+
+
+def test_a_foot_lock_holds_what_travels(lunging):
+    motion, touching = lunging
+    during = second_contact(motion, touching)
+    hold = FootHold("foot.L", motion.frames[during][2], "FULL")
+    np.testing.assert_array_equal(standing(motion, touching, FLOOR, (hold,)), touching)
+    places = cleaned(lunging, hold).soles[0].landmark_positions()[during]
+    assert np.abs(places - places[0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("skid", [-0.3, 0.3])
+def test_a_walk_that_skids_as_its_travel_is_scaled_wrongly_is_held(sliding, skid):
+    motion, touching = sliding
+    way = skid * (motion.hips - motion.hips[0]) * (1.0, 0.0, 0.0)
+    soles = tuple(along(sole, way) for sole in motion.soles)
+    scaled = replace(motion, soles=soles, joints={name: path + way for name, path in motion.joints.items()})
+    np.testing.assert_array_equal(standing(scaled, touching, FLOOR), touching)
+
+
+def test_skates_are_let_go():
+    motion, touching = walk()
+    way = np.arange(len(motion.frames))[:, None] / motion.frame_rate * (2.0, 0.0, 0.0)
+    still = (replace(sole, transforms=np.repeat(sole.transforms[:1], len(way), axis=0)) for sole in motion.soles)
+    joints = {name: path[:1] + way for name, path in motion.joints.items()}
+    skating = replace(motion, soles=tuple(along(sole, way) for sole in still), joints=joints)
+    touching = np.ones_like(touching)
+    assert not standing(skating, touching, FLOOR).any()
+    assert clean(skating, touching, FLOOR).is_none
+
+
 def test_easing_that_is_longer_than_the_contact_holds_one_frame():
     touching = np.array([False, True, True, True, True, False])
     frames = np.arange(6.0)
     contacts = HeldContacts.of([FootHold("f", 2, ease_in=9, ease_out=9)], "f", frames, touching)
-    assert contacts.held(frames).sum() == 1
+    assert contacts.held(frames, touching).sum() == 1
 
 
 def test_holds_that_hold_nothing_are_told(sliding):
