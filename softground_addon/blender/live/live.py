@@ -28,7 +28,7 @@ SOON = 0.05
 PAUSE = 0.005
 """Time that is left to everything else between two parts of an answer [s]."""
 PART = 0.025
-"""What a part of an answer takes, beside the frame that is being pressed when it is over [s]."""
+"""What a part of an answer takes of the processor, beside the frame that is being pressed when it is over [s]."""
 LONGEST_PART = 0.05
 """What it may take where drawing between two parts takes as long [s]."""
 

@@ -120,13 +120,19 @@ class LiveMode:
 
         Who drags a slider sees the newest steps follow: only what comes after these is begun anew with each setting.
 
+        Parameters
+        ----------
+        scene : bpy.types.Scene
+        seconds : float
+            Of the processor [s]: where other programs take their share of it, Blender draws no oftener for that.
+
         Raises
         ------
         InputError
             If the shot cannot be read any more.
         """
         try:
-            return self._answer(scene, time.perf_counter() + seconds)
+            return self._answer(scene, time.thread_time() + seconds)
         finally:
             self.answered_at = time.perf_counter()
 
@@ -142,7 +148,7 @@ class LiveMode:
         while self._answering is not None:
             if next(self._answering, _ENDED) is _ENDED:
                 self._answering, self._can_start_over = None, True
-            elif time.perf_counter() > until:
+            elif time.thread_time() > until:
                 return True
         return False
 
@@ -214,9 +220,11 @@ class LiveMode:
         while newest.advance(shown):
             yield
         if ground := self._object(self.current_scene()):
-            windows = [*self._playhead.ground.tile_windows(), *newest.ground.tile_windows(), *self._drawn_over]
+            changed = [*self._playhead.changed_since(since), *newest.changed_since(since)]
+            windows = [*changed, *self._drawn_over]
             self._ground.show(ground, newest, windows, asked.material.blur_sigma, asked.frame_rate)
-            self._drawn_over = windows
+            self._drawn_over = changed
+            yield
 
     def _presses_like(self, known: analysis.Analysis, asked: BakeSettings) -> bool:
         """Whether the ground that is shown need not be pressed again."""

@@ -136,6 +136,11 @@ class Playhead:
         began = [_began_last(self.frame, character) for character in self._loads]
         return max(first, self.frame - NEWEST, np.floor(min(began, default=first)) - 1.0)
 
+    def changed_since(self, frame: float) -> list[Window]:
+        """Where the ground that is shown may differ from what it was at a scene frame."""
+        shown = self._changes[: self._shown + 1]
+        return [window for change in shown if change.frame > frame for window in change.windows]
+
     def pressed_anew(self, frame: float, loads: Sequence[CharacterLoads], ground: SoftGround) -> Playhead:
         """A playhead that goes on from this one's ground at an earlier scene frame, under other loads or with another
         material: what is under way at that frame, and what follows, is pressed anew, what came before stays."""

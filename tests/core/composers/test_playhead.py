@@ -87,6 +87,19 @@ def test_the_newest_steps_are_pressed_anew_onto_what_lies_there(loads):
             assert depths[0] == depths[2]
 
 
+def test_the_ground_differs_from_an_earlier_frame_only_where_it_is_said_to(loads):
+    playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
+    first, last = loads.motion.frames[[0, -1]]
+    for frame in (first, (first + last) / 2, last):
+        playhead.go_to(frame)
+        earlier = playhead.ground.copy()
+        playhead.go_to(last)
+        for window in playhead.changed_since(frame):
+            earlier.write(window, playhead.ground.read(window))
+        assert state(earlier) == state(playhead.ground)
+    assert playhead.changed_since(last) == []
+
+
 def test_newest_steps_begin_where_the_last_two_feet_came_down(loads):
     playhead = Playhead([loads], SoftGround(FlatTerrain(), SNOW), CELL)
     playhead.go_to(80.0)

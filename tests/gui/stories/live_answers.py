@@ -38,10 +38,11 @@ def tell(hand: Hand, facts: dict) -> Steps:
             now = heights()
             seen.append([float(now[newest].min()), float(now[oldest].min())])
             yield _
-        let_go = time.perf_counter()
+        let_go, before_it = time.perf_counter(), len(parts)
         facts["while dragged"] = seen
         yield from hand.wait_for(lambda: not answering(), 10)
         facts["seconds after letting go"] = time.perf_counter() - let_go
+        facts["parts after letting go"] = parts[before_it:]
     facts["parts"] = sorted(parts, reverse=True)[:8]
     facts["number of parts"] = len(parts)
     facts["depth"] = [depth, scene().softground.depth_cm]
@@ -71,7 +72,7 @@ def answering():
 
 
 class parts_timed:  # noqa: N801
-    """What the parts of an answer take of the processor [s]."""
+    """What the parts of an answer take of the processor, in the order in which they are done [s]."""
 
     def __enter__(self) -> list[float]:
         mode, self.parts = live()._mode, []
