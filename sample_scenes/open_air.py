@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import atan, pi, radians
 
 import bpy
@@ -66,10 +66,15 @@ def rolling(swell: float, hills: float, seed: int = 0) -> terrain.Field:
 
 
 def add_ground(
-    scene: bpy.types.Scene, name: str, along: tuple[float, float], height: terrain.Field, surface: str
+    scene: bpy.types.Scene,
+    name: str,
+    along: tuple[float, float],
+    height: terrain.Field,
+    surface: str,
+    painted: Mapping[str, terrain.Field] | None = None,
 ) -> bpy.types.Object:
     """Ground to the horizon, even around the way and from one y to another `along` it [m]."""
-    return terrain.add_terrain(name, places(-NEAR, NEAR), places(*along), height, surface, scene.collection)
+    return terrain.add_terrain(name, places(-NEAR, NEAR), places(*along), height, surface, scene.collection, painted)
 
 
 def bake_walk(
@@ -209,53 +214,20 @@ def _water() -> bpy.types.Material:
     return material
 
 
-def add_conifers(
-    spots: Array, heights: Array, ground: terrain.Field, colour: tuple[float, float, float], seed: int = 0
-) -> None:
-    """Firs on a ground: whorls of drooping twigs around a stem."""
-    shapes = [_conifer(np.random.default_rng(seed + number), colour) for number in range(4)]
-    turn = np.random.default_rng(seed)
-    for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
-        tree = bpy.data.objects.new("Fir", shapes[number % len(shapes)])
-        tree.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.02 * height)
-        tree.rotation_euler.z = turn.uniform(0, 2 * pi)
-        tree.scale = (height, height, height)
-        bpy.context.scene.collection.objects.link(tree)
-
-
-def _conifer(chance: np.random.Generator, colour: tuple[float, float, float]) -> bpy.types.Mesh:
-    """A fir of height 1: twigs as bent triangles, whorl over whorl."""
-    whorls = np.linspace(0.10, 0.985, 34)
-    vertices, faces = [], []
-    for z in whorls:
-        reach = 0.20 * (1.0 - z) ** 0.85 + 0.008
-        for angle in np.arange(0, 2 * pi, 2 * pi / 13) + chance.uniform(0, 2 * pi):
-            length = reach * chance.uniform(0.65, 1.1)
-            ahead = np.array((np.cos(angle), np.sin(angle), 0.0))
-            aside = np.array((-ahead[1], ahead[0], 0.0)) * 0.28 * length
-            middle = ahead * 0.55 * length + (0.0, 0.0, z + 0.05 * length)
-            tip = ahead * length + (0.0, 0.0, z - chance.uniform(0.25, 0.45) * length)
-            first = len(vertices)
-            vertices += [(0.0, 0.0, z + 0.02), tuple(middle + aside), tuple(tip), tuple(middle - aside)]
-            faces.append((first, first + 1, first + 2, first + 3))
-    stem = len(vertices)
-    vertices += [(0.012, 0, 0), (-0.006, 0.01, 0), (-0.006, -0.01, 0), (0, 0, 1.0)]
-    faces += [(stem, stem + 1, stem + 3), (stem + 1, stem + 2, stem + 3), (stem + 2, stem, stem + 3)]
-    mesh = bpy.data.meshes.new("Fir")
-    mesh.from_pydata(vertices, [], faces)
-    mesh.materials.append(stage.plain_material("SoftGround Sample fir", colour, 0.9))
-    return mesh
-
-
 def add_grass(spots: Array, heights: Array, ground: terrain.Field, seed: int = 0) -> None:
     """Tufts of bent blades on a ground, at places (N, 2), so high (N,) [m]."""
     chance = np.random.default_rng(seed)
-    shapes = [_tuft(chance) for _ in range(5)]
+    shapes = tufts(chance)
     for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
         tuft = bpy.data.objects.new("Grass", shapes[number % len(shapes)])
         tuft.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.01)
         tuft.rotation_euler.z, tuft.scale = chance.uniform(0, 2 * pi), (height, height, height)
         bpy.context.scene.collection.objects.link(tuft)
+
+
+def tufts(chance: np.random.Generator) -> list[bpy.types.Mesh]:
+    """Grass of height about 1."""
+    return [_tuft(chance) for _ in range(5)]
 
 
 def _tuft(chance: np.random.Generator) -> bpy.types.Mesh:
@@ -286,7 +258,7 @@ _GLOW = 0.35
 
 
 def add_snowfall(camera: bpy.types.Object, count: int, aspect: float, seed: int = 0) -> bpy.types.Object:
-    """Flakes of 3 to 8 mm in the air that a camera sees, as one mesh of octahedra."""
+    """Flakes of 3 to 8 mm in the air that a camera sees, as one mesh of lumps, no two alike."""
     chance = np.random.default_rng(seed)
     depth = 0.7 + 26.0 * chance.random(count) ** 0.8
     half = np.tan(atan(18.0 / camera.data.lens))
@@ -294,15 +266,16 @@ def add_snowfall(camera: bpy.types.Object, count: int, aspect: float, seed: int 
     up = depth * half / aspect * chance.uniform(-1.1, 1.1, count)
     centres = np.column_stack([across, up, -depth])
     sizes = chance.uniform(0.0015, 0.0038, count)
-    corners = np.array([(1, 0, 0), (-1, 0, 0), (0, 1.6, 0), (0, -1.6, 0), (0, 0, 1), (0, 0, -1)], float)
-    sides = np.array([(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)])
-    vertices = (centres[:, None] + sizes[:, None, None] * corners).reshape(-1, 3)
+    corners, sides = stage.ball(2)
+    lumps = corners * chance.uniform(0.6, 1.15, (count, len(corners), 1))
+    vertices = (centres[:, None] + sizes[:, None, None] * lumps).reshape(-1, 3)
     faces = (np.arange(count)[:, None, None] * len(corners) + sides).reshape(-1, 3)
     world = np.array(camera.matrix_world)
     vertices = vertices @ world[:3, :3].T + world[:3, 3]
     high = np.repeat(vertices.reshape(count, -1, 3)[:, :, 2].min(axis=1) > 0.05, len(sides))
     mesh = bpy.data.meshes.new("Snowfall")
     mesh.from_pydata(vertices.tolist(), [], faces[high].tolist())
+    mesh.shade_smooth()
     flake = stage.plain_material("SoftGround Sample flake", (0.9, 0.9, 0.92), 0.7)
     shader = next(node for node in flake.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Emission Color"].default_value = (1.0, 0.95, 0.9, 1.0)

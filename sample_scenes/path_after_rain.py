@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage
+from sample_scenes import firs, open_air, production, stage
 from sample_scenes.production import Bake, Claim, Options
 from softground_addon.blender.ground import weather
 
@@ -58,7 +58,7 @@ def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
     chance = np.random.default_rng(5)
     sides = np.where(chance.random(140) < 0.5, -1.0, 1.0)
     spots = np.column_stack([sides * (9.0 + chance.gamma(1.6, 9.0, 140)), -chance.uniform(22.0, 110.0, 140)])
-    open_air.add_conifers(spots, chance.uniform(5.0, 14.0, len(spots)), HEIGHT, (0.014, 0.020, 0.012))
+    firs.add_firs(spots, chance.uniform(5.0, 14.0, len(spots)), HEIGHT, (0.042, 0.060, 0.036))
     sides = np.where(chance.random(TUFTS) < 0.5, -1.0, 1.0)
     spots = np.column_stack(
         [sides * (0.75 + chance.gamma(1.3, 1.9, TUFTS)), 2.0 - chance.uniform(0.0, 1.0, TUFTS) ** 1.6 * 24]

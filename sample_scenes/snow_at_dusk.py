@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage
+from sample_scenes import firs, open_air, production, stage
 from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
@@ -20,6 +20,7 @@ FRAMES = 300
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
 FLAKES = 6000
+_SKY = (radians(4.5), 2.4)  # pale at the horizon, where a lower sun makes it mustard
 HEIGHT = open_air.rolling(swell=0.16, hills=26.0, seed=3)
 
 
@@ -52,15 +53,15 @@ def shoot(_built: SnowAtDusk, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would kneel beside the first steps."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(28), radians(6.5), (1.0, 0.62, 0.42), 6.5, 0.24)
+    open_air.add_low_sun(scene, radians(28), radians(6.5), (1.0, 0.60, 0.39), 6.5, 0.13, _SKY)
     chance = np.random.default_rng(5)
-    spots = np.column_stack([chance.normal(0.0, 60.0, 90), -chance.uniform(48.0, 120.0, 90)])
+    spots = np.column_stack([chance.normal(0.0, 75.0, 190), -chance.uniform(48.0, 150.0, 190)])
     spots = spots[np.abs(spots[:, 0] + 2.0) > 7.0]
     unseen = np.column_stack([chance.uniform(-60.0, -16.0, 9), chance.uniform(-26.0, -2.0, 9)])
     spots = np.concatenate([spots, unseen])  # which throw shadows into the picture
-    open_air.add_conifers(spots, chance.uniform(4.0, 11.0, len(spots)), HEIGHT, (0.018, 0.028, 0.030))
+    firs.add_firs(spots, chance.uniform(4.0, 11.0, len(spots)), HEIGHT, (0.034, 0.056, 0.040), snow=0.7)
     open_air.add_snowfall(scene.camera, FLAKES, PICTURE[0] / PICTURE[1])
-    scene.view_settings.exposure = 1.15
+    scene.view_settings.exposure = 0.9
     path = folder / "snow_at_dusk.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]

@@ -10,6 +10,7 @@ from math import atan2, cos, pi, radians, sin
 from pathlib import Path
 from typing import Any
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -143,6 +144,17 @@ def plain_material(name: str, colour: tuple[float, float, float], roughness: flo
         shader.inputs["Roughness"].default_value = roughness
         material.diffuse_color = (*colour, 1.0)
     return material
+
+
+def ball(fineness: int) -> tuple[Array, NDArray[np.intp]]:
+    """Corners (V, 3) and triangles (F, 3) of a ball of radius 1: 42 corners at a fineness of 2."""
+    round_body = bmesh.new()
+    try:
+        bmesh.ops.create_icosphere(round_body, subdivisions=fineness, radius=1.0)
+        faces = [[vertex.index for vertex in face.verts] for face in round_body.faces]
+        return np.array([vertex.co for vertex in round_body.verts]), np.array(faces)
+    finally:
+        round_body.free()
 
 
 def add_arrow(
