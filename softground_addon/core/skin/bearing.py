@@ -123,12 +123,15 @@ def without_glimpses(bears: Mask, tracks: PartTracks) -> Mask:
     Such a foot is about to land, or has just lifted.
     """
     longest = max(round(GLIMPSE * tracks.rate), 2)
-    seen = bears.copy()
+    seen, rise = bears.copy(), tracks.rise
+    if tracks.loops:  # what goes on beyond the seam is not seen at this end
+        rise = rise.copy()
+        rise[[0, -1]] = np.abs(tracks.low[[1, -2]] - tracks.low[[0, -1]]) * tracks.rate
     for part in np.flatnonzero(bears.any(axis=0)):
         intervals = list(zip(*runs(bears[:, part]), strict=True))
         for first, last in intervals if len(intervals) > 1 else ():
             at_end = last - first <= longest and (first == 0 or last == len(bears))
-            rests = tracks.rise[first:last, part].min() < CALM_SPEED
+            rests = rise[first:last, part].min() < CALM_SPEED
             seen[first:last, part] = rests or not at_end
         if not seen[:, part].any():
             seen[:, part] = bears[:, part]

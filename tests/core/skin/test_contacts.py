@@ -214,6 +214,22 @@ def test_the_last_moments_show_a_contact_where_the_foot_rests_in_them(pace: floa
     assert (without_glimpses(only, tracks) == only).all()
 
 
+@pytest.mark.parametrize("ends", [slice(0, 2), slice(-2, None)])
+def test_a_loop_that_begins_or_ends_in_mid_step_shows_no_step_in_that_moment(ends: slice) -> None:
+    """The last pose is the first: a foot that stands over the seam is seen to rest on one side of it alone."""
+    low = np.full(26, 0.2)
+    low[:5] = 0.001
+    low[-2:] = 0.008, 0.001
+    low = low[::-1] if ends.start == 0 else low
+    around = np.concatenate([low[-2:-1], low, low[1:2]])
+    rise = np.minimum(*np.abs([low - around[:-2], around[2:] - low])) * 24
+    still = np.zeros((2, 26, 1, 2))
+    tracks = PartTracks(low[:, None], still[0], rise[:, None], still, 0.25, 24.0, loops=True)
+    seen = without_glimpses(bearing(tracks, 0.0, np.zeros(2)), tracks)[:, 0]
+    assert seen.sum() == 5
+    assert not seen[ends].any()
+
+
 def run_on_the_spot(stance: int, rest: np.ndarray, pace: float, base: float = 0.0) -> PartTracks:
     """One foot over 60 frames that stands `stance` of 10 on a belt of 2 H/s, and is `rest` high in the others, as calm.
 
