@@ -141,6 +141,20 @@ class NodeGraph:
         self.link(value, node.inputs["Value"])
         return node.outputs["Geometry"]
 
+    def captured(self, geometry: Any, *numbers: Number, kind: str = "FLOAT") -> tuple[Any, list[Number]]:
+        """The geometry with numbers or vectors that are worked out together and once, and these as it has them."""
+        node = self.node("GeometryNodeCaptureAttribute", domain="POINT")
+        names = [f"Value {count}" for count in range(len(numbers))]
+        if [item.name for item in node.capture_items] != names:
+            if self._known is not None:
+                raise OtherGraphError
+            for name in names:
+                node.capture_items.new(kind, name)
+        self.link(geometry, node.inputs["Geometry"])
+        for name, number in zip(names, numbers, strict=True):
+            self.link(number.socket, node.inputs[name])
+        return node.outputs["Geometry"], [self.number(node.outputs[name]) for name in names]
+
     def forgotten(self, geometry: Any, *names: str) -> Any:
         """Without some attributes, so that nothing carries them on."""
         for name in names:

@@ -69,9 +69,6 @@ standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
 STANDING = "softground_weather_standing"
 """Depth of standing water without the bake's own [m], there only while the group works."""
 
-WORN = "softground_weather_worn"
-"""Compression and rim under the weather [m], there only while the group works."""
-
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
     (
@@ -184,9 +181,7 @@ def _fill(
     graph.next_row()
     geometry = group.outputs["Geometry"]
     changed = ground.stored(geometry, felt=felt)
-    changed = ground.moved(changed)
-    if matter.soaking:
-        changed = ground.flooded(changed, said["Water Table"] * 0.01)
+    changed = ground.moved(changed, said["Water Table"] * 0.01)
     if matter.wet:
         changed = ground.dried(changed, said["Halo"])
     graph.finish(graph.choose("GEOMETRY", course.is_any.socket, geometry, changed))
@@ -227,7 +222,7 @@ class _Vertices:
         self._trodden = graph.attribute(TRODDEN, "FLOAT_VECTOR")
 
     def stored(self, geometry: Any, *, felt: bool) -> Any:
-        """The geometry with what materials read, but for new snow and standing water; `felt` as in `build`."""
+        """The geometry with what is told before it moves: how wet it looks without puddles; `felt` as in `build`."""
         graph, acts, matter = self._graph, self._acts, self._matter
         wetness = self._course.around["wet"]
         if matter.wet:
@@ -238,41 +233,51 @@ class _Vertices:
             deep = graph.number(graph.attribute(COMPACTED)) * begun
             deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
             geometry = self._with(geometry, {COMPRESSION: deep}, acts["Snowfall"])
-        if matter.blown:
-            geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, self._worn(geometry))
         return geometry
 
-    def moved(self, geometry: Any) -> Any:
-        """The geometry under new snow and as high as the weather has it, but for standing water."""
+    def moved(self, geometry: Any, table: Number) -> Any:
+        """The geometry as high as the weather has it, under new snow and water, looking no more trodden than it is.
+
+        `table` is how far below the brims of hollows water comes by itself [m].
+        """
         graph, acts, matter = self._graph, self._acts, self._matter
-        snow, fresh = acts["Snowfall"], graph.number(graph.attribute(FRESH))
+        rounded, relief = self._rounded(), self._relief()
         cover = self._around("cover", self._not_full(self._inside))
-        geometry = self._with(geometry, {FRESH: cover * (1.0 / COVERED)}, snow)
-        relief = self._relief()
-        change = self._rounded()
+        change = rounded.where(acts["Snowfall"], acts["Temperature"], acts["Rain"])
+        worn: dict[str, Number] = {}
         if matter.blown:
-            change = change + (relief * self._number(self._course.aged["filled"], self._moment)).where(acts["Wind"])
-        change = change.where(acts["Snowfall"], acts["Temperature"], acts["Wind"], acts["Rain"])
-        height = change + (fresh * COVERED).where(snow)
+            filled = self._number(self._course.aged["filled"], self._moment)
+            change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
+            trodden = (graph.number(graph.attribute(name)) * (filled + 1.0) for name in (COMPRESSION, RIM))
+            worn = dict(zip((COMPRESSION, RIM), w.worn(*trodden, rounded), strict=True))
+        height = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
             left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
             height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
-        geometry = graph.put_higher(geometry, self._up, height.socket)
-        return self._with(geometry, {FRESH: fresh.within_one()}, snow)
+        fresh = (cover * (1.0 / COVERED)).within_one()
+        # Once and together, as each node works out all that it asks for anew.
+        geometry, (height, fresh, *left) = graph.captured(geometry, height, fresh, *worn.values())
+        if worn:
+            geometry = self._with(geometry, dict(zip(worn, left, strict=True)), acts["Wind"])
+        geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
+        if not matter.soaking:
+            return graph.put_higher(geometry, self._up, height.socket)
+        floods = acts["Rain"] + acts["Water Table"]
+        geometry = graph.choose("GEOMETRY", floods.socket, geometry, self._flooded(geometry, table, relief + height))
+        standing = graph.number(graph.attribute(STANDING)).where(floods)
+        geometry = graph.put_higher(geometry, self._up, (height + standing).socket)
+        return graph.choose("GEOMETRY", floods.socket, geometry, graph.forgotten(geometry, STANDING))
 
-    def flooded(self, geometry: Any, table: Number) -> Any:
-        """The geometry with water in the hollows; `table` is how far below their brims it comes by itself [m]."""
-        graph, acts = self._graph, self._acts
-        hollows = graph.attribute(FILLED, "INT")
-        wet = graph.store(geometry, STANDING, self._standing(table).socket, hollows)
+    def _flooded(self, geometry: Any, table: Number, relief: Number) -> Any:
+        """The geometry that knows of the water in the hollows of its relief, and is not under it yet."""
+        graph, hollows = self._graph, self._graph.attribute(FILLED, "INT")
+        wet = graph.store(geometry, STANDING, self._standing(table, relief).socket, hollows)
         standing = graph.number(graph.attribute(STANDING))
-        wet = graph.put_higher(wet, self._up, standing.socket, hollows)
         deepest = graph.number(graph.attribute(WATER)).at_least(standing)  # the bake's own water stays
         wet = graph.store(wet, WATER, deepest.socket, hollows)
         wetness = graph.number(graph.attribute(WETNESS)).at_least(standing.above(0.0))
-        wet = graph.forgotten(graph.store(wet, WETNESS, wetness.socket, hollows), STANDING)
-        return graph.choose("GEOMETRY", (acts["Rain"] + acts["Water Table"]).socket, geometry, wet)
+        return graph.store(wet, WETNESS, wetness.socket, hollows)
 
     def dried(self, geometry: Any, halo: Number) -> Any:
         """The geometry with how dry ground looks that is wet to begin with."""
@@ -284,23 +289,12 @@ class _Vertices:
             dried = dried.at_least((halo * near * pale).where(acts["Halo"]))
         return self._with(geometry, {DRIED: dried}, acts["Drying"], acts["Halo"])
 
-    def _worn(self, geometry: Any) -> Any:
-        """The geometry that looks no more trodden than it is: blown full, and with the edges that are left."""
-        graph, selection = self._graph, self._graph.attribute(MOMENT, "INT")
-        kept = self._number(self._kept, self._moment)
-        compression, rim = (graph.number(graph.attribute(name)) * kept for name in (COMPRESSION, RIM))
-        left = graph.combined(*(one.socket for one in w.worn(compression, rim, self._rounded())), 0.0)
-        geometry = graph.store(geometry, WORN, left, selection, "FLOAT_VECTOR")
-        for name, value in zip((COMPRESSION, RIM), graph.parts(graph.attribute(WORN, "FLOAT_VECTOR")), strict=False):
-            geometry = graph.store(geometry, name, value.socket, selection)
-        return graph.forgotten(geometry, WORN)
-
     def _rounded(self) -> Number:
         """What edges that are lost change the height by [m]."""
         return self._dot(self._blur, self._not_full(self._share), self._moment)
 
-    def _standing(self, table: Number) -> Number:
-        """Depth of water in hollows."""
+    def _standing(self, table: Number, relief: Number) -> Number:
+        """Depth of water in hollows of a relief [m]."""
         graph, course = self._graph, self._course
         capacity, above, left = graph.parts(graph.attribute(POOL, "FLOAT_VECTOR"))
         rise = graph.attribute(RISE, "FLOAT_VECTOR")
@@ -312,7 +306,7 @@ class _Vertices:
         brim = graph.number(graph.dot(rise, (1.0,) * POWERS))
         risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
         level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
-        return (level - above - self._relief()).at_least(0.0) * level.above(0.0)
+        return (level - above - relief).at_least(0.0) * level.above(0.0)
 
     def _thawed(self, left: Number) -> Number:
         """What has melted of snow of which so much would be left without [m]."""
