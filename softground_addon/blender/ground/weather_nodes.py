@@ -248,8 +248,8 @@ class _Vertices:
         if matter.blown:
             filled = self._number(self._course.aged["filled"], self._moment)
             change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
-            trodden = (graph.number(graph.attribute(name)) * (filled + 1.0) for name in (COMPRESSION, RIM))
-            worn = dict(zip((COMPRESSION, RIM), w.worn(*trodden, rounded), strict=True))
+            compression, rim = (graph.number(graph.attribute(name)) * (filled + 1.0) for name in (COMPRESSION, RIM))
+            worn = dict(zip((COMPRESSION, RIM), w.worn(compression, rim, rounded), strict=True))
         height = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
@@ -257,9 +257,9 @@ class _Vertices:
             height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
         fresh = (cover * (1.0 / COVERED)).within_one()
         # Once and together, as each node works out all that it asks for anew.
-        geometry, (height, fresh, *left) = graph.captured(geometry, height, fresh, *worn.values())
+        geometry, (height, fresh, *looks) = graph.captured(geometry, height, fresh, *worn.values())
         if worn:
-            geometry = self._with(geometry, dict(zip(worn, left, strict=True)), acts["Wind"])
+            geometry = self._with(geometry, dict(zip(worn, looks, strict=True)), acts["Wind"])
         geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
         if not matter.soaking:
             return graph.put_higher(geometry, self._up, height.socket)
