@@ -382,6 +382,14 @@ def test_a_ground_that_changes_over_time_is_told_of_before_any_bake(shot):
     assert labels(panels._changing_ground, options) == ["'Swell' changes its shape", "Taken as it is at frame 7"]
 
 
+@pytest.mark.parametrize(
+    ("typical", "deepest", "shown"), [(0.04, 0.062, "4.0 cm, up to 6.2 cm"), (0.0618, 0.062, "6.2 cm")]
+)
+def test_a_depth_that_all_steps_share_is_told_once(typical, deepest, shown):
+    summary = {"steps": 6, "peak_force_n": 900.0, "typical_depth_m": typical, "max_depth_m": deepest}
+    assert labels(bake_result._result, summary) == ["Steps", "6, up to 900 N", "Depth", shown]
+
+
 def test_what_a_bake_warns_of_stays_in_the_panel_until_the_bake_goes(shot):
     def buttons():
         layout = MagicMock()

@@ -29,9 +29,10 @@ def _result(layout: Any, summary: Any) -> None:
     """What the bake that is on the ground came to."""
     box = layout.box().column(align=True)
     deepest = summary["max_depth_m"]
+    typical, most = (f"{depth * 100:.1f} cm" for depth in (summary.get(bake_report.TYPICAL, deepest), deepest))
     rows = (
         ("Steps", f"{summary['steps']:.0f}, up to {summary['peak_force_n']:,.0f} N"),
-        ("Depth", f"{summary.get(bake_report.TYPICAL, deepest) * 100:.1f} cm, up to {deepest * 100:.1f} cm"),
+        ("Depth", typical if typical == most else f"{typical}, up to {most}"),
     )
     for label, value in rows:
         row = box.split(factor=0.3)
