@@ -18,7 +18,8 @@ class Layout:
 
 
 def redraw(context):
-    """Ask all that a redraw with everything open, and an edit before it, ask."""
+    """Ask all that a redraw with everything open, and an edit before it, ask, in one turn of Blender's."""
+    bpy.app.timers.register(prediction.look_anew)
     for cls in registration.CLASSES:
         is_shown = not hasattr(cls, "poll") or cls.poll(context)
         if is_shown and issubclass(cls, bpy.types.Panel):
@@ -28,6 +29,8 @@ def redraw(context):
     prediction.of(context.scene)  # the overlay's
     handlers.notice_edits(context.scene, context.view_layer.depsgraph)
     handlers.follow_frame(context.scene, context.view_layer.depsgraph)
+    bpy.app.timers.unregister(prediction.look_anew)
+    prediction.look_anew()
 
 
 def least_seconds(action, *arguments, count=100):

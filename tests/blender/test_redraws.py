@@ -1,9 +1,13 @@
 """What is asked at each redraw does not depend on how much there is in the file."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import pytest
 
+from softground_addon.blender import settings
 from softground_addon.blender.after import debris_object
+from softground_addon.blender.interface import prediction
 from softground_addon.blender.settings import exists
 from tests.blender import grounds, responders
 from tests.blender.redraws import empty, fill, least_seconds, redraw, walk_over_all_objects
@@ -61,6 +65,19 @@ def test_nothing_that_is_asked_at_a_redraw_walks_over_all_objects(short_walk, se
         empty()
         redraw(bpy.context)
     assert min(longer) < 1 / 5
+
+
+def test_a_redraw_takes_the_settings_down_once(short_walk, monkeypatch):
+    baked_on_a_copy(short_walk)
+    bpy.ops.softground.predict_depth()
+    snapshot = MagicMock(side_effect=settings.snapshot)
+    monkeypatch.setattr(settings, "snapshot", snapshot)
+    redraw(bpy.context)
+    assert snapshot.call_count == 1
+    short_walk.softground.material.youngs_modulus *= 2
+    redraw(bpy.context)
+    assert snapshot.call_count == 2
+    assert not prediction.of(short_walk).is_current
 
 
 def test_who_is_deleted_in_the_viewport_and_comes_back_is_there_again(scene):

@@ -8,6 +8,7 @@ from ...core.settings import BakeSettings
 from .. import session, settings
 from ..baking import bake_report
 from ..ground import weather
+from . import prediction
 from .prediction import SOON
 
 WAIT = 0.3
@@ -19,7 +20,8 @@ _compared: dict[int, BakeSettings] = {}
 
 def watch(scene: bpy.types.Scene) -> None:
     """Have the bake compared soon if the settings are others now: operators that set some tell nobody."""
-    if _compared.get(scene.session_uid) != _asked(scene) and not bpy.app.timers.is_registered(compare_bake):
+    is_another = _compared.get(scene.session_uid) != weather.felt(prediction.asked(scene))
+    if is_another and not bpy.app.timers.is_registered(compare_bake):
         bpy.app.timers.register(compare_bake, first_interval=SOON)
 
 
@@ -33,16 +35,12 @@ def compare_bake() -> float | None:
     windows = bpy.context.window_manager.windows
     if windows:
         scene = windows[0].scene
-        _compared[scene.session_uid] = _asked(scene)
+        _compared[scene.session_uid] = weather.felt(settings.snapshot(scene))
         reasons = "\n".join(bake_report.stale_reasons(scene))
         if state.stale != reasons:
             state.stale = reasons
             session.redraw()
     return None
-
-
-def _asked(scene: bpy.types.Scene) -> BakeSettings:
-    return weather.felt(settings.snapshot(scene))
 
 
 def forget() -> None:

@@ -13,6 +13,7 @@ import bpy
 
 from ...core.composers.prediction import matching_modulus
 from ...core.errors import InputError
+from ...core.settings import BakeSettings
 from .. import jobs, session, settings
 from ..live import live
 from ..reading import analysis
@@ -70,9 +71,39 @@ class DepthPrediction:
     is_current: bool
 
 
+_seen: dict[int, tuple[BakeSettings, DepthPrediction | None]] = {}
+"""What the panel or overlay that asked first found, by session uid of the scene; the others are drawn in the same turn,
+in which nothing changes any more."""
+
+
 def of(scene: bpy.types.Scene) -> DepthPrediction | None:
     """The prediction for a scene whose shot is known; to be shown, and worked out soon where it is outdated."""
-    wanted = settings.snapshot(scene)
+    return _look(scene)[1]
+
+
+def asked(scene: bpy.types.Scene) -> BakeSettings:
+    """The settings of a scene as panels and overlay are drawn."""
+    return _look(scene)[0]
+
+
+def look_anew() -> None:
+    """Forget what was seen; for a timer, with which Blender's next turn begins."""
+    _seen.clear()
+
+
+def _look(scene: bpy.types.Scene) -> tuple[BakeSettings, DepthPrediction | None]:
+    """Look once in a turn."""
+    if not bpy.app.timers.is_registered(look_anew):
+        _seen.clear()
+        if not bpy.app.background:  # where there are no turns
+            bpy.app.timers.register(look_anew, persistent=True)
+    if scene.session_uid not in _seen:
+        wanted = settings.snapshot(scene)
+        _seen[scene.session_uid] = wanted, _prediction(scene, wanted)
+    return _seen[scene.session_uid]
+
+
+def _prediction(scene: bpy.types.Scene, wanted: BakeSettings) -> DepthPrediction | None:
     known = analysis.known(scene, wanted)
     if known is None:
         return None
@@ -155,8 +186,10 @@ def _work_out() -> float | None:
 
 def unregister() -> None:
     """Work nothing out any more."""
-    if bpy.app.timers.is_registered(_work_out):
-        bpy.app.timers.unregister(_work_out)
+    for timer in (_work_out, look_anew):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    _seen.clear()
     _working.clear()
     _aims.clear()
     _told.clear()
