@@ -38,8 +38,14 @@ MOTION_FILES = {
 
 
 def import_motion(name: str) -> bpy.types.Object:
+    """Import a motion file of the reference data into the open file, with `coarse` settings."""
+    import_file(MOTION_FILES[name])
+    coarse(bpy.context.scene)
+    return bpy.context.active_object
+
+
+def import_file(motion: MotionFile) -> None:
     """Import a motion file of the reference data into the open file; skips the test where it is not there."""
-    motion = MOTION_FILES[name]
     path = SHARED / motion.path
     if not path.is_file():
         pytest.skip(f"the reference data is not here: {path}")
@@ -51,8 +57,6 @@ def import_motion(name: str) -> bpy.types.Object:
         update_scene_fps=True,
         update_scene_duration=True,
     )
-    coarse(bpy.context.scene)
-    return bpy.context.active_object
 
 
 COARSE = 4.0

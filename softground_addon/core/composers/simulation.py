@@ -13,8 +13,8 @@ from ..errors import InputError
 from ..ground.heightfield import HeightField, Window
 from ..ground.soft_ground import SoftGround
 from ..loads.estimate import CharacterLoads
-from ..motion.motion import Sole, SoleMotion
-from ..numerics.intervals import runs
+from ..loads.tracks import tracks
+from ..motion.motion import Sole
 from ..pressing.contact_layout import ContactLayout
 from ..pressing.ground_cells import Timing, UndisturbedCells
 from ..pressing.open_contact import OpenContact
@@ -26,14 +26,6 @@ from ..record.contact_steps import ContactSteps, PressingSole, Steps, kept_sole,
 from ..record.footprints import Footprint
 
 Array = NDArray[np.float64]
-
-LONGEST_TRACK = 8.0
-"""Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
-
-LONGEST_SLIDE = 0.25
-"""How far a foot slides within one print, in body heights: further on, it is another place that it prints, ..."""
-SHORTEST_SLIDE = 0.08
-"""... if it takes as long for it [s]."""
 
 MOST_VERTICES = 20_000
 """Most vertices of a contact shape that is kept with its prints, so that they can be moved."""
@@ -228,48 +220,14 @@ def _is_kept(sole: Sole) -> bool:
 
 def _contacts(character: CharacterLoads, number: int, index: int, offset: int) -> Iterator[_Contact]:
     """The contacts of a sole of a character, which appears at a step of the time grid."""
-    motion = character.motion.soles[index]
-    skin = character.motion.skin
-    tracks = list(
-        _tracks(
-            motion,
-            character.contacts.touching[:, index],
-            furthest=LONGEST_SLIDE * skin.height if skin else np.inf,
-            shortest=SHORTEST_SLIDE / character.motion.time_step,
-        )
-    )
-    points = sole_points(motion.sole, motion.transforms) if tracks and not motion.sole.prop else None
-    pressing = kept_sole(motion.sole, flat_pose(motion.transforms)) if tracks and _is_kept(motion.sole) else None
-    for since, end in tracks:
-        begin = max(since, 1 - offset)  # the first step of the grid is a state, it presses nothing
-        if begin < end:
-            yield _Contact(
-                character, (number, index), slice(begin, end), since + offset, begin + offset, points, pressing
-            )
-
-
-def _tracks(
-    motion: SoleMotion, touching: NDArray[np.bool_], *, furthest: float, shortest: float
-) -> Iterator[tuple[int, int]]:
-    """First steps of the contacts, and the steps after their last; those of a body that travels far are cut.
-
-    Those of a foot that slides, in a gait on the spot or on skates, are cut into even pieces of at most `furthest` [m]
-    and on average at least `shortest` steps.
-    """
-    prop, place = motion.sole.prop, motion.transforms[:, 0, :2, 3]
-    for first, end in zip(*runs(touching), strict=True):
-        if prop is not None:
-            limit = LONGEST_TRACK * prop.extent.max()
-        else:
-            slide = float(np.abs(place[first:end] - place[first]).max())
-            pieces = min(np.ceil(slide / furthest), (end - first) // shortest)
-            limit = slide / pieces if pieces > 1 else np.inf
-        begin = int(first)
-        for step in range(begin + 1, int(end)):
-            if np.abs(place[step] - place[begin]).max() > limit:
-                yield begin, step
-                begin = step
-        yield begin, int(end)
+    motion, pieces = character.motion.soles[index], list(tracks(character, index))
+    points = sole_points(motion.sole, motion.transforms) if pieces and not motion.sole.prop else None
+    pressing = kept_sole(motion.sole, flat_pose(motion.transforms)) if pieces and _is_kept(motion.sole) else None
+    for piece in pieces:
+        begin = max(piece.start, 1 - offset)  # the first step of the grid is a state, it presses nothing
+        if begin < piece.stop:
+            during, since = slice(begin, piece.stop), piece.start + offset
+            yield _Contact(character, (number, index), during, since, begin + offset, points, pressing)
 
 
 @dataclass(frozen=True)

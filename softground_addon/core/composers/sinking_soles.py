@@ -20,12 +20,10 @@ Single = NDArray[np.float32]
 
 SQUARES_AT_ONCE = 100_000
 """Squares under contacts that are followed in a slice, summed over their steps: 4 ms."""
-STEPS_AT_ONCE = 400
+STEPS_AT_ONCE = 200
 """Steps whose pressure is fitted in a slice, or those of one contact: 4 ms."""
 CONTACTS_AT_ONCE = 64
 """Contacts that are put into a table in a slice: 4 ms."""
-STEPS_PER_FIT = 3
-"""The pressure is fitted once in so many steps: 40 times a second."""
 
 
 @dataclass(frozen=True)
@@ -258,23 +256,9 @@ def _pressure(contacts: Sequence[SoleContact], sunk: Array, tolerance: float) ->
 def _fitted(contacts: Sequence[SoleContact], sunk: Array, tolerance: float) -> Array:
     """See `_pressure`."""
     most = max(contact.parts.shape[2] for contact in contacts)
-    fitted_rows, fit_of_row, parts, centres, moved = [], [], [], [], []
-    first = count = 0
-    for contact in contacts:
-        steps = np.arange(len(contact.force))
-        middle = steps // STEPS_PER_FIT * STEPS_PER_FIT + STEPS_PER_FIT // 2
-        fitted, fit = np.unique(np.minimum(middle, steps[-1]), return_inverse=True)
-        fitted_rows.append(first + fitted)
-        fit_of_row.append(count + fit)
-        place = contact.parts[:2].mean(axis=2).T
-        moved.append(place - place[fitted[fit]])
-        parts.append(np.pad(contact.parts[:, fitted], ((0, 0), (0, 0), (0, most - contact.parts.shape[2]))))
-        centres.append(contact.centre[fitted])
-        first, count = first + len(steps), count + len(fitted)
+    parts = [np.pad(contact.parts, ((0, 0), (0, 0), (0, most - contact.parts.shape[2]))) for contact in contacts]
     x, y, clearance, area = np.concatenate(parts, axis=1)
-    touching = area * touching_fraction(clearance, sunk[np.concatenate(fitted_rows), None], 1.0)
-    field = pressure_field(x, y, touching, np.concatenate(centres), tolerance)
-    fit = np.concatenate(fit_of_row)
-    slope, middle = field.slope[fit], field.middle[fit] + np.concatenate(moved)
-    level = field.level[fit] - (slope * middle).sum(axis=1)
-    return np.stack([level, *slope.T, field.highest[fit]])
+    touching = area * touching_fraction(clearance, sunk[:, None], 1.0)
+    field = pressure_field(x, y, touching, np.concatenate([contact.centre for contact in contacts]), tolerance)
+    level = field.level - (field.slope * field.middle).sum(axis=1)
+    return np.stack([level, *field.slope.T, field.highest])

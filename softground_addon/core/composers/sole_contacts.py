@@ -13,6 +13,7 @@ from ..ground.heightfield import Surface
 from ..ground.variation import Factors
 from ..loads.cell_limits import pressed_area
 from ..loads.estimate import CharacterLoads
+from ..loads.tracks import tracks
 from ..motion.motion import Sole
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices
@@ -124,10 +125,10 @@ def square_sizes(loads: Sequence[CharacterLoads], cell_size: float) -> list[floa
 
 
 def contacts_of(character: CharacterLoads, index: int) -> Iterator[slice]:
-    """The steps of each contact of a sole, without the first of all: that is a state, it presses nothing."""
-    for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
-        if end > max(first, 1):
-            yield slice(max(int(first), 1), int(end))
+    """The steps of each print of a sole, without the first of all: that is a state, it presses nothing."""
+    for piece in tracks(character, index):
+        if piece.stop > max(piece.start, 1):
+            yield slice(max(piece.start, 1), piece.stop)
 
 
 def sole_contacts(

@@ -44,7 +44,13 @@ def median_depth(depth: Array) -> float:
 
 
 def typical_of(footprints: Sequence[Footprint]) -> float:
-    """Depth of the typical one of some footprints [m]."""
-    depths = np.array([footprint.max_depth_m for footprint in footprints])
-    impulse = np.array([float(footprint.load_n.sum()) for footprint in footprints])
+    """Depth of the typical step among some footprints [m]; without a foot among them, of the typical one of bodies."""
+    steps = [footprint for footprint in footprints if not _is_of_body(footprint)] or footprints
+    depths = np.array([footprint.max_depth_m for footprint in steps])
+    impulse = np.array([float(footprint.load_n.sum()) for footprint in steps])
     return median_depth(depths[main_contacts(impulse)]) or median_depth(depths)
+
+
+def _is_of_body(footprint: Footprint) -> bool:
+    """Whether a ball, a hand or a head left it."""
+    return footprint.pressed_by is not None and footprint.pressed_by.pressing.sole.prop is not None

@@ -10,6 +10,7 @@ from softground_addon.core.composers.simulation import simulate
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
+from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.record.typical_depth import main_contacts, typical_of
 from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
@@ -100,6 +101,28 @@ def test_a_foot_that_slides_is_predicted_as_shallow_as_it_prints(speed, pressure
     loads = sliding(speed, walk(steps=4))
     expected = pressed([loads], SNOW, pressure)
     assert contact_loads([loads], FlatTerrain(), CELL).deepest(SNOW, pressure) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 4.0])
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_a_gait_on_the_spot_is_predicted_by_the_prints_into_which_its_tracks_are_cut(speed, hardening):
+    loads, material = sliding(speed, walk(steps=4)), replace(SNOW, hardening=hardening)
+    frames = loads.motion.frames
+    skin = LowSkin(frames, np.zeros((len(frames), 1, 3)), np.zeros((len(frames), 1)), 0.3, 1.0)
+    known = replace(loads, motion=replace(loads.motion, skin=skin))
+    prints = prints_of([known], material, "UNIFORM")
+    assert len(prints) > len(prints_of([loads], material, "UNIFORM"))
+    contacts = contact_loads([known], FlatTerrain(), CELL)
+    assert contacts.typical(material) == pytest.approx(typical_of(prints), rel=0.02)
+
+
+def test_the_typical_step_is_of_feet_whatever_else_prints():
+    loads, ball = walk(steps=4), resting(prop_sole(*sphere(0.2)), (9.0, 9.0, 0.2), 5000.0)
+    both = prints_of([loads, ball], SNOW, "UNIFORM")
+    assert typical_of(both) == typical_of(prints_of([loads], SNOW, "UNIFORM"))
+    assert max(one.max_depth_m for one in both) > 2 * typical_of(both)
+    contacts = contact_loads([loads, ball], FlatTerrain(), CELL)
+    assert contacts.typical(SNOW) == pytest.approx(typical_of(both), rel=0.02)
 
 
 @pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])

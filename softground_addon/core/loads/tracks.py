@@ -1,0 +1,50 @@
+"""From where to where a print goes: a contact leaves one, but that of a body that travels on the ground several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..numerics.intervals import runs
+from .estimate import CharacterLoads
+
+LONGEST_TRACK = 8.0
+"""Length of the tracks of rolling and sliding bodies that are recorded as one print, in their longest extents."""
+
+LONGEST_SLIDE = 0.25
+"""How far a foot slides within one print, in body heights: further on, it is another place that it prints, ..."""
+SHORTEST_SLIDE = 0.08
+"""... if it takes as long for it [s]."""
+
+
+def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
+    """The steps of each print of a sole; the contacts of one that travels far are cut.
+
+    Those of a foot that slides, in a gait on the spot or on skates, are cut into even pieces of at most `LONGEST_SLIDE`
+    and on average at least `SHORTEST_SLIDE`.
+
+    Parameters
+    ----------
+    character : CharacterLoads
+    index : int
+        Of the sole.
+    """
+    motion = character.motion
+    sole, skin = motion.soles[index], motion.skin
+    prop, place = sole.sole.prop, sole.transforms[:, 0, :2, 3]
+    furthest = LONGEST_SLIDE * skin.height if skin else np.inf
+    shortest = SHORTEST_SLIDE / motion.time_step
+    for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
+        if prop is not None:
+            limit = LONGEST_TRACK * prop.extent.max()
+        else:
+            slide = float(np.abs(place[first:end] - place[first]).max())
+            pieces = min(np.ceil(slide / furthest), (end - first) // shortest)
+            limit = slide / pieces if pieces > 1 else np.inf
+        begin = int(first)
+        for step in range(begin + 1, int(end)):
+            if np.abs(place[step] - place[begin]).max() > limit:
+                yield slice(begin, step)
+                begin = step
+        yield slice(begin, int(end))
