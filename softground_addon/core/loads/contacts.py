@@ -145,11 +145,22 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
     if seen is None:
         return Contacts(touching, offset, normal, clearance)
+    touching = _shown(touching, seen)
     # What a limb that rolls turns to the ground has no speed of its own; and calm skin on the ground bears where
     # nothing else does.
     limb = np.array([sole.sole.prop is not None for sole in motion.soles])
     touching |= seen.touching & (limb | ~touching.any(axis=1, keepdims=True))
     return Contacts(touching, offset, normal, clearance, seen.aloft)
+
+
+def _shown(touching: Mask, seen: Contacts) -> Mask:
+    """What touches by its speed, without what the skin shows in the air, and without the contacts in which the skin of
+    a sole never bears that bears at other times."""
+    shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
+    for sole in np.flatnonzero(seen.touching.any(axis=0)):
+        for first, last in zip(*runs(shown[:, sole]), strict=True):
+            shown[first:last, sole] = seen.touching[first:last, sole].any()
+    return shown
 
 
 def _seen_on_skin(motion: CharacterMotion, terrain: Terrain, tracks: list[_Track]) -> Contacts | None:

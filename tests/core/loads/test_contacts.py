@@ -164,6 +164,22 @@ def test_the_skin_tells_which_soles_are_in_the_air_where_the_ground_is_level_und
     assert detect_contacts(motion, Slope(slope=0.05)).aloft is None
 
 
+def test_a_foot_touches_no_longer_than_its_skin_is_on_the_ground_nor_where_it_only_hangs_over_it():
+    """Beside one that stands, a foot hangs just over the ground, comes down from higher up, and lifts slowly."""
+    step = np.arange(360)
+    height = np.interp(step, [60, 90, 120, 300, 360], [0.02, 0.1, 0.0, 0.0, 0.06])
+    path = np.stack([0 * step, 0 * step, height], axis=1)
+    foot = replace(flat_sole(path), bears=height < 0.015)
+    stands = replace(flat_sole(np.tile((0.0, 0.3, 0.0), (360, 1))), bears=np.ones(360, dtype=bool))
+    skin = LowSkin(step, np.zeros((360, 1, 3)), np.zeros((360, 1)), 0.3, 1.78)
+    motion = replace(character([foot, stands], hips=(0.0, 0.0, 0.9), rate=RATE), ground_level=0.0, skin=skin)
+    touching = detect_contacts(motion, Slope()).touching
+    assert touching[:, 1].all()
+    assert not touching[height > 0.018 * 1.78, 0].any()
+    assert not touching[:60, 0].any()
+    assert touching[120:300, 0].all()
+
+
 @pytest.mark.parametrize("hangs", [0.0, 0.015])
 def test_a_limb_that_lies_still_just_over_the_ground_touches_though_its_skin_does_not(hangs):
     down = np.maximum(1.0 - 2.0 * np.arange(180) / RATE, hangs) + 0.1
