@@ -23,14 +23,15 @@ NAMES = st.text(st.characters(exclude_categories=("Cs", "Cc"), exclude_character
 class Animal:
     """An animal 1 m tall before it is scaled.
 
-    `turn` is of the rest pose in the armature, which is turned back, and about the vertical by `heading` [rad]. `axes`
-    and `leaves` are those of the feet's bones and the lengths of theirs; `on_trunk` says which feet hang on the trunk
-    and not on the root.
+    It travels, or takes its steps `on_the_spot`. `turn` is of the rest pose in the armature, which is turned back, and
+    about the vertical by `heading` [rad]. `axes` and `leaves` are those of the feet's bones and the lengths of theirs;
+    `on_trunk` says which feet hang on the trunk and not on the root.
     """
 
     legs: int
     duty: float
     stride: float
+    on_the_spot: bool
     names: tuple[str, ...]
     turn: np.ndarray
     axes: np.ndarray
@@ -49,6 +50,7 @@ def animals(draw):
         legs,
         draw(st.floats(0.55, 0.72)),
         draw(st.floats(0.3, 0.7)),
+        draw(st.booleans()),
         tuple(draw(st.lists(NAMES, min_size=2 * legs + 2, max_size=2 * legs + 2, unique_by=lambda name: name.lower()))),
         turn * np.sign(np.linalg.det(turn)),
         chance.normal(size=(legs, 3)),
@@ -109,12 +111,14 @@ def build(animal):
     for index, (bone, *_) in enumerate(pieces):
         skin.vertex_groups.new(name=bone).add(range(8 * index, 8 * index + 8), 1.0, "REPLACE")
     ahead, lift, _ = gait(animal)
-    body = np.zeros((FRAMES, 3))
-    body[:, 1] = -animal.stride * np.arange(FRAMES) / PERIOD
+    travel, body = np.zeros((2, FRAMES, 3))
+    travel[:, 1] = -animal.stride * np.arange(FRAMES) / PERIOD
+    if not animal.on_the_spot:
+        body = travel
     paths = {trunk: body}
     for index, foot in enumerate(feet):
         paths[foot] = np.stack([np.zeros(FRAMES), -ahead[:, index], lift[:, index]], axis=-1)
-        paths[foot] -= body * animal.on_trunk[index]
+        paths[foot] -= travel - body + body * animal.on_trunk[index]
     for bone, path in paths.items():
         local = path @ animal.turn.T @ np.array(armature.data.bones[bone].matrix_local)[:3, :3]
         rigs.key(armature, "location", {frame + 1: value for frame, value in enumerate(local.tolist())}, bone=bone)
