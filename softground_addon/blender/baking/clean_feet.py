@@ -16,9 +16,9 @@ from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
 from ...core.numerics.intervals import runs
 from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_holds, standing
-from ...core.response.foot_lock import rim
 from ...core.response.grounding import leg_soles, responding
 from ...core.response.response import at_scene_frames, gaps
+from ...core.response.sole_rim import posed_rim
 from ...core.settings import BakeSettings
 from ..characters.character_setup import characters_of
 from ..jobs import Job, Progress, meanwhile
@@ -113,8 +113,8 @@ def _cleaned(
         for when, moved in (("before", motion), ("after", after)):
             faults = yield from meanwhile(now, foot_faults.slices(moved, touching, shot.terrain, stands))
             feet[when][motion.name] = _statistics(faults)
-        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), rim))
-        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), rim))
+        made = yield from meanwhile(now, gaps.slices(motion, touching, shot.terrain, (), posed_rim))
+        left = yield from meanwhile(now, gaps.slices(after, touching, shot.terrain, (), posed_rim))
         found.append(CharacterResponse(motion, response, made, left, 0.0))
     return found, feet, missed
 

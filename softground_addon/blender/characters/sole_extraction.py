@@ -69,6 +69,7 @@ def foot_sole(
             name=source.name,
             side=source.side,
             ball=flat.ball if has_toes else None,
+            toe_weight=mesh.toe_weight,
         )
     behind = ANKLE_POSITION * size.length
     placed = anatomical_sole(

@@ -110,6 +110,8 @@ class Sole:
     underside : (N, M) float array or None
         Heights of the flat sole's mesh from heel to toes and from left to right [m], infinite where there is none;
         None where it is of no mesh.
+    bend : float
+        How far behind and before the seam of two pieces the skin moves with both [m].
     """
 
     name: str
@@ -120,6 +122,7 @@ class Sole:
     outline: Array
     prop: Prop | None = None
     underside: Array | None = None
+    bend: float = 0.0
 
     @property
     def area(self) -> float:

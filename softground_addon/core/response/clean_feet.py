@@ -14,9 +14,10 @@ from ..numerics.rigid import carried
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
-from .foot_lock import lock, moved, rim, slides, travelling, underside_on
-from .foot_placement import Placement, place_sole, posed_points
+from .foot_lock import lock, moved, slides, travelling, underside_on
+from .foot_placement import Placement, place_sole
 from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
+from .sole_rim import posed_rim
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -98,7 +99,7 @@ def clean(
             floor,
             floor,
             align=0.0,
-            points=posed_points(lying, rim(sole.sole)),
+            points=posed_rim(lying),
         )
         carry, lift = contacts.faded(sole, placed.carry @ locked, first.lift + placed.lift)
         placements[side] = number, Placement(carry, lift, np.zeros_like(lift), placed.room)

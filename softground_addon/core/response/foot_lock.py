@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..loads.contacts import LEAVE_SPEED, REST_SPEED, TOUCH_SPEED
-from ..motion.motion import CharacterMotion, Sole, SoleMotion, SolePatch
+from ..loads.contacts import LEAVE_SPEED, REST_SPEED, TOUCH_HEIGHT, TOUCH_SPEED
+from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.intervals import runs
 from ..numerics.rigid import displacement, rotation
-from .foot_placement import Pieces, PressedGround, between_contacts, posed_points
+from .foot_placement import PressedGround, between_contacts
+from .sole_rim import posed_rim, rim_pieces
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,7 +26,7 @@ PLANTED = 0.01
 YIELD = 0.0025
 """A point bears 1/e as much so far above the lowest, in sole lengths (0.7 mm of an adult's shoe): with more, what bears
 creeps along while the foot rolls over its toes."""
-MOST = 0.5
+MOST = 0.8
 """A rigid piece of the sole bears that has this part as many points near the floor as the one with most of them."""
 AXLE = 0.01
 """Points that bear within about this distance of each other are an axle, about which the foot may turn, in lengths."""
@@ -35,33 +36,6 @@ TRAVEL = 0.15
 """A foot that goes so far along the floor in a burst is meant to go there, in leg lengths (14 cm for an adult)."""
 STILL = 0.004
 """A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
-
-
-def rim(sole: Sole) -> Pieces:
-    """Points around each patch of a sole, and its lowest: patch and positions (K, 3) in the patch's frame [m].
-
-    A convex sole that is tilted stands on one of its rim. The landmarks where the sole has no patches.
-    """
-    if not sole.patches:
-        return [(int(p), sole.landmarks[sole.landmark_patch == p]) for p in np.unique(sole.landmark_patch)]
-    return [(number, _outermost(patch)) for number, patch in enumerate(sole.patches)]
-
-
-def _outermost(patch: SolePatch) -> Array:
-    """The first and last node of each row and column inside a patch's outline, every third inside, and the lowest."""
-    inside = patch.signed_distance <= 0.0
-    before, after = np.roll(inside, 1, axis=1), np.roll(inside, -1, axis=1)
-    before[:, 0] = after[:, -1] = False
-    above, below = np.roll(inside, 1, axis=0), np.roll(inside, -1, axis=0)
-    above[0] = below[-1] = False
-    chosen = inside & ~(before & after & above & below)
-    chosen[::3, ::3] |= inside[::3, ::3]
-    lowest = np.where(inside, patch.heights, np.inf).argmin()
-    chosen.flat[lowest] |= bool(inside.any())
-    rows, columns = np.nonzero(chosen)
-    x = patch.origin[0] + columns * patch.spacing
-    y = patch.origin[1] + rows * patch.spacing
-    return np.stack([x, y, patch.heights[rows, columns]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -112,14 +86,12 @@ class Underside:
 
 def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Underside:
     """The rim of a sole over time and its heights above a floor, above its own lowest point where there is none."""
-    pieces = rim(motion.sole)
-    points = posed_points(motion, pieces)
+    points = posed_rim(motion)
     ground = floor.heights(points[..., 0], points[..., 1], np.broadcast_to(frames[:, None], points.shape[:2]))
     known = np.isfinite(ground)
     own = points[..., 2] - points[..., 2].min(axis=1, keepdims=True)
     heights = np.where(known.any(axis=1, keepdims=True), np.where(known, points[..., 2] - ground, np.inf), own)
-    piece = np.concatenate([np.full(len(places), patch) for patch, places in pieces])
-    return Underside(points, heights, piece, motion.sole.length)
+    return Underside(points, heights, rim_pieces(motion.sole), motion.sole.length)
 
 
 def lock(sole: Underside, touching: Mask, weight: Array | None = None) -> Array:
@@ -222,7 +194,7 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
 
     Somewhere on such a way it is faster than a foot that still touches and than half the body: one that skids, because
     its walk is scaled wrongly, is slower than half the body. The way begins and ends where the foot stands, or with the
-    contact, and is no shorter than `TRAVEL`.
+    contact, keeps at its height, unlike that of a foot that comes down or leaves, and is no shorter than `TRAVEL`.
 
     Parameters
     ----------
@@ -233,14 +205,15 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
     """
     body = np.linalg.norm(np.diff(motion.hips[:, :2], axis=0), axis=1)
     unit = motion.froude_speed * motion.time_step
-    weight, found = sole.bearing(), np.zeros(len(touching), bool)
+    weight, lowest, found = sole.bearing(), sole.lowest(), np.zeros(len(touching), bool)
     for first, end in zip(*runs(touching), strict=True):
         step = rolled(sole.points[first:end, :, :2], weight[first:end])
         length = np.linalg.norm(step, axis=1)
         fast = length > np.maximum(LEAVE_SPEED * TOUCH_SPEED * unit, body[first : end - 1] / 2)
+        high = np.abs(lowest[first:end] - np.median(lowest[first:end])) > TOUCH_HEIGHT * motion.leg_length
         for start, stop in zip(*runs(length > REST_SPEED * unit), strict=True):
             far = np.linalg.norm(np.cumsum(step[start:stop], axis=0), axis=1).max() > TRAVEL * motion.leg_length
-            if far and fast[start:stop].any():
+            if far and fast[start:stop].any() and not high[start : stop + 1].any():
                 begin, until = start + (start > 0), stop + (stop == len(step))
                 found[first + begin : first + max(until, begin + 1)] = True
     return found

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import FlatTerrain, Terrain
 from ..loads.contacts import Contacts, detect_contacts
-from ..motion.motion import CharacterMotion, Sole, SoleMotion
+from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.interpolation import in_stretches
 from ..numerics.plane_fit import fitted_slope, smoothed
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
 from .foot_lock import moved
-from .foot_placement import Pieces, Placement, lowest_clearance, place_sole, posed_points, underside
+from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
 from .grounding import Response, heel_rises, leg_soles, responding, settle, with_sole
 from .moved_steps import Followed
 from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
@@ -232,7 +232,7 @@ def gaps(
     touching: Mask,
     terrain: Terrain,
     footprints: Sequence[Footprint],
-    points: Callable[[Sole], Pieces] = underside,
+    posed: Callable[[SoleMotion], Array] = posed_points,
 ) -> Slices[Gaps]:
     """Distance of each standing sole's lowest point from the ground as it is at that frame; of those points of it."""
     history = GroundHistory(terrain, footprints)
@@ -240,7 +240,7 @@ def gaps(
     for index, sole in enumerate(motion.soles):
         yield
         stands = np.flatnonzero(touching[:, index])
-        clearance = _clearance(sole, points(sole.sole), stands, motion.frames[stands], history)
+        clearance = _clearance(sole, posed, stands, motion.frames[stands], history)
         known = np.isfinite(clearance)
         frames.append(motion.frames[stands][known])
         soles.append(np.full(int(known.sum()), index))
@@ -249,12 +249,16 @@ def gaps(
 
 
 def _clearance(
-    sole: SoleMotion, pieces: Pieces, samples: NDArray[np.intp], frames: Array, history: GroundHistory
+    sole: SoleMotion,
+    posed: Callable[[SoleMotion], Array],
+    samples: NDArray[np.intp],
+    frames: Array,
+    history: GroundHistory,
 ) -> Array:
     """Height of a sole's lowest point above the ground at some of its samples, which are at these frames, (K,) [m]."""
 
     def during(part: slice) -> Array:
-        points = posed_points(replace(sole, transforms=sole.transforms[samples[part]]), pieces)
+        points = posed(replace(sole, transforms=sole.transforms[samples[part]]))
         return lowest_clearance(points, history, frames[part])
 
     return in_stretches(during, len(samples))

@@ -44,6 +44,13 @@ TREAD_NODES = 192
 _SEAM = 0.06
 """Overlap of foot and toes over sole length, so that bent toes leave no gap under the ball."""
 
+_BEND = 0.3
+"""How far behind and before the ball the skin of a bare foot moves with both foot and toes, over sole length: feet that
+roll slide least on the captured motions with this."""
+
+_WIDEST_BEND = 0.5
+"""The most of it that is looked for in a skin."""
+
 _UNDERSIDE_BAND = 0.10
 """Part of the foot that counts as its underside: up to this height over sole length (arches yes, instep no)."""
 
@@ -128,7 +135,8 @@ def anatomical_sole(
         + _TOE_RELIEF * np.clip((x - 0.86) / 0.14, 0.0, 2.0) ** 2
     )
     ball_x = BALL_POSITION * length if ball is None else ball
-    return _assemble(grid, heights, [outline], ball_x, split=ball is not None, name=name, side=side)
+    placed = _assemble(grid, heights, [outline], ball_x, split=ball is not None, name=name, side=side)
+    return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, bend=_BEND * length))
 
 
 def sole_from_underside(
@@ -138,6 +146,7 @@ def sole_from_underside(
     name: str,
     side: str,
     ball: float | None = None,
+    toe_weight: Array | None = None,
 ) -> PlacedSole:
     """Sole of a foot from its mesh: boots, heels and bare feet print differently.
 
@@ -150,6 +159,8 @@ def sole_from_underside(
         As in `Sole`.
     ball : float, optional
         x of the line about which the toes bend [m]; none gives a sole of one piece.
+    toe_weight : (V,) float array, optional
+        How much of each vertex moves with the toes.
 
     Returns
     -------
@@ -191,7 +202,21 @@ def sole_from_underside(
     columns, rows = np.ceil(extent / fine).astype(int)
     drawn = lowest_surface(np.asarray(vertices, dtype=float), triangles, low + fine / 2, (rows, columns), fine)
     drawn[drawn > drawn.min() + _UNDERSIDE_BAND * length] = np.inf
-    return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T))
+    bend = 0.0 if ball is None or toe_weight is None else _bend(used, toe_weight[np.unique(triangles)], ball_x)
+    return dataclasses.replace(placed, sole=dataclasses.replace(placed.sole, underside=drawn[::-1].T, bend=bend))
+
+
+def _bend(vertices: Array, toe_weight: Array, ball: float) -> float:
+    """How far behind and before the ball the underside's weights go from foot to toes [m]: least squares, straight.
+
+    None for a crease that is no wider than the seam of the pieces.
+    """
+    length = float(np.ptp(vertices[:, 0]))
+    low = vertices[:, 2] < vertices[:, 2].min() + _UNDERSIDE_BAND * length
+    tried = np.linspace(0.0, _WIDEST_BEND, 51)[1:] * length
+    ramp = np.clip(0.5 + (vertices[low, 0] - ball) / (2 * tried[:, None]), 0.0, 1.0)
+    found = float(tried[((ramp - toe_weight[low]) ** 2).sum(axis=1).argmin()])
+    return found if found > _SEAM * length / 2 + 1e-9 else 0.0
 
 
 def prop_sole(vertices: Array, triangles: NDArray[np.intp], *, name: str, side: str = "", give: float = 0.0) -> Sole:

@@ -233,3 +233,12 @@ def test_holes_run_the_other_way_and_separate_loops_join_to_one_polygon_of_the_s
     assert sorted(np.sign(area([loop])) for loop in loops) == [-1, 1, 1]
     assert area([as_one_polygon(loops)]) == pytest.approx(area(loops))
     assert area(loops) == pytest.approx(256 - 36 + 100, rel=0.02)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.15, 0.3])
+def test_where_the_sole_bends_is_read_from_the_weights_of_its_skin(bend):
+    vertices, triangles, _ = bare_foot()
+    weight = np.clip(0.5 + (vertices[:, 0] - 0.18) / (2 * 0.26 * max(bend, 1e-3)), 0.0, 1.0)
+    sole = sole_from_underside(vertices, triangles, name="f", side="L", ball=0.18, toe_weight=weight).sole
+    assert sole.bend == pytest.approx(0.26 * bend, abs=2e-3)
+    assert sole_from_underside(vertices, triangles, name="f", side="L", ball=0.18).sole.bend == 0.0
