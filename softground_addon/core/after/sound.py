@@ -181,23 +181,30 @@ def _volumes(footprint: Footprint) -> Array:
     return np.asarray(np.maximum(volumes, 0.0))
 
 
-def _crackle(step: SoundStep, voice: Voice, random: np.random.Generator, begin: float, count: int) -> Array:
-    """Micro-impacts, of which all together have the energy of one at full loudness for each tenth of a second."""
+def micro_impacts(step: SoundStep, voice: Voice, random: np.random.Generator) -> tuple[Array, Array]:
+    """When ground gives way in a step [s], and with what energy over the least, both (K,)."""
     volume = float(step.compacted[:, 2].sum())
     if volume <= 0:
-        return np.zeros(count)
+        return np.zeros(0), np.zeros(0)
     impacts = int(np.clip(random.poisson(voice.density * volume * 1e3), FEWEST, MOST))
-    at = np.maximum(_times(step, random.random(impacts)) - begin, 0.0)
+    at = _times(step, random.random(impacts))
     power = 1.0 - voice.gamma  # inverse of the cumulative distribution of E^-gamma from 1 to STRONGEST
-    energy = (1.0 + random.random(impacts) * (STRONGEST**power - 1.0)) ** (1.0 / power)
+    return at, (1.0 + random.random(impacts) * (STRONGEST**power - 1.0)) ** (1.0 / power)
+
+
+def _crackle(step: SoundStep, voice: Voice, random: np.random.Generator, begin: float, count: int) -> Array:
+    """Micro-impacts, of which all together have the energy of one at full loudness for each tenth of a second."""
+    at, energy = micro_impacts(step, voice, random)
+    if not len(at):
+        return np.zeros(count)
     low, high = np.log(voice.crackle_band)
     pitch = np.exp(low + (high - low) * random.random(GRAINS))
     decay = np.array(voice.crackle_decay) @ np.stack([part := random.random(GRAINS), 1 - part])
     time = np.arange(round(5 * voice.crackle_decay[1] * RATE)) / RATE
     grains = np.exp(-time / decay[:, None]) * np.sin(2 * np.pi * pitch[:, None] * time)
-    amplitude = np.sqrt(energy / energy.sum()) * random.choice((-1.0, 1.0), impacts)
-    samples = np.rint(at * RATE).astype(np.intp)[:, None] + np.arange(len(time))
-    values = amplitude[:, None] * grains[random.integers(0, GRAINS, impacts)]
+    amplitude = np.sqrt(energy / energy.sum()) * random.choice((-1.0, 1.0), len(at))
+    samples = np.rint(np.maximum(at - begin, 0.0) * RATE).astype(np.intp)[:, None] + np.arange(len(time))
+    values = amplitude[:, None] * grains[random.integers(0, GRAINS, len(at))]
     heard = np.bincount(samples.ravel(), values.ravel(), minlength=count)[:count]
     return np.asarray(2.5 * loudness(step) * heard)
 
