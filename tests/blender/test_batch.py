@@ -90,7 +90,7 @@ def test_an_interrupted_batch_exits_with_130_and_goes_on_where_it_stopped(night)
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=600)
     assert process.returncode == 130, errors
-    assert "goes on where it stopped" in errors
+    assert "run the same command again" in errors
     state = manifest.parent / "night.batch"
     assert json.loads((state / "batch.json").read_text())["totals"] | {"skipped": 0} == {
         "done": 1, "skipped": 0, "refused": 0, "failed": 0, "crashed": 0, "interrupted": 2,

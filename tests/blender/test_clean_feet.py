@@ -254,7 +254,7 @@ def test_a_foot_lock_where_no_foot_stands_is_told(floor_walk):
     hold = lock_contact(floor_walk, "HEEL")
     hold.frame = 5000
     cleaned = jobs.run(clean_feet(floor_walk))
-    assert cleaned.warnings == (f"'{hold.foot}' of 'Walker' is not planted at frame 5000: its foot lock was left out.",)
+    assert cleaned.warnings == (f"'{hold.foot}' of 'Walker' is not planted at frame 5000: its foot lock was ignored.",)
 
 
 def test_the_selected_bone_says_which_foot_is_locked_and_a_lock_is_removed(floor_walk):

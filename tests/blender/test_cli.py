@@ -145,7 +145,7 @@ def test_bad_options_exit_with_2_and_say_what_to_do(shot, capfd, options, says):
         (("--in-place", "--report", "shot.blend"), "Two results"),
         (("--in-place", "--report", "SHOT.blend"), "Two results"),
         (("--save", "new.blend", "--report", "New.BLEND"), "Two results"),
-        (("--dry-run", "--report", "Shot.Blend"), "would be lost"),
+        (("--dry-run", "--report", "Shot.Blend"), "would be overwritten"),
         (("--save", "new.blend", "--report", "new.blend"), "Two results"),
         (("--dry-run", "--report", "a.json", "--receipt", "./a.json"), "Two results"),
         (("--dry-run", "--report", "shot.blend"), "is read by this bake"),
@@ -312,5 +312,5 @@ def test_a_library_of_the_shot_is_not_written_over(scene, tmp_path, capfd):
     (tmp_path / "again.blend").symlink_to(library)
     for name in ("library.blend", "again.blend"):
         assert run(shot, "--save", tmp_path / name) == 2
-        assert "would be lost" in capfd.readouterr().err
+        assert "would be overwritten" in capfd.readouterr().err
     assert library.read_bytes() == before

@@ -298,7 +298,7 @@ def test_images_that_are_interrupted_are_whole_and_not_denied(scene, tmp_path, m
     options = ["--format=exr", f"--output={tmp_path / 'x.exr'}", "--resolution=64"]
     assert cli.run_in_blender(["export", *options]) == cli.EXIT_INTERRUPTED
     assert files_in(tmp_path) == ["x_displacement_0020.exr"]
-    assert capfd.readouterr().err == "softground: interrupted; no file was left half written.\n"
+    assert capfd.readouterr().err == "softground: interrupted; no file was left half-written.\n"
 
 
 def test_a_scene_that_was_never_saved_proposes_a_name_too(scene):

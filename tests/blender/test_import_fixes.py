@@ -72,7 +72,7 @@ def test_one_button_makes_the_same_prints_of_a_file_in_other_units(scene, metres
     for one, other in zip(report["steps"], steps, strict=True):
         assert one["position"] == pytest.approx(other["position"], abs=0.02)
         assert one["max_depth_m"] == pytest.approx(other["max_depth_m"], rel=0.1)
-    with pytest.raises(RuntimeError, match="its scale is as it should be"):
+    with pytest.raises(RuntimeError, match="its scale needs no fix"):
         bpy.ops.softground.fix_scale()
     bpy.data.objects.remove(armature.parent)
 

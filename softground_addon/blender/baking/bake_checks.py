@@ -169,11 +169,11 @@ def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, fac
         if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
-                f"{high:.6g} m³ were displaced; nothing was written. Please report this shot."
+                f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
             )
         fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
         if footprint.max_depth_m > (material.layer_depth * depth.max() + fallen) * (1 + 1e-9):
             raise BakeError(
                 f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
-                "was written. Please report this shot."
+                "was written. Please report this as a bug."
             )

@@ -105,7 +105,7 @@ def _cleaned(
         stands = yield from meanwhile(now, standing.slices(motion, touching, shot.terrain, asked.holds))
         response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds))
         missed += [
-            f"'{hold.foot}' of '{motion.name}' is not planted at frame {hold.frame:g}: its foot lock was left out."
+            f"'{hold.foot}' of '{motion.name}' is not planted at frame {hold.frame:g}: its foot lock was ignored."
             for hold in missed_holds(motion, touching, asked.holds)
         ]
         missed += _travels(motion, touching & ~stands)
@@ -124,8 +124,8 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
     legs = leg_soles(motion)
     if not legs:
         raise InputError(
-            f"'{motion.name}' has no leg with hip, knee and ankle to clean: complete its joints in Body Bones, under "
-            "Advanced."
+            f"'{motion.name}' has no leg with hip, knee and ankle to clean: complete its joints in "
+            "Advanced > Body Bones."
         )
     parts = {control.part for control in rig.controls}
     if not all(f"foot_{side}" in parts for side in legs):
@@ -148,7 +148,7 @@ def _travels(motion: CharacterMotion, travels: NDArray[np.bool_]) -> list[str]:
         if ways:
             said.append(
                 f"'{sole.sole.name}' of '{motion.name}' travels along the floor at frames {ways}, and was not held "
-                "there: hold it by a foot lock if it should stand."
+                "there: add a foot lock if it should stand still."
             )
     return said
 
@@ -160,7 +160,7 @@ def _left_out(wanted: BakeSettings, shot: Shot) -> tuple[str, ...]:
         if one.armature:
             feet = set(leg_soles(motion).values())
             names += [f"{sole.sole.name} of {motion.name}" for i, sole in enumerate(motion.soles) if i not in feet]
-    return (f"Only feet of legs are cleaned; left as they are: {', '.join(names)}.",) if names else ()
+    return (f"Only feet with legs are cleaned; these stay as they are: {', '.join(names)}.",) if names else ()
 
 
 def _statistics(faults: FootFaults) -> dict[str, dict[str, float]]:

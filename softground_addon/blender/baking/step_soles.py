@@ -110,10 +110,10 @@ def _check_size(name: str, extent: Array) -> None:
     if length > LONGEST:
         raise InputError(
             f"'{name}' is {length:.3g} m long, and a sole at most {LONGEST:g} m: scale it to the size of the character "
-            f"(it may be of a file in other units), {_REMEDY}."
+            f"(its file may be in other units), {_REMEDY}."
         )
     if length < SHORTEST:
         raise InputError(
             f"'{name}' is {length * 1e3:.2g} mm long, and a sole at least {SHORTEST * 1e3:g} mm: scale it to the size "
-            f"of the character (it may be of a file in other units), {_REMEDY}."
+            f"of the character (its file may be in other units), {_REMEDY}."
         )

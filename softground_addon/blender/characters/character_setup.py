@@ -48,7 +48,7 @@ def adding_character(scene: bpy.types.Scene, armature: bpy.types.Object | None) 
     settings = scene.softground
     if any(character.armature == armature for character in settings.characters):
         raise InputError(
-            f"'{armature.name}' is a character already: correct its bones in the list, or remove it first."
+            f"'{armature.name}' is already a character: correct its bones in Advanced, or remove it first."
         )
     rig = name_of(armature)
     recognised = yield from recognise(scene, armature, animated_frames(scene, armature))
@@ -181,7 +181,9 @@ def _check_printable(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
         raise InputError(f"'{obj.name}' has no faces to print with: give its mesh faces, or select another object.")
     for character in scene.softground.characters:
         if any(sole.object == obj for sole in character.soles):
-            raise InputError(f"'{obj.name}' already prints, as a sole of '{title_of(character)}'.")
+            raise InputError(
+                f"'{obj.name}' already prints, as a sole of '{title_of(character)}': select another object."
+            )
 
 
 def _root(obj: bpy.types.Object) -> bpy.types.Object:
@@ -235,7 +237,7 @@ def fix_scale(scene: bpy.types.Scene, character: SoftGroundCharacter) -> float:
     armature = character.armature
     factor = scale_to_metres(character.size)
     if armature is None or factor == 1.0:
-        raise InputError(f"'{title_of(character)}' is {character.size:.2g} m in size: its scale is as it should be.")
+        raise InputError(f"'{title_of(character)}' is {character.size:.2g} m in size: its scale needs no fix.")
     put_under(scene, armature, f"{armature.name} Scale").scale = (factor,) * 3
     by_volume = character.mass == character.skin_mass
     character.size, character.sole_length = character.size * factor, character.sole_length * factor

@@ -40,7 +40,7 @@ def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> 
     if linked is not None:
         raise InputError(
             f"'{linked.name}' is linked from another file: make a library override of it (Object > Library Override > "
-            "Make), or put it right in its own file."
+            "Make), or scale it in its own file."
         )
     empty = bpy.data.objects.new(name, None)
     (armature.users_collection or (scene.collection,))[0].objects.link(empty)

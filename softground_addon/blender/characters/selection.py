@@ -126,8 +126,8 @@ def set_up_automatically(scene: bpy.types.Scene) -> None:
     rigs = walkers_of(scene) or armatures
     if len(rigs) > 1:
         raise InputError(
-            f"Scene '{scene.name}' has several armatures ({_names(rigs)}): add those that walk with Add Character in "
-            "the SoftGround panel and save the file."
+            f"Scene '{scene.name}' has several armatures ({_names(rigs)}): select those that walk, press Add "
+            "Character in the SoftGround panel, and save the file."
         )
     options = scene.softground
     if not options.is_property_set("sink_feet"):

@@ -102,7 +102,7 @@ def _exit_code(arguments: Sequence[str], *, standalone: bool) -> int:
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         previous.clear()  # the process is about to end: a second signal must not spoil that
-        print("softground: interrupted; no file was left half written.", file=sys.stderr)
+        print("softground: interrupted; no file was left half-written.", file=sys.stderr)
         return EXIT_INTERRUPTED
     finally:
         for number, handler in previous.items():
@@ -128,7 +128,7 @@ def _batch_code(outcomes: Sequence[command.Outcome]) -> int:
     """The exit code of a batch: that of its worst shot."""
     statuses = {outcome.status for outcome in outcomes}
     if "interrupted" in statuses:
-        print("softground: interrupted; the same command goes on where it stopped.", file=sys.stderr)
+        print("softground: interrupted; run the same command again to continue.", file=sys.stderr)
         return EXIT_INTERRUPTED
     if statuses & {"crashed", "failed"}:
         return EXIT_FAILED_CHECK
@@ -325,7 +325,7 @@ def _check_places(options: argparse.Namespace, target: Path | None) -> None:
         if name in taken:
             raise InputError(f"Two results would be written to '{path}': give each a name of its own.")
         if name in read and not (path == target and name == opened):
-            raise InputError(f"'{path}' is read by this bake and would be lost: write to another file.")
+            raise InputError(f"'{path}' is read by this bake and would be overwritten: write to another file.")
         taken.add(name)
 
 

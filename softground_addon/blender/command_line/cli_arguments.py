@@ -85,9 +85,13 @@ def _add_clean(clean: argparse.ArgumentParser, *, standalone: bool) -> None:
     clean.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame")
     clean.add_argument("--root-motion", action="store_true", help="add root motion first to cycles on the spot")
     destination = clean.add_mutually_exclusive_group()
-    destination.add_argument("--save", type=Path, metavar="FILE.blend", help="save the shot with its layer as this")
+    destination.add_argument(
+        "--save", type=Path, metavar="FILE.blend", help="save the shot with its layer under this name"
+    )
     destination.add_argument("--in-place", action="store_true", help="save the shot over the opened file")
-    clean.add_argument("--report", type=Path, metavar="FILE.json", help="write what the feet did before and after")
+    clean.add_argument(
+        "--report", type=Path, metavar="FILE.json", help="write a report of the feet, before and after, to this file"
+    )
     clean.set_defaults(blend=None, preset=None, edits=None, receipt=None)
 
 
@@ -100,9 +104,11 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     )
     export.add_argument(
         "--output", type=Path, metavar="FILE",
-        help="the file; of images their folder and what their names begin with; beside the shot if left out",
+        help="output file; for images, a folder and how their names begin (default: beside the shot)",
     )  # fmt: skip
-    export.add_argument("--frames", type=_frame_range, metavar="A-B", help="first and last frame; else those baked")
+    export.add_argument(
+        "--frames", type=_frame_range, metavar="A-B", help="first and last frame (default: those of the bake)"
+    )
     export.add_argument("--resolution", type=int, default=2048, metavar="N", help="width and height of images")
     export.add_argument("--uv-map", default="", metavar="NAME", help="UV map of images, if not the one rendered")
     export.add_argument(

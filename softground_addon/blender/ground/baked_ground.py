@@ -287,7 +287,7 @@ def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:
     """
     units = {name: float(inputs[name]) for name in UNITS}
     if not all(1.0 / LARGEST_UNIT <= unit <= LARGEST_UNIT for unit in units.values()):
-        raise ValueError("it was baked in units that there are not")
+        raise ValueError("its units are unknown")
     return units
 
 

@@ -96,7 +96,9 @@ def _check_names(display_mesh: bpy.types.Object) -> None:
     mesh = ground_mesh.mesh_of(display_mesh)
     taken = [one for one in nodes.OF_WEATHER if one in mesh.attributes and one not in own_data.made(mesh)]
     if taken:
-        raise InputError(f"'{display_mesh.name}' has an attribute '{taken[0]}' of yours: rename it, weather needs it.")
+        raise InputError(
+            f"'{display_mesh.name}' has an attribute '{taken[0]}' of your own: rename it, as weather needs that name."
+        )
 
 
 def felt(wanted: BakeSettings) -> BakeSettings:

@@ -303,7 +303,7 @@ class SOFTGROUND_OT_sink_feet(_Bake):
 
 
 class SOFTGROUND_OT_clean_feet(_Bake):
-    """Stop standing feet from sliding, floating and sinking, on the ground as a hard floor or on a flat one. Hips
+    """Stop planted feet from sliding, floating and sinking, on the ground as a hard floor, or on a flat one. Hips
     and legs follow, in a layer above the animation that Clear Bake removes. Esc cancels"""
 
     bl_idname = "softground.clean_feet"

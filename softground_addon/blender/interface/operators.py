@@ -111,7 +111,7 @@ class SOFTGROUND_OT_use_as_ground(bpy.types.Operator):
         assert chosen is not None
         ground_checks.check_usable(chosen)
         settings.scene_of(context).softground.ground = chosen
-        self.report({"INFO"}, f"'{chosen.name}' is the ground")
+        self.report({"INFO"}, f"'{chosen.name}' is now the ground")
         return {"FINISHED"}
 
 
@@ -123,7 +123,7 @@ class SOFTGROUND_OT_create_ground(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     use_selected: BoolProperty(
-        name="Use Selected", description="Take the selected mesh as it is, where one is selected", default=True
+        name="Use Selected", description="Use the selected mesh as it is, if one is selected", default=True
     )
 
     @reports_errors
@@ -222,9 +222,9 @@ class SOFTGROUND_OT_apply_look(bpy.types.Operator):
         ground_checks.check_writable(baked_ground.display_mesh_of(options.ground))
         with analysis.own_changes(scene):
             mixed = look.apply(options.ground, options.material.surface)
-        theirs = f" over {mixed} of your materials" if mixed else ""
+        theirs = f", over {mixed} of your materials" if mixed else ""
         self.report(
-            {"INFO"}, f"'{options.ground.name}' looks like {options.material.surface.replace('_', ' ')}{theirs}"
+            {"INFO"}, f"'{options.ground.name}' now looks like {options.material.surface.replace('_', ' ')}{theirs}"
         )
         return {"FINISHED"}
 

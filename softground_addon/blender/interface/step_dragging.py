@@ -29,8 +29,8 @@ TURN_STEP = 5.0
 REACH = 1.4
 """A click picks a step within so many times the size of its outline."""
 _HINT = (
-    "Drag a print   ·   Shift Click: choose more   ·   Drag beside them: choose by a box   ·   Wheel: turn it   ·   "
-    "Shift: move it finely   ·   Esc: leave it"
+    "Drag: move a print   ·   Shift Click: extend the selection   ·   Drag beside prints: box select   ·   "
+    "Wheel: rotate   ·   Shift: precise   ·   Esc: cancel"
 )
 SLOW = 0.1
 """Of several steps only the outlines follow the mouse, until they are dropped, once pressing them took longer [s]."""

@@ -261,7 +261,7 @@ def _mesh(scene: bpy.types.Scene, steps: Sequence[BakedStep], sole: str) -> Mesh
     kept = mesh_soles(baked_ground.edits_of(scene.softground.ground))
     if obj is None and sole not in kept:
         feet = ", ".join(sorted(steps[0].feet)) or "none"
-        raise InputError(f"The bake has no sole '{sole}': choose one of {feet}; or a mesh object of this scene.")
+        raise InputError(f"The bake has no sole '{sole}': choose one of {feet}, or a mesh object in this scene.")
     if obj is None:
         return kept[sole]
     return step_soles.read(obj, scene.softground.ground, scene.unit_settings.scale_length)

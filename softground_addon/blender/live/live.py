@@ -170,7 +170,7 @@ class SOFTGROUND_OT_live(bpy.types.Operator):
         if not is_on():
             return "Press prints while the timeline plays. Move a slider, and the prints follow"
         if properties.keep:
-            return "End live mode and leave the prints on the ground, as a bake up to the frame that is shown"
+            return "End live mode and leave the prints on the ground, as a bake up to the current frame"
         return "End live mode and leave the ground as it was before"
 
     @reports_errors

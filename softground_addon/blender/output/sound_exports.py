@@ -70,7 +70,7 @@ def _recordings(folder: Path, target: Path) -> list[tuple[str, np.ndarray]]:
         raise InputError(f"There is no WAV file in '{folder}': choose a folder that holds recordings of single steps.")
     if files.identity(target) in map(files.identity, paths):
         raise InputError(
-            f"'{target.name}' is one of your own sounds and would be lost: choose a folder that holds them alone."
+            f"'{target.name}' is one of your own sounds and would be overwritten: keep those in a folder of their own."
         )
     return [(path.name, wave_file.read(path)) for path in paths]
 

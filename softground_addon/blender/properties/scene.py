@@ -187,7 +187,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
         description="Broken edges, crumbs, cracks and tread on the displayed prints. Forces, depths "
         "and the response are not affected",
         items=[
-            ("OFF", "Off", "Smooth prints, as they are computed"),
+            ("OFF", "Off", "Smooth prints, as they are simulated"),
             ("FINE", "Fine", "As fine as the cells: for trails and full figures"),
             (
                 "CLOSE_UP",
@@ -242,7 +242,7 @@ class SoftGroundSettings(bpy.types.PropertyGroup):
     debris: BoolProperty(
         name="Throw Debris",
         description="Let steps kick up snow, sand, mud and soil, according to their speed and force: "
-        "a plume for a run in powder, almost nothing for a walk on firm sand. What flies "
+        "a plume for a run in powder, almost nothing for a walk on firm sand. What flies away "
         "is missing from the rims",
         default=False,
     )

@@ -192,7 +192,7 @@ def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: st
         if len(below) and (depth := float(np.median(below))) > leg:
             raise InputError(
                 f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
-                "Where it is a room, let its faces look inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
+                "If it is a room, turn its faces inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
             )
 
 

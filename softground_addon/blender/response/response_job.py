@@ -108,7 +108,7 @@ def without_sinking(scene: bpy.types.Scene, wanted: BakeSettings) -> tuple[BakeS
     if not why:
         return wanted, []
     said = Finding(
-        "feet_not_sunk", "note", f"Feet were not lowered into their prints. {why}", "Or leave Sink Feet off."
+        "feet_not_sunk", "note", f"Feet were not lowered into their prints. {why}", "Or switch Sink Feet off."
     )
     return replace(wanted, response=None), [said]
 

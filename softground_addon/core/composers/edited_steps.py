@@ -302,8 +302,8 @@ class EditedSteps:
         if kept is None:
             raise InputError(
                 f"The print of '{footprint.character}', {footprint.sole}, at frame {footprint.start_frame:.0f} was "
-                "baked by an earlier SoftGround, or by a mesh of too many vertices, and can only be muted: bake again, "
-                "or give the mesh fewer vertices."
+                "baked by an earlier version of SoftGround, or by a mesh of too many vertices, and can only be muted: "
+                "bake again, or give the mesh fewer vertices."
             )
         steps = _grid(footprint).shifted(kept.steps(footprint.load_frames), edit.shift_frames)
         other = self._shared(sole_of(edit, kept.pressing, self._feet), edit)

@@ -150,7 +150,7 @@ def _partial(path: Path) -> Path:
     if path.exists() and not path.is_file():
         raise InputError(f"'{path}' is a folder or a device, not a file: choose another name.")
     if path.exists() and not os.access(path, os.W_OK):
-        raise InputError(f"'{path}' is write-protected: choose another name, or let it be written.")
+        raise InputError(f"'{path}' is write-protected: choose another name, or make it writable.")
     # Containers share process ids, and some writers go by the suffix.
     return path.with_name(f".{path.stem}.{_MACHINE}-{secrets.token_hex(8)}.partial{path.suffix}")
 

@@ -111,9 +111,7 @@ class MeshTerrain:
         yield
         corners, triangles = corners[upward], triangles[upward]
         if not len(corners):
-            raise InputError(
-                f"{name} has no face under the character's path that could be stood on: move it under the feet."
-            )
+            raise InputError(f"{name} has no face under the character's path to stand on: move it under the feet.")
         bins = yield from _bins(corners[..., :2])
         of_corners = np.zeros((len(corners), 3, 0)) if values is None else np.asarray(values, float)[triangles]
         return MeshTerrain(corners, *bins, of_corners)
