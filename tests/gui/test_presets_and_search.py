@@ -19,6 +19,11 @@ def test_a_preset_is_added_and_removed_by_clicks(facts):
     assert facts["kept stiffness"] == pytest.approx(0.123)
 
 
+def test_the_panel_says_when_values_are_no_longer_the_presets(facts):
+    assert facts["modified"] == "My Ground (modified)"
+    assert facts["as saved"] == "My Ground"
+
+
 def test_the_search_finds_the_operators(facts):
     assert facts["found"] == {name: name for name in facts["found"]}
     assert len(facts["found"]) >= 5

@@ -10,6 +10,12 @@ def facts(tell):
     return tell("sink_feet")
 
 
+def test_its_switch_is_beside_bake_and_on_in_new_scenes(facts):
+    assert facts["on by default"]
+    assert facts["below Bake"] == pytest.approx(0.0, abs=12)  # px
+    assert facts["switched off"]
+
+
 def test_the_button_lets_the_feet_down(facts):
     assert facts["floating"] > 10.0
     assert facts["left"] < 2.0
@@ -25,6 +31,12 @@ def test_one_undo_takes_it_back(facts):
     floating, grounding = facts["undone"]
     assert floating == pytest.approx(facts["floating"])
     assert not grounding
+
+
+def test_depth_and_overlay_go_on_after_the_file_was_saved_and_opened_again(facts):
+    predicted, baked, stale = facts["reopened"]
+    assert predicted == pytest.approx(baked, rel=0.02)
+    assert stale == ""
 
 
 def test_nothing_goes_wrong_on_the_console(facts):

@@ -8,9 +8,18 @@ import bpy
 
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
+from tests.gui.stories.first_minutes import title
 from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 
-SEARCHED = ("Predict Depth", "Create Ground", "Bake Footprints", "Add Force Curves", "Clear Bake")
+SEARCHED = (
+    "Predict Depth",
+    "Create Ground",
+    "Bake Footprints",
+    "Go to Last Step",
+    "Apply Look",
+    "Add Force Curves",
+    "Clear Bake",
+)
 """Operators by the words that an artist would type."""
 
 
@@ -28,6 +37,10 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield 0.5
     facts["saved"] = presets()
     facts["chosen"] = scene().softground.material.preset
+    scene().softground.material.stiffness_mpa = 0.2
+    facts["modified"] = title()
+    scene().softground.material.stiffness_mpa = 0.123
+    facts["as saved"] = title()
     place = yield from hand.find_button("softground.save_preset", offset=0.76)
     yield from hand.click(place[0] - 120, place[1])
     yield 0.7

@@ -1,4 +1,4 @@
-"""Prints by one click, feet let down into them by another; the response by its panel."""
+"""Prints by one click, feet let down into them by another; the response by its panel; the file on another day."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ from tests.gui.stories.interrupted_bake import scene, session, with_viewport
 def tell(hand: Hand, facts: dict) -> Steps:
     armature = open_walk(60)
     yield from hand.open_sidebar()
-    scene().softground.sink_feet = False
     with_viewport(hand, bpy.ops.softground.add_character)
-    yield from hand.press_button("softground.bake")
+    facts["on by default"] = scene().softground.sink_feet
+    bake = yield from hand.find_button("softground.bake")
+    switch = yield from hand.find_field("sink_feet", offset=0.85)
+    facts["below Bake"] = bake[1] - switch[1]
+    yield from hand.click(*switch)
+    facts["switched off"] = not scene().softground.sink_feet
+    yield from hand.click(*bake)
     yield from hand.wait_for(lambda: session().is_baking, 10)
     yield from hand.wait_for(lambda: not session().is_baking, 120)
     yield 0.5
@@ -45,6 +50,23 @@ def tell(hand: Hand, facts: dict) -> Steps:
     yield from hand.key("Z", ctrl=True)
     yield 0.5
     facts["undone"] = floating(), scene().softground.grounding.use
+
+    # another day
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.5
+    shot = str(hand.pictures / "sunk.blend")
+    with_viewport(hand, bpy.ops.wm.save_as_mainfile, filepath=shot)
+    with_viewport(hand, bpy.ops.wm.open_mainfile, filepath=shot)
+    yield 1.0
+    yield from hand.open_sidebar()
+    yield from hand.press_button("softground.predict_depth")
+    yield 1.0
+    with_viewport(hand, bpy.ops.softground.overlay)
+    yield 1.0
+    summary = dict(scene().softground.ground.data["softground_summary"])
+    facts["reopened"] = scene().softground.depth_cm, 100 * summary["typical_depth_m"], session().stale
+    yield from hand.find_field("depth_cm")  # which is there while the animation that was read still holds
+    yield from hand.picture("overlay_after_reopening", in_docs=False)
 
 
 def floating() -> float:
