@@ -31,7 +31,7 @@ def test_apply_look_goes_over_the_users_material_and_only_when_asked(facts):
 
 
 def test_the_graph_editor_shows_the_force_curves(facts):
-    assert len([path for path in facts["curves"] if "Force" in path]) == 2
+    assert len([path for path in facts["curves"] if " force" in path]) == 2
 
 
 def test_the_add_menu_has_the_sample_figure(facts):
