@@ -44,8 +44,7 @@ def add_firs(
     crown : float
         Part of the height below the lowest branches.
     """
-    bark = stage.plain_material("SoftGround Sample bark", (0.075, 0.052, 0.038), 0.9)
-    materials = _needles(colour), bark, stage.plain_material("SoftGround Sample laden", (0.86, 0.89, 0.93), 0.8)
+    materials = _needles(colour), _bark(), stage.plain_material("SoftGround Sample laden", (0.86, 0.89, 0.93), 0.8)
     shapes = [_fir(np.random.default_rng(seed + number), materials, snow, crown) for number in range(_SHAPES)]
     turn = np.random.default_rng(seed)
     for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
@@ -172,4 +171,24 @@ def _needles(colour: Colour) -> bpy.types.Material:
     dark, young = (0.55 * red, 0.55 * green, 0.55 * blue), (1.9 * red, 1.9 * green, 1.3 * blue)
     shade = graph.mix(graph.attribute("tip") * 0.7 + tree * 0.3, dark, young)
     material.node_tree.links.new(shade.output, shader.inputs["Base Color"])
+    return material
+
+
+def _bark() -> bpy.types.Material:
+    """Scales of bark that are longer than wide, with dark cracks between them."""
+    material = stage.plain_material("SoftGround Sample bark", (0.085, 0.058, 0.042), 0.9)
+    graph = Graph(material.node_tree)
+    place = graph.node(
+        "ShaderNodeVectorMath",
+        {0: graph.out(graph.node("ShaderNodeNewGeometry")), 1: (1.0, 1.0, 0.35)},
+        operation="MULTIPLY",
+    )
+    scales = graph.node("ShaderNodeTexVoronoi", {"Vector": graph.out(place), "Scale": 22.0}, feature="DISTANCE_TO_EDGE")
+    crack = graph.ramp(graph.out(scales) + graph.noise(graph.out(place), 0.03, 4.0, 0.7) * 0.25, 0.10, 0.35)
+    tone = graph.noise(graph.out(place), 0.12, 3.0, 0.6)
+    colour = graph.mix(crack, (0.020, 0.014, 0.011), graph.mix(tone, (0.065, 0.044, 0.032), (0.17, 0.125, 0.095)))
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    bump = graph.node("ShaderNodeBump", {"Height": crack, "Distance": 0.02})
+    material.node_tree.links.new(colour.output, shader.inputs["Base Color"])
+    material.node_tree.links.new(bump.outputs[0], shader.inputs["Normal"])
     return material

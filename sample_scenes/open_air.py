@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import atan, pi, radians
 
 import bpy
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from sample_scenes import production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
+from sample_scenes.dog import Dog
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
@@ -86,21 +87,28 @@ def bake_walk(
     cell_size: float | None,
     options: Options | None,
     motion: BodyMotion | None = None,
-    body: Body | None = None,
+    body: Body | Dog | None = None,
+    beside: Sequence[Walker] = (),
 ) -> Bake:
-    """A hiker who goes along the way toward -y, from y = `start` [m], in prints as fine as close-ups ask for.
+    """A hiker, or an animal, who goes along the way toward -y, from y = `start` [m], in prints for close-ups.
 
-    He walks, unless another `motion` of so many frames is given. The camera is there first: relief is fine where it
-    comes near.
+    A hiker walks, unless another `motion` of so many frames is given; others may print `beside` him. The camera is
+    there first: relief is fine where it comes near.
     """
     body = body or Body()
-    walker = create_character("Hiker", body, scene.collection)
+    name = "Hiker" if isinstance(body, Body) else "Animal"
+    walker = create_character(name, body, scene.collection)
     walker.location = (0.0, start, 0.0)
-    write_action(walker, motion or walk(body, Gait(), frames, scene.render.fps), "Walk")
+    if motion is None:
+        assert isinstance(body, Body), "an animal needs a motion"
+        motion = walk(body, Gait(), frames, scene.render.fps)
+    write_action(walker, motion, "Walk")
     scene.frame_start, scene.frame_end = 1, frames
     chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "detail": "ALWAYS", "sink_feet": "true"}
     chosen |= dict(options or {})
-    return production.bake(scene, [Walker(walker, body.mass)], preset, cell_size, ground=ground, options=chosen)
+    more = () if isinstance(body, Body) else ("hand.L", "hand.R")
+    walkers = [Walker(walker, body.mass, more=more), *beside]
+    return production.bake(scene, walkers, preset, cell_size, ground=ground, options=chosen)
 
 
 _SUN_WIDTH = radians(0.7)

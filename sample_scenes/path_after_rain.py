@@ -1,27 +1,79 @@
-"""A walk along a forest path, after a shower: water stands in the prints and mirrors the sky."""
+"""A walk along a forest path, after a shower: water stands in the prints and in hollows, and mirrors the sky."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians
+from math import pi, radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import firs, open_air, production, stage
+from sample_scenes import firs, litter, open_air, production, stage
 from sample_scenes.production import Bake, Claim, Options
-from softground_addon.blender.ground import weather
+from sample_scenes.stage import Array
+from softground_addon.blender.ground import baked_ground, weather
+from softground_addon.blender.shader_graph import Graph
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
 
-PRESET = "Soil"
+PRESET = "Mud"
 FRAMES = 260
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
-TUFTS = 3000
-HEIGHT = open_air.rolling(swell=0.20, hills=14.0, seed=8)
+PUDDLES = np.array(
+    [
+        (0.78, 0.15, 0.34, 0.50, 0.045),
+        (-0.74, -1.30, 0.36, 0.75, 0.050),
+        (0.86, -2.60, 0.46, 0.90, 0.060),
+        (-0.80, -4.90, 0.40, 1.10, 0.055),
+        (0.80, -6.60, 0.42, 1.20, 0.060),
+        (-0.85, -9.40, 0.45, 1.40, 0.060),
+        (0.90, -12.5, 0.50, 1.80, 0.070),
+    ]
+)
+"""Hollows beside the way: middle, half width, half length and depth [m]."""
+LEVEL = -0.016  # m, of the water in them
+_HILLS = open_air.rolling(swell=0.22, hills=14.0, seed=8)
+
+
+def height(x: Array, y: Array) -> Array:
+    """A trodden path between low banks, with hollows [m]."""
+    bank = np.clip((np.abs(x) - 1.0 - 0.15 * np.sin(0.9 * y) - 0.1 * np.sin(2.1 * y + 1.0)) / 0.7, 0.0, 1.0)
+    return _HILLS(x, y) + 0.11 * bank**2 * (3.0 - 2.0 * bank) - hollow(x, y)
+
+
+def hollow(x: Array, y: Array) -> Array:
+    """How deep the puddles' beds are below the path [m]."""
+    depth = np.zeros(np.broadcast(x, y).shape)
+    for middle, along, wide, long, deep in PUDDLES:
+        bent = x - middle - 0.10 * np.sin(3.1 * (y - along) + 7.0 * middle) - 0.05 * np.sin(7.3 * y)
+        depth += deep * np.exp(-(((bent / wide) ** 2 + ((y - along) / long) ** 2) ** 1.5))
+    return depth
+
+
+def _beside(way: float, bank: float) -> Callable[[Array, Array], Array]:
+    """So many pieces on a square metre of the way, and of the forest floor beside it; none far from the camera."""
+
+    def density(x: Array, y: Array) -> Array:
+        share = np.clip((np.abs(x) - 0.5) / 0.7, 0.0, 1.0)
+        seen = np.clip((y + 26.0) / 16.0, 0.0, 1.0) ** 2 * (y < 2.5) * np.clip((9.0 - np.abs(x)) / 4.0, 0.0, 1.0)
+        return seen * (way + (bank - way) * share) * (hollow(x, y) < 0.01)
+
+    return density
+
+
+PAINTED = {
+    "leaves": _beside(40.0, 170.0),
+    "needles": _beside(110.0, 480.0),
+    "crumbs": _beside(260.0, 160.0),
+    "stones": _beside(70.0, 30.0),
+    "twigs": _beside(5.0, 16.0),
+    "growth": _beside(-60.0, 60.0),
+}
+"""Pieces of a square metre, by kind."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +85,19 @@ class PathAfterRain:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PathAfterRain:
     """A wide ground, a walk away from the camera, and a shower on its prints."""
-    ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), HEIGHT, "soil")
+    ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), height, "mud", PAINTED)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.40, 1.70, 0.62), (-0.12, -1.2, 0.06), 28.0, (0.0, 0.1, 0.0), 8.0)
+    open_air.add_camera(scene, (0.36, 1.62, 0.56), (-0.10, -1.6, 0.12), 28.0, (0.0, 0.1, 0.0), 8.0)
     bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
     weather.set_preset(weather.add(bake.ground), "SHOWER")
     return PathAfterRain({PRESET: bake})
 
 
 def claims(built: PathAfterRain) -> list[Claim]:
-    """A track of the depth of boots in soil."""
+    """A track of the depth of boots in mud."""
     steps = built.bakes[PRESET].footprints
     return [
-        Claim("Steps in the soil", len(steps), 12, 40),
+        Claim("Steps in the mud", len(steps), 12, 40),
         Claim("Depth of the deepest [m]", max(step.max_depth_m for step in steps), 0.01, 0.08),
     ]
 
@@ -54,20 +106,99 @@ def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, with the light from the side."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    stage.add_sun(scene, radians(28), radians(14))
+    open_air.add_low_sun(scene, radians(30), radians(27), (1.0, 0.86, 0.68), 7.0, 0.24, (radians(24.0), 1.0))
     chance = np.random.default_rng(5)
-    sides = np.where(chance.random(140) < 0.5, -1.0, 1.0)
-    spots = np.column_stack([sides * (9.0 + chance.gamma(1.6, 9.0, 140)), -chance.uniform(22.0, 110.0, 140)])
-    firs.add_firs(spots, chance.uniform(5.0, 14.0, len(spots)), HEIGHT, (0.042, 0.060, 0.036))
-    sides = np.where(chance.random(TUFTS) < 0.5, -1.0, 1.0)
-    spots = np.column_stack(
-        [sides * (0.75 + chance.gamma(1.3, 1.9, TUFTS)), 2.0 - chance.uniform(0.0, 1.0, TUFTS) ** 1.6 * 24]
-    )
-    open_air.add_grass(spots, 0.06 + chance.gamma(2.0, 0.05, TUFTS), HEIGHT)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.1, 80
+    sides = np.where(chance.random(340) < 0.5, -1.0, 1.0)
+    spots = np.column_stack([sides * (4.5 + chance.gamma(1.4, 9.0, 340)), -chance.uniform(13.0, 75.0, 340)])
+    firs.add_firs(spots, chance.uniform(6.0, 16.0, len(spots)), height, NEEDLES)
+    spots = np.array([(-2.6, -5.2), (2.9, -3.9), (-3.9, -9.0), (2.9, -9.5), (-2.9, -13.0), (4.6, -7.2), (5.2, -4.4)])
+    firs.add_firs(spots, chance.uniform(13.0, 19.0, len(spots)), height, NEEDLES, seed=9, crown=0.26)
+    _add_litter(scene.softground.ground, chance)
+    _add_puddles(scene)
+    _add_roots(scene, spots[:4], chance)
+    scene.view_settings.exposure, scene.render.image_settings.quality = 0.45, 82
     path = folder / "path_after_rain.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
+
+
+NEEDLES = (0.030, 0.052, 0.026)
+
+
+def _add_litter(baked: bpy.types.Object, chance: np.random.Generator) -> None:
+    """Leaves, needles, crumbs, stones, twigs and grass, which the boots have bent, buried and soiled."""
+    ground = baked_ground.display_mesh_of(baked)
+    grass = litter.blades(open_air.tufts(chance), (0.045, 0.060, 0.014), (0.115, 0.125, 0.040))
+    crumbs = litter.stones((0.050, 0.030, 0.018), (0.120, 0.074, 0.044), 0.75)
+    stones = litter.stones((0.13, 0.11, 0.09), (0.32, 0.28, 0.23), 0.5, rough=0.2)
+    brown, ochre = (0.060, 0.026, 0.010), (0.30, 0.135, 0.035)
+    flat = {"lean": 0.35, "bend": 0.15, "bury": 0.12}
+    litter.strew(ground, litter.leaves(brown, ochre), "leaves", smallest=0.045, largest=0.10, law=2.2, seed=1, **flat)
+    fallen = litter.needles((0.045, 0.022, 0.010), (0.17, 0.085, 0.034))
+    litter.strew(ground, fallen, "needles", smallest=0.03, largest=0.07, seed=2, lean=0.05, bury=0.2)
+    litter.strew(
+        ground, crumbs, "crumbs", smallest=0.004, largest=0.022, lean=pi, bend=pi / 2, depth=0.1, bury=1.0, seed=3
+    )
+    litter.strew(
+        ground, stones, "stones", smallest=0.004, largest=0.04, lean=pi, bend=pi / 2, depth=0.1, bury=0.8, seed=4
+    )
+    wood = litter.twigs((0.050, 0.034, 0.022), (0.15, 0.11, 0.075))
+    litter.strew(ground, wood, "twigs", smallest=0.05, largest=0.45, law=1.4, lean=0.06, bury=0.03, seed=5)
+    growth = litter.pieces_of("Grass", grass)
+    litter.strew(ground, growth, "growth", smallest=0.05, largest=0.30, law=1.2, lean=0.2, bend=1.4, bury=0.05, seed=6)
+
+
+def _add_puddles(scene: bpy.types.Scene) -> None:
+    """Level water over the hollows, clear at its edge and turbid where it is deep."""
+    x, y = np.meshgrid(np.arange(-1.6, 1.6, 0.02), np.arange(-16.0, 1.6, 0.02))
+    depth = LEVEL - height(x, y)
+    mesh = litter.mesh_of(
+        "Puddles", np.stack([x, y, np.full_like(x, LEVEL)], -1).reshape(-1, 3), _where(depth > -0.012), _puddle_water()
+    )
+    mesh.attributes.new("depth", "FLOAT", "POINT").data.foreach_set("value", depth.astype(np.float32).ravel())
+    scene.collection.objects.link(bpy.data.objects.new("Puddles", mesh))
+
+
+def _where(chosen: Array) -> Array:
+    """Corners of the squares of a grid whose corner is chosen, (F, 4)."""
+    columns = chosen.shape[1]
+    corner = np.flatnonzero(chosen[:-1, :-1] & chosen[1:, 1:])
+    corner = corner // (columns - 1) * columns + corner % (columns - 1)
+    return corner[:, None] + [0, 1, columns + 1, columns]
+
+
+def _puddle_water() -> bpy.types.Material:
+    """Still, turbid water."""
+    material = stage.plain_material("SoftGround Sample puddle", (0.10, 0.066, 0.038), 0.02)
+    graph = Graph(material.node_tree)
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["IOR"].default_value = 1.33
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    ragged = graph.noise(place, 0.03, 4.0, 0.65) * 0.016
+    there = graph.ramp(graph.attribute("depth") + ragged + -0.008, -0.001, 0.003)
+    material.node_tree.links.new(there.output, shader.inputs["Alpha"])
+    ripples = graph.node(
+        "ShaderNodeBump", {"Height": graph.noise(place, 0.06, 1.0), "Distance": 0.001, "Strength": 0.15}
+    )
+    material.node_tree.links.new(ripples.outputs[0], shader.inputs["Normal"])
+    return material
+
+
+def _add_roots(scene: bpy.types.Scene, spots: Array, chance: np.random.Generator) -> None:
+    """Roots from trees toward the way, which dive before they reach it."""
+    lines = []
+    for place in spots:
+        for _ in range(5):
+            end = np.array((np.sign(place[0]) * chance.uniform(0.45, 1.0), place[1] + chance.normal(0.2, 1.0)))
+            along = np.linspace(0.0, 1.0, 24)
+            way = place + (end - place) * along[:, None]
+            way[:, 1] += 0.12 * np.sin(chance.uniform(5, 9) * along + chance.uniform(0, 6)) * along
+            thick = chance.uniform(0.025, 0.05)
+            up = thick * (0.55 - 1.3 * along**3 + 0.25 * np.sin(11 * along + chance.uniform(0, 6)))
+            lines.append((np.column_stack([way, height(*way.T) + up]), thick))
+    vertices, faces = litter.tubes(lines, 10)
+    look = litter.material("root", (0.055, 0.036, 0.022), (0.085, 0.058, 0.036), 0.8)
+    scene.collection.objects.link(bpy.data.objects.new("Roots", litter.mesh_of("Roots", vertices, faces, look)))
 
 
 if __name__ == "__main__":
