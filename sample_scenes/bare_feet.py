@@ -71,7 +71,7 @@ def shoot(_built: BareFeet, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, with the sun over the sea."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(-18), radians(15), (1.0, 0.70, 0.45), 6.5, 0.11, _SKY)
+    open_air.add_low_sun(scene, radians(-50), radians(21), (1.0, 0.72, 0.48), 6.5, 0.11, _SKY)
     open_air.add_sea(scene, shore, LEVEL, height)
     chance = np.random.default_rng(5)
     spots = np.column_stack([5.5 + chance.gamma(1.5, 5.0, 700), 1.0 - chance.uniform(0.0, 60.0, 700)])
