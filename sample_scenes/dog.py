@@ -89,10 +89,13 @@ class Dog:
         Height at the shoulder blades [m].
     mass : float
         [kg].
+    brush : float
+        How many times thicker the tail is than a shepherd's.
     """
 
     withers: float = 0.66
     mass: float = 35.0
+    brush: float = 1.0
 
     @property
     def bones(self) -> Bones:

@@ -46,12 +46,12 @@ def _trunk(body: Dog) -> Piece:
         base = skull + W * np.array((-0.035, 0.065 * y, 0.075))
         head.append(round_cone(base, base + W * np.array((-0.015, 0.030 * y, 0.125)), 0.042 * W, 0.010 * W))
     tail = [
-        round_cone(j["tail"] + W * np.array((0.10, 0, 0)), j["tail_middle"], 0.055 * W, 0.050 * W),
-        round_cone(j["tail_middle"], j["tail_tip"], 0.050 * W, 0.020 * W),
+        round_cone(j["tail"] + W * np.array((0.10, 0, 0)), j["tail_middle"], 0.055 * W, 0.050 * W * body.brush),
+        round_cone(j["tail_middle"], j["tail_tip"], 0.050 * W * body.brush, 0.020 * W * body.brush),
     ]
     solid = union([union(trunk, 0.06 * W), union(head, 0.04 * W), union(tail, 0.02 * W)], 0.05 * W)
     wide = 0.26 * W * max(g, 1.0)
-    low = np.array((j["tail_tip"][0] - 0.08 * W, -wide, 0.35 * W / max(g, 1.0)))
+    low = np.array((j["tail_tip"][0] - 0.08 * W * body.brush, -wide, 0.35 * W / max(g, 1.0)))
     high = np.array((nose[0] + 0.08 * W, wide, 1.45 * W))
     return surface(
         body, "coat", solid, low, high, 0.017 * W, tuple(bone for bone in body.bones if "." not in bone[-2:])
