@@ -201,7 +201,7 @@ def character_of(character: Any) -> CharacterSettings:
     soles = tuple(
         SoleSource(
             sole.name,
-            SIDE_TO_CODE[sole.side],
+            SIDE_TO_CODE.get(sole.side, ""),
             sole.bone,
             sole.toe_bone,
             sole.object.name_full if sole.object else "",
@@ -382,6 +382,37 @@ def fit_cells(scene: bpy.types.Scene) -> None:
 
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[(?:\"([^\"]*)\"|'([^']*)')\]")
+
+
+def check_stored(group: Any) -> None:
+    """Whether all values of a group of settings are such as its fields take: those of a forged file may be any.
+
+    Raises
+    ------
+    InputError
+        If one is not; names it.
+    """
+    for field in group.bl_rna.properties:
+        if field.identifier in (*_OTHERS, "name"):
+            continue
+        value = getattr(group, field.identifier)
+        if field.type == "COLLECTION":
+            for one in value:
+                check_stored(one)
+        elif field.type == "POINTER":
+            if isinstance(value, bpy.types.PropertyGroup):
+                check_stored(value)
+        elif not _takes(field, value):
+            raise InputError(
+                f"The file holds {value!r} as '{field.name}', which it cannot be: right-click it, choose Reset to "
+                "Default Value, and set it again."
+            )
+
+
+def _takes(field: Any, value: Any) -> bool:
+    if field.type in ("FLOAT", "INT"):
+        return all(field.hard_min <= one <= field.hard_max for one in (value if field.is_array else (value,)))
+    return field.type != "ENUM" or value != ""  # Blender gives no name to a number that names nothing
 
 
 def assign(settings: bpy.types.PropertyGroup, path: str, text: str) -> None:

@@ -10,6 +10,9 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.relief import tread_map
 
+LARGEST = 4096
+"""Pixels along the longer side of an image that is read: 16 million take 0.6 GB and a second or two."""
+
 _known: dict[tuple[int, str], str] = {}
 """Maps as text by the session uid and the file of images; empty of those that cannot be read."""
 
@@ -39,6 +42,11 @@ def check(image: bpy.types.Image | None) -> None:
     """
     if image is None:
         raise InputError("Tread Pattern is 'Image', and none is chosen: choose one below it, or another pattern.")
+    if max(image.size) > LARGEST:
+        raise InputError(
+            f"The tread image '{image.name}' is {image.size[0]:,} x {image.size[1]:,} pixels: scale it to {LARGEST:,} "
+            "or fewer along its longer side."
+        )
     if not map_of(image):
         raise InputError(
             f"The tread image '{image.name}' has no pixels that can be read: check that its file is there "
@@ -48,6 +56,8 @@ def check(image: bpy.types.Image | None) -> None:
 
 def _read(image: bpy.types.Image) -> str:
     width, height = image.size
+    if max(width, height) > LARGEST:
+        return ""
     stored: Any = image.pixels
     pixels = np.empty(width * height * image.channels, np.float32)
     if not len(pixels) or len(stored) != len(pixels):

@@ -14,6 +14,7 @@ from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
 from softground_addon.blender.response import response_job
+from softground_addon.core.errors import InputError
 from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.response.clean_feet import foot_faults
@@ -277,3 +278,11 @@ def test_a_character_without_feet_takes_no_foot_lock(floor_walk):
     with pytest.raises(RuntimeError, match="has no foot with a bone"):
         bpy.ops.softground.add_foot_lock()
     assert not floor_walk.softground.characters[0].holds
+
+
+def test_a_bone_that_is_gone_is_named(scene):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    scene.softground.characters[0].joints["hips"].bone = "Pelvis"
+    with pytest.raises(InputError, match="'Walker' has no bone 'Pelvis'"):
+        jobs.run(clean_feet(scene))

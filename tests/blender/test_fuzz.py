@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 
 from softground_addon.batch import manifest
 from softground_addon.blender import handlers, jobs
-from softground_addon.blender.baking import bake_job, bake_report
+from softground_addon.blender.baking import bake_job, bake_report, step_edits, step_soles
 from softground_addon.blender.command_line import cli
-from softground_addon.blender.ground import baked_ground, ground_mesh
+from softground_addon.blender.ground import baked_ground, ground_mesh, weather
 from softground_addon.blender.interface import panels, response_panel
 from softground_addon.blender.response import response_job
 from softground_addon.core.composers.edited_steps import EditedSteps
@@ -35,8 +35,9 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.soft_ground import SoftGround
 from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record import record
-from softground_addon.core.record.edits import StepEdit
-from tests.blender import shots
+from softground_addon.core.record.edits import StepEdit, step_id
+from tests.blender import shots, weathered_shots
+from tests.blender.test_edited_steps import plate
 
 QUICK = 40
 WHOLE: list[int] = []
@@ -367,6 +368,56 @@ def test_steps_of_a_forged_record_are_pressed_again_or_refused(count, stored):
     each(forged, count, check)
 
 
+@pytest.fixture(scope="module")
+def felt(addon, tmp_path_factory):
+    """A file with a bake in weather that its steps feel, with debris, and with a step that a mesh's sole presses."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    weathered_shots.added_walker(scene)
+    scene.softground.sink_feet, scene.softground.cell_size = False, 0.05
+    scene.softground.debris = scene.softground.steps_feel_weather = True
+    plate(scene)
+    bpy.ops.softground.bake()
+    bpy.ops.softground.add_weather()
+    assert bpy.ops.softground.bake() == {"FINISHED"}
+    bake = step_edits.editable(scene)
+    shoe = {step_id(bake.left.footprints[0]): StepEdit(sole="Shoe")}
+    step_edits.edit(scene, bake, step_soles.edits_with_soles(scene, bake.made_with, shoe))
+    path = tmp_path_factory.mktemp("felt") / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@counts(1000)
+@pytest.mark.timeout(3600)
+def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
+    bpy.ops.wm.open_mainfile(filepath=str(felt))
+    scene = bpy.context.scene
+    ground = scene.softground.ground
+    mesh = ground_mesh.mesh_of(baked_ground.display_mesh_of(ground))
+    content = bytes(mesh[ground_mesh.RECORD])
+    left = record.load(content)
+    (edited,) = left.edits.values()
+    assert all((left.throws, left.thrown, left.about["inputs"]["weather"], edited.mesh))
+    moved = {step_id(left.footprints[1]): StepEdit(move_m=(0.1, 0.0), shift_frames=2)}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        text = archive.read("record.json")
+
+    def check(forged):
+        made = rezipped(content, "record.json", forged, zipfile.ZIP_DEFLATED)
+        mesh.pop(ground_mesh.RECORD, None)  # an array that is there would keep its length
+        mesh[ground_mesh.RECORD] = np.frombuffer(made + bytes(-len(made) % 4), np.int32)
+        assert isinstance(bake_report.stale_reasons(scene), tuple)
+        assert handlers.compare_bake() is None
+        with contextlib.suppress(InputError), np.errstate(all="ignore"):
+            step_edits.edit(scene, step_edits.editable(scene), moved)
+        with contextlib.suppress(InputError), np.errstate(all="ignore"):
+            weather.add(ground)
+        bpy.context.view_layer.update()
+
+    each(forged_text(text), count, check)
+
+
 @cache
 def bomb(stored, method):
     """The record with a part more, of a gigabyte of zeros in little space."""
@@ -482,6 +533,62 @@ def test_no_stored_property_makes_a_traceback(count, forgeable):
                 owner[name] = before
 
     each(st.tuples(st.sampled_from(names), PROPERTY_VALUES), count, check)
+
+
+FORGED = {
+    "FLOAT": (float("nan"), float("inf"), -1e38),
+    "INT": (-(2**31), 2**31 - 1),
+    "ENUM": (-1, 99),
+    "STRING": ("x" * 3000,),
+    "BOOLEAN": (7,),
+}
+"""Values that no field of a kind takes; stored past its bounds, as forged files have them."""
+
+
+def stored_fields(group):
+    """Each field below a group of settings that holds a value, with the group that it is of."""
+    for field in group.bl_rna.properties:
+        if field.identifier in ("rna_type", "name"):
+            continue
+        value = getattr(group, field.identifier)
+        if field.type == "COLLECTION" and len(value):
+            yield from stored_fields(value[0])
+        elif isinstance(value, bpy.types.PropertyGroup):
+            yield from stored_fields(value)
+        elif field.type in FORGED:
+            yield group, field
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.skipif(bpy.app.version >= (5, 0), reason="scripts do not reach what Blender 5 stores of such fields")
+def test_no_stored_setting_makes_a_traceback(scene, capfd):
+    shots.walker(scene, frames=30)
+    bpy.ops.softground.add_character()
+    character = scene.softground.characters[0]
+    lock = character.holds.add()
+    lock.foot, lock.frame = character.soles[0].name, 5
+    scene.softground.cell_size = 0.05
+    bpy.ops.softground.bake()
+    fields = list(stored_fields(scene.softground))
+    assert len(fields) > 50
+    for group, field in fields:
+        name = field.identifier
+        before = group.get(name)
+        for value in FORGED[field.type]:
+            group[name] = [value] * field.array_length if getattr(field, "is_array", False) else value
+            for operator in (bpy.ops.softground.bake, bpy.ops.softground.clean_feet):
+                with contextlib.suppress(RuntimeError):
+                    operator()
+            said = "".join(capfd.readouterr())
+            assert "Traceback" not in said, (name, value, said)
+            for panel in (panels.SOFTGROUND_PT_character, panels.SOFTGROUND_PT_ground, panels.SOFTGROUND_PT_bake):
+                panel.draw(drawn(), bpy.context)
+            assert handlers.compare_bake() is None
+        if before is None:
+            del group[name]
+        else:
+            group[name] = before
 
 
 def drawn():

@@ -128,7 +128,14 @@ def missing():
     return image
 
 
-@pytest.mark.parametrize(("make", "named"), [(lambda: None, "none is chosen"), (missing, "'Gone'.*not_there.png")])
+def wide():
+    return bpy.data.images.new("Wide", tread_images.LARGEST + 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [(lambda: None, "none is chosen"), (missing, "'Gone'.*not_there.png"), (wide, "'Wide' is 4,097 x 1 pixels")],
+)
 def test_images_that_cannot_be_read_are_named_and_nothing_changes(shod, make, named):
     options = shod.softground
     options.tread_pattern, options.tread_image = "IMAGE", make()

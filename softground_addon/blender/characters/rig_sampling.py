@@ -98,7 +98,7 @@ def sample_character(
     InputError
         If the rig cannot be used as it is; the message names the object and the remedy.
     """
-    _check_input(scene, armature, mapping, mass)
+    check_rig(scene, armature, mapping, mass)
     _check_frames(frames)
     bones = [*bones_of(mapping), *(recorder.bones if recorder else ())]
     on_bones = any(source.bone and not source.object for source in mapping.soles)
@@ -415,7 +415,14 @@ def _check_mass(name: str, mass: float) -> None:
         raise InputError(f"The mass of '{name}' is {mass} kg: give it a positive mass.")
 
 
-def _check_input(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
+def check_rig(scene: bpy.types.Scene, armature: bpy.types.Object, mapping: RigMapping, mass: float) -> None:
+    """Whether a character can be read.
+
+    Raises
+    ------
+    InputError
+        If not; names the armature and the remedy.
+    """
     require_armature(armature)
     name = armature.name
     _check_mass(name, mass)

@@ -20,12 +20,12 @@ def of(preset: Path) -> int:
 def read(preset: Path) -> bpy.types.ImagePreview | None:
     """The picture beside a preset's file; None where there is none."""
     picture, key = preset.with_suffix(".png"), str(preset)
-    if not picture.is_file():
-        return None
     if not _shown:
         _shown.append(bpy.utils.previews.new())
     if key not in _shown[0]:
         with suppress(OSError, KeyError):
+            if not picture.is_file():
+                return None
             _shown[0].load(key, str(picture), "IMAGE")
     return _shown[0].get(key)
 

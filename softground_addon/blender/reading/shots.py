@@ -26,7 +26,7 @@ from ..characters.control_poses import PoseRecorder
 from ..characters.import_fixes import size_of
 from ..characters.prop_extraction import check_props
 from ..characters.rig_mapping import RigMapping
-from ..characters.rig_sampling import sample_character, sample_prop
+from ..characters.rig_sampling import check_rig, sample_character, sample_prop
 from ..ground import ground_checks, ground_mesh, painted_ground, weather
 from ..ground.ground_mesh import GroundSurface
 from ..jobs import Job, Progress, counted, meanwhile
@@ -79,6 +79,7 @@ def settings_of(scene: bpy.types.Scene, *, grounded: bool = False) -> BakeSettin
         If not; names what is wrong and the remedy.
     """
     settings.forget_deleted_ground(scene)
+    settings.check_stored(scene.softground)
     for character in scene.softground.characters:
         if character.armature is None and character.soles and not any(s.object or s.bone for s in character.soles):
             raise InputError(
@@ -220,6 +221,7 @@ def sample_characters(
         if one.armature:
             armature = settings.found(one.armature)
             if wanted.response:
+                check_rig(scene, armature, mapping, one.mass_kg)
                 controls = controls_of(scene, armature, mapping)
                 recorder = PoseRecorder([control.bone for control in controls], len(frames))
             grown = size_of(scene, armature) / one.size_m if one.size_m else 1.0
