@@ -397,7 +397,8 @@ def test_images_hold_what_came_down_where_and_when(scene, tmp_path):
     set_input(obj.modifiers[0], "Wind", (3.0, 0.0, 0.0))
     blown = debris_object.at_rest(obj, frame_rate=24.0, time_stretch=1.0, unit_scale=1.0).place
     there = wanted(obj, 1e4, (3, 0, 0))
-    assert len(there) - len(blown) == (there[:, 2] < -10).sum() < 30  # what fell beside the ground lies nowhere
+    beside = (there[:, 2] < -5).sum()  # what fell beside the ground lies nowhere, and grains fall slowly
+    assert len(there) - len(blown) == beside < 0.002 * len(there)
     assert KDTree(there[:, :2]).query(blown)[0].max() < 1e-4
 
 

@@ -22,7 +22,7 @@ from ..record.record import EditableStep
 from ..record.throws import AIM, WEIGHT, Throw
 from . import flight, phases
 from .phases import Phase
-from .thrown_matter import MATTER, ThrownMatter
+from .thrown_matter import GRAINS, MATTER, ThrownMatter
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
@@ -57,8 +57,10 @@ SIZE_FALL = 2.5
 """Exponent with which the number of pieces falls over their size."""
 LARGEST_SHARE = 0.25
 """Of what a step throws in one phase, in its largest piece."""
-MOST_PIECES = 4000
-"""Of a step: what is more is drawn as larger ones."""
+ALL_PIECES = 250_000
+"""That all landings and pushes of a bake throw together: what is more is drawn as larger ones."""
+MOST_SHED = 800
+"""That a sole sheds."""
 LANDING_TIME = 0.1
 """What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
 BREADTH = 0.3
@@ -213,7 +215,9 @@ def throw(
     height_at : callable, optional
         The same at a scene frame, where they change over time: pieces land on the ground of the frame they fly from.
     """
-    parts = [_pieces(one, MATTER[surface], gravity) for one in found if one.volume > 1e-12]
+    throwing = [one for one in found if one.volume > 1e-12]
+    kinds = 2 * sum(one.throw.kind != 2 for one in throwing)  # pieces and grains
+    parts = [_pieces(one, MATTER[surface], gravity, ALL_PIECES // max(kinds, 1)) for one in throwing]
     return _landed(parts, height_at or (lambda _: height), gravity, moves=height_at is not None)
 
 
@@ -329,12 +333,16 @@ def _landing_part(footprint: Footprint, until: float) -> float:
 _Pieces = dict[str, Array]
 
 
-def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
-    """The pieces of a source, before their flight is known."""
+def _pieces(source: Source, matter: ThrownMatter, gravity: float, most: int) -> _Pieces:
+    """The pieces of a source, before their flight is known; of each kind at most so many."""
     throw = source.throw
     digest = hashlib.sha256(f"{source.step.name} {throw.kind}".encode()).digest()
     random = np.random.default_rng(int.from_bytes(digest[:8], "big"))
-    radius = _radii(source.volume, matter, random)
+    fine = matter.fine * source.volume
+    most = max(min(most, MOST_SHED if throw.kind == 2 else matter.most), 1)
+    radius = _radii(source.volume - fine, matter.sizes, most, random)
+    if fine:
+        radius = np.append(radius, _radii(fine, GRAINS, most, random))
     count, weights = len(radius), throw.samples[:, WEIGHT].astype(np.float64)
     lumps = matter.lumps if throw.kind == 2 else 0
     which = random.choice(len(weights), lumps or count, p=weights / weights.sum())
@@ -353,6 +361,7 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
     low, high = matter.settling
     part = np.sqrt(np.clip((2 * radius - matter.sizes[0]) / np.ptp(matter.sizes), 0.0, 1.0))
     settling = (low + (high - low) * part) * (0.8 + 0.4 * random.random(count))
+    settling *= np.minimum(2 * radius / matter.sizes[0], 1.0)  # of grains it rises with their size
     return {
         "birth": frames,
         "start": start,
@@ -364,14 +373,14 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float) -> _Pieces:
     }
 
 
-def _radii(volume: float, matter: ThrownMatter, random: np.random.Generator) -> Array:
+def _radii(volume: float, sizes: tuple[float, float], most: int, random: np.random.Generator) -> Array:
     """Radii of pieces whose spheres have a volume together [m]: their number falls as d^-2.5."""
-    low, high = matter.sizes
+    low, high = sizes
     high = max(min(high, (6 / np.pi * LARGEST_SHARE * volume) ** (1 / 3)), 2 * low)
     power = 1.0 - SIZE_FALL
     # mean of d³ over the distribution
     mean = power / (power + 3) * (high ** (power + 3) - low ** (power + 3)) / (high**power - low**power)
-    count = int(np.clip(np.ceil(volume / (np.pi / 6 * mean)), 1, MOST_PIECES))
+    count = int(np.clip(np.ceil(volume / (np.pi / 6 * mean)), 1, most))
     part = random.random(count)
     diameter = (low**power + part * (high**power - low**power)) ** (1 / power)
     scale = (volume / (np.pi / 6 * (diameter**3).sum())) ** (1 / 3)

@@ -23,6 +23,10 @@ class ThrownMatter:
         Smallest and largest diameter [m]; their number falls as d^-2.5.
     settling : (float, float)
         Speed at which the smallest and the largest fall at last [m/s].
+    most : int
+        Pieces of a step in one phase at most: what is more is drawn as larger ones.
+    fine : float
+        Share of the volume in as many single grains, as a mist between the pieces.
     """
 
     density: float
@@ -31,11 +35,16 @@ class ThrownMatter:
     lumps: int
     sizes: tuple[float, float]
     settling: tuple[float, float]
+    most: int = 4000
+    fine: float = 0.0
 
+
+GRAINS = (0.2e-3, 0.6e-3)
+"""Smallest and largest diameter of single grains [m]: medium dune sand; fine powder."""
 
 MATTER = {
-    "snow": ThrownMatter(150.0, 34.0, 1.0e-3, 0, (2.0e-3, 15.0e-3), (0.7, 4.0)),
-    "sand": ThrownMatter(1500.0, 34.0, 0.1e-3, 0, (1.0e-3, 5.0e-3), (2.0, 6.0)),
+    "snow": ThrownMatter(150.0, 34.0, 1.0e-3, 0, (2.0e-3, 15.0e-3), (0.7, 4.0), 8000, 0.01),
+    "sand": ThrownMatter(1500.0, 34.0, 0.1e-3, 0, (0.3e-3, 2.0e-3), (2.0, 6.0), 16_000, 0.01),
     "wet_sand": ThrownMatter(1800.0, 45.0, 0.4e-3, 8, (2.0e-3, 12.0e-3), (5.0, 9.0)),
     "mud": ThrownMatter(1700.0, 15.0, 0.3e-3, 6, (2.0e-3, 20.0e-3), (5.0, 9.0)),
     "soil": ThrownMatter(1300.0, 38.0, 0.3e-3, 0, (2.0e-3, 30.0e-3), (3.0, 12.0)),

@@ -121,6 +121,26 @@ def test_a_cloud_has_less_than_a_hundredth_of_the_landings_energy(record, speed)
     assert 0 < cloud < 0.01 * MASS * speed**2 / 2
 
 
+@pytest.mark.parametrize("surface", ["sand", "snow"])
+def test_plumes_are_fine_and_their_mist_comes_down_last(record, surface):
+    """Dry sand has no clumps: half of its pieces are finer than 1 mm, drawn as they are; powder hangs in the air."""
+    heard = thrown(4.0, record, surface=surface)
+    diameter = 2e3 * heard.radius
+    assert np.median(diameter) < (1.0 if surface == "sand" else 1.5)
+    assert diameter.max() < (6.0 if surface == "sand" else 30.0)
+    fine = diameter <= np.percentile(diameter, 20)
+    assert 4 / 3 * np.pi * (heard.radius[fine] ** 3).sum() < 0.01 * heard.volume.sum()
+    assert np.median(heard.drag_time[fine]) < np.median(heard.drag_time[~fine])
+
+
+def test_all_steps_of_a_long_run_share_the_pieces_that_a_bake_has(record):
+    left = replace(thrown(4.0, record).left, thrown={})
+    found = debris.sources(left.throws, left.steps, surface="sand", gravity=GRAVITY) * 60
+    heard = debris.throw(found, surface="sand", gravity=GRAVITY, height=flat)
+    assert 0.5 * debris.ALL_PIECES < len(heard.birth) <= debris.ALL_PIECES
+    assert 4 / 3 * np.pi * (heard.radius**3).sum() == pytest.approx(sum(one.volume for one in found), rel=1e-9)
+
+
 def test_the_rim_lacks_what_was_thrown(record):
     heard = thrown(4.0, record)
     for one, volume in zip(record, heard.volume, strict=True):
