@@ -1,6 +1,7 @@
 """A bake made in one Blender plays in the others, with the add-on and without it; `make versions`."""
 
 import itertools
+import pickle
 import subprocess
 from pathlib import Path
 
@@ -54,6 +55,19 @@ def test_a_bake_plays_as_recorded_in_every_version_without_the_add_on(made, tmp_
     for frame in map(str, frames):
         assert recorded[frame].min() < -0.005
         assert np.abs(played[frame] - recorded[frame]).max() <= TOLERANCE + 1e-6
+
+
+@pytest.mark.parametrize(("maker", "player"), list(itertools.product(VERSIONS, VERSIONS)))
+def test_edits_of_steps_are_read_and_reset_in_every_version(made, tmp_path, maker, player):
+    if (maker, player) in TOO_NEW:
+        pytest.skip("Blender 4.2 opens no files of Blender 5")
+    edited, written, read = (tmp_path / name for name in ("edited.blend", "written", "read"))
+    run_in(maker, "edit", made(maker)[0], edited, written)
+    run_in(player, "reset", edited, read)
+    edits, before, after = pickle.loads(written.read_bytes())
+    assert "StepEdit(mute=True" in edits
+    assert before != after
+    assert pickle.loads(read.read_bytes()) == (edits, before, after)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -1,9 +1,14 @@
-"""Bakes a shot, or plays one, in whatever Blender runs this: `python -m tests.blender.version_worker make|play ...`."""
+"""Bakes a shot, edits or plays one, in whatever Blender runs this: `python -m tests.blender.version_worker ...`."""
 
 from __future__ import annotations
 
+import pickle
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -50,6 +55,55 @@ def make(blend: str, heights: str) -> None:
         softground_addon.unregister()
 
 
+def edit(blend: str, saved: str, told: str) -> None:
+    """Mute a step of a shot, move and turn another, and save it; write its edits, and its records before and after."""
+    from softground_addon.core.record.edits import StepEdit, step_id
+
+    with _editable(blend) as (scene, bake, change):
+        one, other = (step_id(step) for step in bake.left.footprints[1:3])
+        before = _stored(scene)
+        change({one: StepEdit(mute=True), other: StepEdit(move_m=(0.05, 0.02), turn_deg=7.0)})
+        bpy.ops.wm.save_as_mainfile(filepath=saved)
+        Path(told).write_bytes(pickle.dumps((_edits(scene), before, _stored(scene))))
+
+
+def reset(blend: str, told: str) -> None:
+    """Write the edits of a shot as they are read here, and its records once they are reset, and before."""
+    with _editable(blend) as (scene, _, change):
+        found, after = _edits(scene), _stored(scene)
+        change({})
+        Path(told).write_bytes(pickle.dumps((found, _stored(scene), after)))
+
+
+@contextmanager
+def _editable(blend: str) -> Iterator[Any]:
+    """The scene of a file, its bake to be edited, and what changes the edits."""
+    import softground_addon
+    from softground_addon.blender.baking import step_edits
+
+    softground_addon.register()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=blend)
+        scene = bpy.context.scene
+        bake = step_edits.editable(scene)
+        yield scene, bake, partial(step_edits.edit, scene, bake)
+    finally:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        softground_addon.unregister()
+
+
+def _stored(scene: bpy.types.Scene) -> bytes:
+    from softground_addon.blender.ground import baked_ground
+
+    return bytes(baked_ground.stored_record(scene.softground.ground))
+
+
+def _edits(scene: bpy.types.Scene) -> str:
+    from softground_addon.blender.ground import baked_ground
+
+    return repr(sorted(baked_ground.edits_of(scene.softground.ground).items()))
+
+
 def play(blend: str, out: str, with_addon: str, rendering: str, *frames: str) -> None:
     """Open a shot with the add-on enabled or without it, and write heights and, if asked for, pixels of the frames."""
     if with_addon == "1":
@@ -88,4 +142,4 @@ def pixels(scene: bpy.types.Scene, path: Path) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    {"make": make, "play": play}[sys.argv[1]](*sys.argv[2:])
+    {"make": make, "edit": edit, "reset": reset, "play": play}[sys.argv[1]](*sys.argv[2:])
