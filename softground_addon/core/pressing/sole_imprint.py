@@ -135,7 +135,7 @@ def _underside(
     slack_u, slack_v = cell_size + sideways
     near = (u > low[0] - slack_u) & (u < high[0] + slack_u) & (v > low[1] - slack_v) & (v < high[1] + slack_v)
     cells = np.flatnonzero(near.any(axis=0))
-    u, v = u.reshape(len(pose), -1)[:, cells], v.reshape(len(pose), -1)[:, cells]
+    u, v = (one.reshape(len(pose), -1).take(cells, axis=1) for one in (u, v))  # in C order, as fancy indexing is not
     if sideways.max() > NEGLIGIBLE_SHIFT * cell_size:
         height = Nodes.under(patch, u, v).interpolate(patch.heights)
         u -= shift[0] * height
