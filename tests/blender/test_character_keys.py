@@ -8,7 +8,9 @@ import pytest
 
 from softground_addon.blender import settings
 from softground_addon.blender.animation_layer import nla_layer
+from softground_addon.blender.animation_layer.layer_curves import new_action
 from softground_addon.blender.characters import rig_sampling
+from softground_addon.blender.compat import set_slot
 from softground_addon.blender.response import response_job
 from softground_addon.blender.response.character_keys import controls_of
 from softground_addon.core.errors import InputError
@@ -164,10 +166,23 @@ def test_the_strength_scales_the_response_from_none_to_twice_without_a_bake(scen
         assert height - heights[0.0] == pytest.approx(strength * sunk, rel=0.02, abs=1e-5)
 
 
-def test_a_pose_that_nothing_keys_stays_under_the_layer_and_after_it(scene):
-    """NLA takes channels without keys for their defaults: the layer must not lose a pose set by hand."""
+@pytest.mark.parametrize("muted", [False, True], ids=["nothing", "muted track"])
+def test_a_pose_that_nothing_plays_stays_under_the_layer_and_after_it(scene, muted):
+    """NLA takes channels without keys for their defaults: the layer must not lose a pose set by hand.
+
+    Game files bring all their other motions on muted tracks.
+    """
     armature = shots.walker(scene)
     set_up(armature)
+    if muted:
+        curves = [
+            nla_layer.LayerCurve('pose.bones["thigh.L"].rotation_euler', 0, "", np.array([1.0, 9.0]), np.ones(2)),
+            nla_layer.LayerCurve('pose.bones["thigh.L"].location', 1, "", np.array([1.0, 9.0]), np.ones(2)),
+        ]
+        track = armature.animation_data.nla_tracks.new()
+        strip = track.strips.new("Jump", 1, new_action("Jump", armature, curves))
+        set_slot(strip, nla_layer.slot_of_action(strip.action))
+        track.mute = True
     bone = armature.pose.bones["thigh.L"]
     bone.rotation_mode = "XYZ"  # its quaternion keys no longer count: this bone is posed by hand
     bone.rotation_euler = (0.1, 0.05, -0.02)
@@ -178,6 +193,9 @@ def test_a_pose_that_nothing_keys_stays_under_the_layer_and_after_it(scene):
         nla_layer.LayerCurve('pose.bones["thigh.L"].rotation_euler', i, "thigh.L", np.array([1.0, 72.0]), np.zeros(2))
         for i in range(3)
     ]
+    curves.append(
+        nla_layer.LayerCurve('pose.bones["thigh.L"].location', 1, "thigh.L", np.array([1.0, 72.0]), np.zeros(2))
+    )
     nla_layer.add_layer(armature, curves, (1, 72))
     scene.frame_set(30)
     assert (tuple(bone.rotation_euler), tuple(bone.location)) == before

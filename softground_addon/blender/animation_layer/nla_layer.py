@@ -251,12 +251,13 @@ def slot_of_action(action: bpy.types.Action) -> Any:
     return next(iter(getattr(action, "slots", ())), None)
 
 
-def animated_paths(obj: bpy.types.Object) -> set[tuple[str, int]]:
-    """Data paths and indices that the object's action, strips and drivers set."""
+def animated_paths(obj: bpy.types.Object, *, muted: bool = True) -> set[tuple[str, int]]:
+    """Data paths and indices that the object's action, strips (those that are muted, too) and drivers set."""
     animation = obj.animation_data
     if animation is None:
         return set()
-    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    tracks = [track for track in animation.nla_tracks if muted or not track.mute]
+    strips = [strip for track in tracks for strip in track.strips if muted or not strip.mute]
     owned = [own_action(obj), *((strip.action, slot_of(strip)) for strip in strips)]
     curves = [curve for action, slot in owned if action for curve in action_curves(action, slot)]
     return {(curve.data_path, curve.array_index) for curve in (*curves, *animation.drivers)}
@@ -337,7 +338,7 @@ _MARGIN = 1000
 
 def _standing_values(obj: bpy.types.Object, curves: Sequence[LayerCurve]) -> list[LayerCurve]:
     """One key each for the channels that the layer changes and nothing animates."""
-    animated = animated_paths(obj)
+    animated = animated_paths(obj, muted=False)
     return [
         LayerCurve(
             curve.path, curve.index, curve.group, np.array([0.0]), np.array([value_of(obj, curve.path, curve.index)])
