@@ -11,7 +11,7 @@ import time
 import bpy
 import pytest
 
-from softground_addon.blender.command_line import cli
+from softground_addon.blender.command_line import cli, cli_arguments
 from softground_addon.blender.compat import action_curves, slot_of
 from softground_addon.blender.ground import ground_mesh
 from tests.blender import command_line, shots
@@ -108,6 +108,17 @@ def test_a_dry_run_saves_nothing(shot, tmp_path):
     assert run(shot, "--dry-run", "--in-place", "--report", tmp_path / "report.json") == 0
     assert shot.read_bytes() == original
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["steps"]
+
+
+def test_help_names_formats_as_they_are_written(capsys):
+    with pytest.raises(SystemExit):
+        cli_arguments.parse(["export", "--help"], standalone=True)
+    told = capsys.readouterr().out
+    assert "events-json" in told
+    assert "EVENTS_JSON" not in told
+    assert (
+        cli_arguments.parse(["export", "a.blend", "--format", "EVENTS_JSON"], standalone=True).format == "events-json"
+    )
 
 
 @pytest.mark.parametrize(

@@ -194,13 +194,14 @@ def _export(options: argparse.Namespace) -> None:
     if options.blend is not None:
         _open(options.blend)
     scene = _scene(options.scene)
-    path = options.output.absolute() if options.output else export_formats.default_path(scene, options.format)
+    kind = options.format.upper().replace("-", "_")
+    path = options.output.absolute() if options.output else export_formats.default_path(scene, kind)
     start, end = options.frames or (scene.softground.frame_start, scene.softground.frame_end)
     if not 1 <= options.resolution <= export_formats.LARGEST_IMAGE:
         raise InputError(f"--resolution takes a number from 1 to {export_formats.LARGEST_IMAGE}.")
     how = export_formats.Options(
-        options.format,
-        export_formats.with_suffix(path, options.format),
+        kind,
+        export_formats.with_suffix(path, kind),
         start,
         end,
         options.resolution,

@@ -99,9 +99,8 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
     if standalone:
         export.add_argument("blend", type=Path, metavar="SHOT.blend", help="the baked file")
     export.add_argument("--scene", metavar="NAME", help="its scene, if it is not the one that the file opens with")
-    export.add_argument(
-        "--format", required=True, type=_format, choices=tuple(export_formats.FORMATS), help="kind of file"
-    )
+    formats = tuple(map(_format, export_formats.FORMATS))
+    export.add_argument("--format", required=True, type=_format, choices=formats, help="kind of file")
     export.add_argument(
         "--output", type=Path, metavar="FILE",
         help="output file; for images, a folder and how their names begin (default: beside the shot)",
@@ -120,8 +119,8 @@ def _add_export(export: argparse.ArgumentParser, *, standalone: bool) -> None:
 
 
 def _format(text: str) -> str:
-    """`events-midi` as the format is called among the others."""
-    return text.upper().replace("-", "_")
+    """A format as it is written on a command line: `EVENTS_MIDI` as `events-midi`."""
+    return text.lower().replace("_", "-")
 
 
 def _frame_range(text: str) -> tuple[int, int]:
