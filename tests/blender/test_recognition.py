@@ -12,6 +12,7 @@ import pytest
 from softground_addon.blender import jobs
 from softground_addon.blender.characters.character_setup import add_character
 from softground_addon.blender.characters.recognition import recognise
+from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 
 from . import rigs
@@ -113,6 +114,35 @@ def test_a_hand_that_touches_for_a_moment_is_a_contact_where_the_other_one_touch
     armature = stool({"Hr": True, "Hl": together})
     mapping = jobs.run(recognise(scene, armature, (1, 10))).mapping
     assert {sole.bone for sole in mapping.soles} - set(LEGS) == ({"Hr", "Hl"} if together else set())
+
+
+@pytest.mark.parametrize("walks_on_feet", [True, False])
+def test_legs_that_the_rest_pose_tells_are_none_where_the_character_bears_on_other_parts(scene, walks_on_feet):
+    """Feet that hang on the root, as those of baked IK do, are not those at the ends of the rest pose's legs."""
+    bones, parents = dict(rigs.TRUNK), {part: above for part, above in rigs.PARENTS.items() if part in rigs.TRUNK}
+    for side, place in (("x", 1), ("y", -1)):
+        limbs = {part: np.multiply(ends, (place, 1, 1)) for part, ends in rigs.LIMBS.items()}
+        bones |= {f"{part}{side}": ends for part, ends in limbs.items()}
+        parents |= {
+            f"{part}{side}": rigs.PARENTS[part] + (side if rigs.PARENTS[part] in rigs.LIMBS else "") for part in limbs
+        }
+        bones[f"paw{side}"] = ((0.1 * place, 0.3, 0.02), (0.1 * place, 0.3, 0.03))
+    numbers = {part: f"Bone.{number:03d}" for number, part in enumerate(bones)}
+    armature = rigs.build(
+        "Beast",
+        {numbers[part]: ends for part, ends in bones.items()},
+        {numbers[part]: numbers[above] for part, above in parents.items()},
+    )
+    assert map_rig(armature).method == "rest pose"
+    feet = {numbers[f"{'foot' if walks_on_feet else 'paw'}{side}"] for side in "xy"}
+    box("trunk", 0.3, (0, 0, 1.2), armature, numbers["chest"])
+    for number, bone in enumerate(sorted(feet)):
+        x, y, _ = armature.data.bones[bone].head_local
+        box(f"sole {number}", 0.1, (x, y, 0.05), armature, bone)
+        rigs.key(armature, "location", {1: (0, 0, 0), 20: (0, 0, 0), 30: (0, 0.0, 0.1)}, bone=bone)
+    mapping = jobs.run(recognise(scene, armature, (1, 40))).mapping
+    assert {(sole.bone, sole.limb) for sole in mapping.soles} == {(bone, False) for bone in feet}
+    assert ("ankle_l" in mapping.joints) == walks_on_feet
 
 
 def test_skin_that_no_bone_moves_is_no_contact(scene):

@@ -101,22 +101,25 @@ def recognise(
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
     seen = yield from jobs.meanwhile(read, _shown_by_skin(found(rig), skin, recording))
-    soles = _joined(found(rig), mapping.soles, seen)
-    return Recognised(replace(mapping, soles=soles, mass=mass), skin, recording)
+    return Recognised(replace(_joined(found(rig), mapping, seen), mass=mass), skin, recording)
 
 
-def _joined(
-    armature: bpy.types.Object, named: tuple[SoleSource, ...], seen: tuple[SoleSource, ...]
-) -> tuple[SoleSource, ...]:
-    """What the names say with the skin's parts, and what only the skin shows: beside feet, hands and other limbs."""
+def _joined(armature: bpy.types.Object, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
+    """What the names say with the skin's parts, and what only the skin shows: beside feet, hands and other limbs.
+
+    Legs that the rest pose alone tells are none if the character bears on other parts, and never on these.
+    """
     soles, left = [], list(seen)
-    for source in named:
+    for source in mapping.soles:
         family, _ = bone_families(armature, source)
         same = [contact for contact in left if family & {*contact.parts}]
         left = [contact for contact in left if contact not in same]
         parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
         soles.append(SoleSource(source.name, source.side, source.bone, source.toe_bone, parts=parts))
-    return (*soles, *(replace(contact, limb=contact.limb or bool(soles)) for contact in left))
+    if mapping.method == "rest pose" and left == list(seen) != []:
+        return RigMapping(soles=seen, method="skin")
+    others = (replace(contact, limb=contact.limb or bool(soles)) for contact in left)
+    return replace(mapping, soles=(*soles, *others))
 
 
 def _shown_by_skin(armature: bpy.types.Object, skin: RigSkin, recording: Recording) -> Slices[tuple[SoleSource, ...]]:

@@ -107,7 +107,7 @@ def posed_points(motion: SoleMotion, pieces: Pieces | None = None) -> Array:
 def lowest_clearance(points: Array, ground: PressedGround, frames: Array) -> Array:
     """Height of the lowest of the points (F, Q, 3) above the ground, (F,) [m]; infinite off the ground."""
     heights = ground.heights(points[..., 0], points[..., 1], np.broadcast_to(frames[:, None], points.shape[:2]))
-    return np.asarray(np.where(np.isfinite(heights), points[..., 2] - heights, np.inf).min(axis=1))
+    return np.asarray(np.where(np.isfinite(heights), points[..., 2] - heights, np.inf).min(axis=1, initial=np.inf))
 
 
 def place_sole(

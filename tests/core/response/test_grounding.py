@@ -11,7 +11,7 @@ from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotio
 from softground_addon.core.response import response
 from softground_addon.core.response.foot_placement import ANKLE_PITCH, place_sole, posed_points, slide_offset, underside
 from softground_addon.core.response.grounding import Response, leg_of, leg_soles, responding, settle
-from softground_addon.core.response.response import GroundingOptions, TiltOptions, respond, stood_on
+from softground_addon.core.response.response import GroundingOptions, TiltOptions, gaps, respond, stood_on
 from tests.core.walkers import foot_sole, pose
 
 RATE = 30.0
@@ -207,6 +207,12 @@ def test_a_sole_that_never_touches_is_left_alone():
     flat = Ground(lambda x, y, t: 1.0)
     placement = place_sole(motion, 0, np.zeros_like(touching[:, 0]), flat, flat)
     assert placement.carry == pytest.approx(np.broadcast_to(np.eye(4), placement.carry.shape))
+
+
+def test_a_sole_without_an_underside_has_no_gap_to_the_ground():
+    motion, touching = walk()
+    left = gaps(motion, touching, FlatTerrain(), [], lambda sole: [(0, np.empty((0, 3)))])
+    assert not len(left.heights)
 
 
 def test_without_grounding_a_lean_keeps_the_feet_where_they_are():
