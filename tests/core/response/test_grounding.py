@@ -211,7 +211,7 @@ def test_a_sole_that_never_touches_is_left_alone():
 
 def test_a_sole_without_an_underside_has_no_gap_to_the_ground():
     motion, touching = walk()
-    left = gaps(motion, touching, FlatTerrain(), [], lambda sole: [(0, np.empty((0, 3)))])
+    left = gaps(motion, touching, FlatTerrain(), [], lambda sole: posed_points(sole, [(0, np.empty((0, 3)))]))
     assert not len(left.heights)
 
 
