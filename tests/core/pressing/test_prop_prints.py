@@ -209,7 +209,7 @@ def test_a_long_track_is_cut_into_prints_that_join_without_a_seam(hardening, mon
     material = replace(GROUND, hardening=hardening)
     loads = rolling(24, speed=2.0)
     ground, prints = pressed(loads, material)
-    monkeypatch.setattr("softground_addon.core.composers.simulation.LONGEST_TRACK", 1.0)
+    monkeypatch.setattr("softground_addon.core.loads.tracks.LONGEST_TRACK", 1.0)
     cut, pieces = pressed(loads, material)
     assert len(prints) == 1
     assert len(pieces) > 3
