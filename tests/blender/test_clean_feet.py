@@ -1,5 +1,6 @@
 """Clean Feet: standing feet neither slide, float nor sink, read from the rig as the user's scene shows it."""
 
+import importlib.util
 import json
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import pytest
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking.clean_feet import clean_feet
+from softground_addon.blender.characters.rest_pose import legs_of_feet
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
@@ -286,3 +288,49 @@ def test_a_bone_that_is_gone_is_named(scene):
     scene.softground.characters[0].joints["hips"].bone = "Pelvis"
     with pytest.raises(InputError, match="'Walker' has no bone 'Pelvis'"):
         jobs.run(clean_feet(scene))
+
+
+def test_feet_that_hang_on_the_root_find_their_legs(scene):
+    """As in game rigs whose IK was baked, whatever the bones are called."""
+    armature = shots.walker(scene)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature.data.edit_bones
+    numbers = {bone.name: f"b{number}" for number, bone in enumerate(bones)}
+    for side in "LR":
+        bones[f"foot.{side}"].parent = None
+    for bone in bones:
+        bone.name = numbers[bone.name]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    feet = [numbers["foot.R"], numbers["foot.L"]]
+    assert legs_of_feet(armature, feet) == {
+        f"{joint}_{side.lower()}": (numbers[f"{bone}.{side}"], "head")
+        for side in "LR"
+        for joint, bone in (("hip", "thigh"), ("knee", "shin"), ("ankle", "foot"))
+    }
+    assert legs_of_feet(armature, [numbers["hips"]]) == {}
+
+
+RIGS = shots.SHARED / "rigs"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["fox_walk", "rat_walk", "trex_run", "trex_idle", "scifi_walk", "robot_run", "rogue_walk", "bandai_walk"]
+)
+def test_rigs_of_other_people_keep_the_bars(scene, tmp_path, name):
+    if not RIGS.exists():
+        pytest.skip("the rigs of other people are not here: see docs/development.md")
+    clips = json.loads((RIGS / "rigs.json").read_text(encoding="utf-8"))
+    spec = importlib.util.spec_from_file_location("zoo", RIGS.parents[1] / "tools" / "zoo.py")
+    zoo = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(zoo)
+    shot, report = tmp_path / "shot.blend", tmp_path / "feet.json"
+    zoo.imported(next(clip for clip in clips if clip["clip"] == name), RIGS, shot)
+    asked = ["clean", str(shot), "--save", str(tmp_path / "clean.blend"), "--report", str(report)]
+    assert 0 in (cli.run_standalone(asked), cli.run_standalone([*asked, "--root-motion"])), "one or the other"
+    for feet in json.loads(report.read_text(encoding="utf-8"))["feet"]["after"].values():
+        assert feet["slide"]["p95"] < SLIDE_95
+        assert feet["slide"]["max"] < SLIDE_MAX
+        assert feet["float"]["p95"] < GAP_95
+        assert feet["penetration"]["p95"] < GAP_95

@@ -19,8 +19,10 @@ from ...core.response.clean_feet import FootFaults, clean, foot_faults, missed_h
 from ...core.response.grounding import leg_soles, responding
 from ...core.response.response import at_scene_frames, gaps
 from ...core.response.sole_rim import posed_rim
-from ...core.settings import BakeSettings
+from ...core.settings import BakeSettings, CharacterSettings
+from .. import settings
 from ..characters.character_setup import characters_of
+from ..characters.rest_pose import legs_of_feet
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
@@ -77,7 +79,8 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
         raise InputError("No character here has feet to clean: add a character with an animated armature.")
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     assert wanted.response is not None
-    wanted = replace(wanted, response=replace(wanted.response, tilt=None))
+    characters = tuple(_with_legs(one) for one in wanted.characters)
+    wanted = replace(wanted, response=replace(wanted.response, tilt=None), characters=characters)
     response_job.check_characters(wanted.characters)
     shot = yield from read_shot(scene, wanted)
     standing = yield from response_job.standing_on(shot.motions, shot.terrain, wanted.response)
@@ -87,6 +90,15 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     response_job.put_layers(scene, wanted, layers)
     yield Progress("write", 1.0)
     return CleanFeet(feet, (*missed, *_left_out(wanted, shot)))
+
+
+def _with_legs(character: CharacterSettings) -> CharacterSettings:
+    """A character with the legs of feet that hang elsewhere, where no leg of it is mapped."""
+    if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
+        return character
+    feet = [sole.bone for sole in character.soles if sole.bone]
+    legs = legs_of_feet(settings.found(character.armature), feet)
+    return replace(character, joints={**character.joints, **legs})
 
 
 def _cleaned(
@@ -125,7 +137,7 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
     if not legs:
         raise InputError(
             f"'{motion.name}' has no leg with hip, knee and ankle to clean: complete its joints in "
-            "Advanced > Body Bones."
+            "Advanced > Body Bones. A leg needs a bone of its own for the foot."
         )
     parts = {control.part for control in rig.controls}
     if not all(f"foot_{side}" in parts for side in legs):

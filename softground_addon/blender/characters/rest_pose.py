@@ -36,6 +36,10 @@ _MIRROR_TOLERANCE = 0.06
 """Two points count as mirrored when they agree to this part of the rig's height."""
 
 
+_HANGS_ON_THE_ROOT = 3
+"""A foot with no more bones from the root down hangs on the root: thigh and shin would be among them, and the hips."""
+
+
 @dataclass(frozen=True)
 class _Skeleton:
     names: list[str]
@@ -98,6 +102,43 @@ def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
         if len(pairs) == 1:
             joints |= _upper_body(skeleton, hips, left)
     return joints, feet
+
+
+def legs_of_feet(armature: bpy.types.Object, feet: Sequence[str]) -> Joints:
+    """Hips, knees and ankles of the hindmost feet that hang elsewhere than on their shins; empty if there are none.
+
+    In game rigs whose IK was baked, feet hang on the root. The shin of such a foot is the end of another chain that is
+    nearest to it; both feet of a pair, with their shins and thighs, are mirror images.
+    """
+    skeleton = _read_skeleton(armature)
+    paths = [skeleton.chain(skeleton.names.index(foot)) for foot in feet if foot in skeleton.names]
+    paths = [path for path in paths if len(path) <= _HANGS_ON_THE_ROOT]
+    tops = {top for path in paths if (top := _highest_alone(path, paths)) is not None}
+    chains = [chain for leaf in skeleton.leaves if not tops & {*(chain := skeleton.chain(leaf))} and len(chain) > 2]
+    legs = []
+    for top in sorted(tops) if chains else ():
+        shin = min(chains, key=lambda chain: float(np.linalg.norm(skeleton.heads[chain[-1]] - skeleton.heads[top])))
+        leg = [*shin[-2:], top]
+        if (np.diff(skeleton.heads[leg, 2]) < 0).all():
+            legs.append(leg)
+    pairs = [(one, other) for one, other in combinations(legs, 2) if _are_mirrored(skeleton, one, other)]
+    if not pairs:
+        return {}
+    forward = _forward(skeleton, pairs)
+    left = np.cross((0.0, 0.0, 1.0), forward)
+    hindmost = min(pairs, key=lambda pair: float(skeleton.heads[pair[0][0]] @ forward))
+    sides = sorted(hindmost, key=lambda leg: -float(skeleton.heads[leg[-1]] @ left))
+    return {
+        f"{joint}_{side}": (skeleton.names[bone], "head")
+        for side, leg in zip("lr", sides, strict=True)
+        for joint, bone in zip(("hip", "knee", "ankle"), leg, strict=True)
+    }
+
+
+def _highest_alone(path: Sequence[int], paths: Sequence[Sequence[int]]) -> int | None:
+    """The highest bone on the way from the root to a foot that carries no other; None where the foot itself does."""
+    others = {bone for other in paths if other != path for bone in other}
+    return next((bone for bone in path if bone not in others), None)
 
 
 def _upper_body(skeleton: _Skeleton, hips: int, left: Array) -> Joints:

@@ -34,6 +34,9 @@ TWIST = np.radians(25.0)
 """A foot that turns by more than this in one contact is meant to turn: it keeps its turn, about what bears [rad]."""
 TRAVEL = 0.15
 """A foot that goes so far along the floor in a burst is meant to go there, in leg lengths (14 cm for an adult)."""
+FARTHEST = 0.5
+"""A foot that slides farther than this in one contact glides all along, however slowly, in leg lengths: hips that
+stayed with it would leave the animation."""
 STILL = 0.004
 """A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
 
@@ -194,7 +197,8 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
 
     Somewhere on such a way it is faster than a foot that still touches and than half the body: one that skids, because
     its walk is scaled wrongly, is slower than half the body. The way begins and ends where the foot stands, or with the
-    contact, keeps at its height, unlike that of a foot that comes down or leaves, and is no shorter than `TRAVEL`.
+    contact, keeps at its height, unlike that of a foot that comes down or leaves, and is no shorter than `TRAVEL`. A
+    contact in which the foot gets farther than `FARTHEST` is such a way as a whole.
 
     Parameters
     ----------
@@ -210,6 +214,9 @@ def travelling(sole: Underside, touching: Mask, motion: CharacterMotion) -> Mask
         step = rolled(sole.points[first:end, :, :2], weight[first:end])
         length = np.linalg.norm(step, axis=1)
         fast = length > np.maximum(LEAVE_SPEED * TOUCH_SPEED * unit, body[first : end - 1] / 2)
+        if np.linalg.norm(np.cumsum(step, axis=0), axis=1).max(initial=0.0) > FARTHEST * motion.leg_length:
+            found[first:end] = True
+            continue
         high = np.abs(lowest[first:end] - np.median(lowest[first:end])) > TOUCH_HEIGHT * motion.leg_length
         for start, stop in zip(*runs(length > REST_SPEED * unit), strict=True):
             far = np.linalg.norm(np.cumsum(step[start:stop], axis=0), axis=1).max() > TRAVEL * motion.leg_length

@@ -23,7 +23,10 @@ Mask = NDArray[np.bool_]
 ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
 RIGID = 0.05
-"""What a contact shape without a side may move against the ankle and still be worn on the foot, in leg lengths."""
+"""What a contact shape may move against the ankle and still be worn on the foot, in leg lengths."""
+TIPTOES = 0.7
+"""A sole of a side that moves with the ankle is the foot's up to here: toes of cartoon feet, as long as their legs, in
+leg lengths."""
 LOWER_FOOT = 0.02
 """How much lower one foot must stand for the hips to follow it rather than the other, in leg lengths."""
 HIPS_TIME = 0.10
@@ -336,6 +339,8 @@ def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
     if sole.sole.side.lower() not in (side, ""):
         return False
     distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
-    if float(distance.mean()) > ON_THE_ANKLE * motion.leg_length:
-        return False
-    return bool(sole.sole.side) or float(np.ptp(distance)) < RIGID * motion.leg_length
+    is_near = float(distance.mean()) <= ON_THE_ANKLE * motion.leg_length
+    is_rigid = float(np.ptp(distance)) < RIGID * motion.leg_length
+    if not sole.sole.side:
+        return is_near and is_rigid
+    return is_near or (is_rigid and float(distance.mean()) <= TIPTOES * motion.leg_length)

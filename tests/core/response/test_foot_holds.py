@@ -168,6 +168,21 @@ def test_a_walk_that_skids_as_its_travel_is_scaled_wrongly_is_held(sliding, skid
     np.testing.assert_array_equal(standing(scaled, touching, FLOOR), touching)
 
 
+def test_a_foot_that_drifts_far_in_one_contact_is_let_go_however_slowly(sliding):
+    motion, touching = sliding
+    touching = np.ones_like(touching)
+    seconds, count = np.arange(len(touching))[:, None] / motion.frame_rate, len(touching)
+    joints = {name: np.repeat(path[:1], count, axis=0) for name, path in motion.joints.items()}
+    soles = []
+    for side, sole, speed in zip("lr", motion.soles, (0.12, 0.2), strict=True):
+        way = seconds * (speed, 0.0, 0.0)
+        soles.append(along(replace(sole, transforms=np.repeat(sole.transforms[:1], count, axis=0)), way))
+        joints[f"ankle_{side}"] = joints[f"ankle_{side}"] + way
+    stands = standing(replace(motion, soles=tuple(soles), joints=joints), touching, FLOOR)
+    assert stands[:, 0].all(), "by 0.36 m in three seconds"
+    assert not stands[:, 1].any(), "by 0.6 m, with legs of 0.92 m"
+
+
 def test_skates_are_let_go():
     motion, touching = walk()
     way = np.arange(len(motion.frames))[:, None] / motion.frame_rate * (2.0, 0.0, 0.0)
