@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ...core.after.felt_weather import felt_in
 from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
-from ...core.ground.material import GroundMaterial
-from ...core.ground.presets import SURFACES
+from ...core.ground.presets import SURFACES, validate_material
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
 from ...core.record.footprints import extent
@@ -134,7 +133,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
         return replace(
             now,
             **on_ground,
-            material=GroundMaterial(**inputs["material"]),
+            material=validate_material(inputs["material"], "record"),
             pressure=inputs["pressure"],
             painted=tuple(inputs["painted"]),
             frames=(first, last),
@@ -146,7 +145,7 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             shoe_treads=tuple((str(who), str(sole), str(text)) for who, sole, text in inputs.get("shoe_treads", ())),
             weather=felt_in(inputs),
         )
-    except (KeyError, TypeError, ValueError, OverflowError):
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError, InputError):
         raise InputError(
             "The stored record of the footprints does not say what they were pressed with: bake again, and edit then."
         ) from None
