@@ -75,7 +75,7 @@ def check_layerable(obj: bpy.types.Object) -> None:
     if obj.library is not None:
         raise InputError(
             f"'{obj.name}' is linked and cannot be given keys: make a library override of it (Object > Library "
-            "Override > Make), or switch the response off."
+            "Override > Make)."
         )
     animation = obj.animation_data
     if animation is None:
