@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -19,7 +20,8 @@ from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.moving_picture import animate
 from sample_scenes.production import Bake, Claim, Options, Walker
-from softground_addon.blender.ground import weather
+from softground_addon.blender import compat
+from softground_addon.blender.ground import weather, weather_keys, weather_modifier
 from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE: float | None = None
@@ -32,6 +34,11 @@ FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
 MOMENTS, COLUMNS = 12, 4
+PACE = {"SNOWFALL": 1.0}
+"""Power of the time over which the pictures are spread; `EARLY` elsewhere, as edges go first."""
+EARLY = 2.0
+AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
+"""Presets that set in when the walk is over; to the others, its steps are of different ages."""
 PICTURE = (360, 240)
 APART = 30.0
 """Distance of the tracks [m]."""
@@ -56,9 +63,22 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
         write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
         chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"} | dict(options or {})
         bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], ground, cell_size, options=chosen)
-        weather.set_preset(weather.add(bakes[preset].ground), preset)
+        modifier = weather.add(bakes[preset].ground)
+        weather.set_preset(modifier, preset)
+        if preset in AFTERWARDS:
+            _set_in(modifier, FRAMES)
         stage.hide(walker)
     return TimeLapse(bakes)
+
+
+def _set_in(modifier: Any, frame: int) -> None:
+    """Let weather begin at a frame: before it, no time passes for it."""
+    name = weather_modifier.inputs_of(modifier)["Time Scale"]
+    path, scale = compat.input_path(modifier, name), compat.read_input(modifier, name)
+    for at, value in ((frame - 1, 0.0), (frame, scale)):
+        compat.write_input(modifier, name, value)
+        modifier.id_data.keyframe_insert(path, frame=at)
+    weather_keys.follow(modifier.id_data)
 
 
 def claims(built: TimeLapse) -> list[Claim]:
@@ -98,7 +118,8 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     for preset, bake in built.bakes.items():
         step = np.array(_step(bake).position)
         moments = []
-        for number, frame in enumerate(np.linspace(FRAMES, FRAMES + LASTS, MOMENTS).round().astype(int)):
+        part = np.linspace(0.0, 1.0, MOMENTS) ** PACE.get(preset, EARLY)
+        for number, frame in enumerate((FRAMES + LASTS * part).round().astype(int)):
             scene.frame_set(int(frame))
             level = _level(bake)
             stage.aim(camera, (step[0] + 0.75, step[1] + 1.25, level + 0.85), (step[0] - 0.02, step[1] + 0.10, level))

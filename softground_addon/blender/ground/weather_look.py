@@ -14,8 +14,12 @@ from .weather_nodes import DRIED, FRESH, WATER, WETNESS
 NEW_SNOW = (0.915, 0.935, 0.96)
 SOAKED = (0.42, 0.38, 0.34)
 """What is left of a dry ground's colour when it is wet (Lekner and Dorf 1988, doi:10.1364/AO.27.001278: about half)."""
-PALE = (2.0, 2.0, 2.0)
+PALE = (1.0 / SOAKED[0], 1.0 / SOAKED[1], 1.0 / SOAKED[2])
 """Wet ground's colour when it is dry, over what it was."""
+PATCH = 0.4
+"""Size of the largest patches in which wet ground dries, of five octaves [m]."""
+DULL = 0.2
+"""Specular level of dry grains."""
 FULL = 0.004
 """Water that hides the grain of the ground [m]."""
 
@@ -39,9 +43,13 @@ def _wet(graph: Graph, surface: str, shown: dict[str, Any], relief: Socket) -> t
     """Colour and relief of wet or dried ground; its gloss is set."""
     colour = shown["Base Color"]
     if surface in ("wet_sand", "mud"):  # which are wet to begin with
-        dried = graph.attribute(DRIED)
+        place = graph.out(graph.node("ShaderNodeNewGeometry"))
+        late = graph.ramp(graph.noise(place, PATCH, 5.0, 0.6), 0.35, 0.65)
+        # Water never lies even: some of it is pale while the rest is still dark. Wet and dry all of it is.
+        dried = graph.ramp(graph.attribute(DRIED) * 2.0 + late * -1.0, 0.0, 1.0)
         pale = _times(graph, colour, PALE)
         shown["Roughness"] = graph.blend(dried, shown["Roughness"], 0.95)
+        shown["Specular IOR Level"] = graph.blend(dried, shown.get("Specular IOR Level", 0.5), DULL)
         if "Coat Weight" in shown:
             shown["Coat Weight"] = shown["Coat Weight"] * graph.math("SUBTRACT", 1.0, dried)
         return graph.mix(dried, colour, pale), relief
