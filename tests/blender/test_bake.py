@@ -260,7 +260,7 @@ def test_clicking_the_characters_mesh_adds_its_armature(scene):
 
 
 def test_a_character_cannot_be_added_twice(walk):
-    with pytest.raises(RuntimeError, match="is a character already"):
+    with pytest.raises(RuntimeError, match="is already a character"):
         bpy.ops.softground.add_character()
 
 

@@ -73,7 +73,7 @@ def test_all_selected_rigs_are_added_by_themselves_or_by_their_meshes(scene):
     select(third.children[0], first)
     bpy.ops.softground.add_character()
     assert added(scene) == [first, second, third]
-    with pytest.raises(RuntimeError, match="is a character already"):
+    with pytest.raises(RuntimeError, match="is already a character"):
         bpy.ops.softground.add_character()
 
 
