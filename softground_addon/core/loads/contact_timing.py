@@ -18,7 +18,7 @@ from ..numerics.intervals import close_short, runs
 from ..numerics.smoothing_spline import smooth_path
 from .body_dynamics import FREE_FALL, BodyDynamics, flights
 from .centre_of_pressure import extents, lowest_points
-from .contacts import EDGE_CUTOFF, TOUCH_SPEED, Contacts
+from .contacts import EDGE_CUTOFF, LEAVE_HEIGHT, TOUCH_SPEED, Contacts
 from .load_sharing import whole_body_shares
 from .sliding import treadmill_velocity
 
@@ -45,6 +45,9 @@ ONSET_DEVIATION = 0.035
 """Standard deviation of that time as the rise of the total force tells it, in the same unit (10 ms)."""
 SHORTEST_SUPPORT = 0.165
 """A push up that lasts less does not prove a contact, in the same unit (50 ms)."""
+LONGEST_ROLL = 0.5
+"""On the spot, a foot that is not lifted stands on while it rolls from its heel faster or slower than the belt, for at
+most this long, in the same unit (0.15 s)."""
 HIGHEST_SUPPORT = 0.2
 """A sole higher than this bears nothing, whatever pushes the body up, in leg lengths."""
 SUPPORT_RANGE = 0.08
@@ -97,6 +100,9 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
     touching = _supported(motion, contacts, np.where(flying, 0.0, body.force[:, 2]))
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))
+    if treadmill_velocity(motion, dataclasses.replace(contacts, touching=touching)).any():
+        lifted = flying[:, None] | (contacts.clearance > LEAVE_HEIGHT * motion.leg_length)
+        touching = _rolled_on(touching, lifted, round(LONGEST_ROLL * unit))
     lowest = lowest_points(motion)
     changes = [
         change
@@ -117,6 +123,16 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         touching[min(strike, first) : max(strike, first), sole] = strike < first
     load = whole_body_shares(motion, lowest, touching, body) * body.force[:, 2:]
     return dataclasses.replace(contacts, touching=_without_idle(touching, load))
+
+
+def _rolled_on(touching: NDArray[np.bool_], lifted: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
+    """Contacts (N, S) without the gaps of at most `longest` steps in which the sole is never lifted."""
+    joined = touching.copy()
+    for sole in range(touching.shape[1]):
+        for first, last in zip(*runs(~touching[:, sole]), strict=True):
+            inside = first > 0 and last < len(touching) and last - first <= longest
+            joined[first:last, sole] = inside and not lifted[first:last, sole].any()
+    return joined
 
 
 def _without_idle(touching: NDArray[np.bool_], load: Array) -> NDArray[np.bool_]:

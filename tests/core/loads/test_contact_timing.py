@@ -90,6 +90,17 @@ def test_a_sole_that_the_skin_shows_in_the_air_bears_nothing_whatever_holds_the_
     assert touching(False, True).all(axis=0).tolist() == [True, False]
 
 
+@pytest.mark.parametrize(("belt", "height"), [(0.9, 0.02), (0.9, 0.08), (0.0, 0.02)])
+def test_on_a_belt_a_foot_that_rolls_from_its_heel_without_being_lifted_stands_on(belt, height):
+    step = np.arange(240)
+    path = np.stack([belt * step / RATE, 0 * step, 0 * step], axis=1)
+    motion = character([flat_sole(path, name=side) for side in "lr"], hips=(0, 0, 0.9), rate=RATE)
+    rolls = (step >= 100) & (step < 112)
+    seen = contacts(np.stack([~rolls, step > -1], axis=1), np.stack([height * rolls, 0 * step], axis=1))
+    refined = refine_contacts(motion, seen, body_dynamics(motion)).touching
+    assert refined[:, 0].all() == (belt > 0 and height < 0.05 * 0.9)
+
+
 def test_a_body_that_hangs_high_stands_on_nothing():
     motion = character([flat_sole(np.zeros((120, 3)))], hips=(0, 0, 0.9), rate=RATE)
     refined = refine_contacts(motion, contacts(np.zeros((120, 1)), np.full((120, 1), 0.4)), body_dynamics(motion))
