@@ -59,7 +59,7 @@ LARGEST_SHARE = 0.25
 """Of what a step throws in one phase, in its largest piece."""
 ALL_PIECES = 250_000
 """That all landings and pushes of a bake throw together: what is more is drawn as larger ones."""
-MOST_SHED = 800
+MOST_SHED = 300
 """That a sole sheds."""
 LANDING_TIME = 0.1
 """What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
