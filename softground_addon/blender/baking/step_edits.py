@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import bpy
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.after.felt_weather import felt_in
 from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
+from ...core.ground.material import Pressure
 from ...core.ground.presets import SURFACES, validate_material
 from ...core.record import record
 from ...core.record.edits import UNCHANGED, StepEdit, is_copy, mesh_soles
@@ -127,16 +129,16 @@ def _made_with(scene: bpy.types.Scene, left: record.BakeRecord) -> BakeSettings:
             if name in inputs
         }
         units = baked_ground.units_of(inputs)
-        first, last = map(int, inputs["frames"])
-        if inputs["surface"] not in SURFACES:
-            raise ValueError("there is no such surface")
+        if inputs["surface"] not in SURFACES or inputs["pressure"] not in get_args(Pressure):
+            raise ValueError("there is no such surface, or no such pressure")
+        stiffness, layer_depth, rim = map(str, inputs["painted"])
         return replace(
             now,
             **on_ground,
             material=validate_material(inputs["material"], "record"),
             pressure=inputs["pressure"],
-            painted=tuple(inputs["painted"]),
-            frames=(first, last),
+            painted=(stiffness, layer_depth, rim),
+            frames=baked_ground.frames_of(inputs),
             cell_size_m=units["cell_size_m"],
             frame_rate=units["frame_rate"],
             time_stretch=units["time_stretch"],

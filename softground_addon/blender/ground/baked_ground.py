@@ -33,6 +33,8 @@ Indices = NDArray[np.intp]
 UNITS = ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m")
 LARGEST_UNIT = 1e12
 """Of any of these, and 1 over the smallest: what is beyond is damage."""
+LAST_FRAME = 1_048_574
+"""Blender's last frame; its first is the same before 0."""
 EVENTS = "events"
 """What is known about footprints: the table of their events."""
 
@@ -291,7 +293,21 @@ def units_of(inputs: Mapping[str, Any]) -> dict[str, float]:
     return units
 
 
-def baked_with(about: dict[str, Any], value: str) -> float:
+def frames_of(inputs: Mapping[str, Any]) -> tuple[int, int]:
+    """First and last scene frame of a bake, by the inputs that its record has.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, OverflowError
+        If they are damaged.
+    """
+    first, last = map(int, inputs["frames"])
+    if not -LAST_FRAME <= first <= last <= LAST_FRAME:
+        raise ValueError("no scene has such frames")
+    return first, last
+
+
+def baked_with(about: Mapping[str, Any], value: str) -> float:
     """A value of the material that a bake was made with, such as its `blur_sigma`, in SI units.
 
     Raises

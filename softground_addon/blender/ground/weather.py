@@ -118,7 +118,7 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
         inputs = about["inputs"]
         known, units = of_bake(inputs), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
-        first, last = (float(frame) * stretch for frame in inputs["frames"])
+        first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
         matter = matter_on(footprints, inputs)
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
@@ -142,13 +142,14 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
 
 def matter_on(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Matter:
     """How the ground of a bake takes weather, by its footprints and inputs."""
-    return matter_of(str(inputs["surface"]), float(inputs["material"]["layer_depth"]), section_of(footprints))
+    depth = baked_ground.baked_with({"inputs": inputs}, "layer_depth")
+    return matter_of(str(inputs["surface"]), depth, section_of(footprints))
 
 
 def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """What `weather_places` takes of a bake's inputs; what `baked_ground.units_of` raises where they are damaged."""
     units = baked_ground.units_of(inputs)
-    material = {name: float(inputs["material"][name]) for name in ("blur_sigma", "layer_depth")}
+    material = {name: baked_ground.baked_with({"inputs": inputs}, name) for name in ("blur_sigma", "layer_depth")}
     return {
         "cell_size": units["cell_size_m"],
         "time_stretch": units["time_stretch"],
