@@ -19,6 +19,10 @@ def test_the_preset_menu_shows_a_picture_of_each_ground_and_opens_at_once(facts)
     assert min(facts["preset menu"]) < MENU
 
 
+def test_a_ground_of_ones_own_gets_its_prediction_at_once(facts):
+    assert 0.5 < facts["predicted"] < 50.0
+
+
 def test_the_object_menu_bakes(facts):
     assert facts["ground"] == "Terrain"
     assert facts["baked"]

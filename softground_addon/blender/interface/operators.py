@@ -13,6 +13,7 @@ from bpy.props import BoolProperty
 from ...batch.manifest import BatchShot
 from ...batch.shell import command_line
 from ...core.errors import InputError
+from ...core.settings import ObjectName
 from .. import jobs, session, settings
 from ..characters import character_setup, frame_ranges, recognition, selection
 from ..characters.rig_mapping import CHOOSE_CONTACTS, instances_mesh
@@ -91,28 +92,49 @@ def _add(
     return reports
 
 
-class SOFTGROUND_OT_use_as_ground(bpy.types.Operator):
-    """Take the selected mesh as the ground, as it is: flat, sculpted or sloped"""
+class SOFTGROUND_OT_use_as_ground(Reading):
+    """Take the selected mesh as the ground, as it is: flat, sculpted or sloped. Esc cancels"""
 
     bl_idname = "softground.use_as_ground"
     bl_label = "Use Selected as Ground"
-    bl_options = {"REGISTER", "UNDO"}
+    cancelled = "Use Selected cancelled: nothing was changed"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Whether a mesh is selected that may be the ground."""
+        if not super().poll(context):
+            return False
         cls.poll_message_set("Select the mesh to walk on, not a character")
         return _selected_ground(context) is not None or _selected_instance(context) is not None
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        _check_no_instance(context)
-        chosen = _selected_ground(context)
+    def _job_of(self, scene: bpy.types.Scene) -> jobs.Job[str]:
+        _check_no_instance(bpy.context)
+        chosen = _selected_ground(bpy.context)
         assert chosen is not None
         ground_checks.check_usable(chosen)
-        settings.scene_of(context).softground.ground = chosen
-        self.report({"INFO"}, f"'{chosen.name}' is now the ground")
-        return {"FINISHED"}
+        return _taken_as_ground(scene, settings.name_of(chosen))
+
+    def _show(self, result: str) -> None:
+        self.report({"INFO"}, f"'{result}' is now the ground")
+
+
+def _taken_as_ground(scene: bpy.types.Scene, chosen: ObjectName) -> jobs.Job[str]:
+    """Take a mesh as the ground, and read the shot for its prediction; the name of the ground."""
+    options, before = scene.softground, scene.softground.ground
+    kept = settings.name_of(before) if before else None
+    stays = False
+    try:
+        options.ground = ground = settings.found(chosen)
+        name = ground.name
+        yield jobs.Progress("sample", 0.0)
+        if options.characters and not bpy.app.background:
+            with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+                yield from analysis.reading(scene)
+        stays = True
+    finally:
+        if not stays:
+            options.ground = settings.find(kept) if kept else None
+    return name
 
 
 class SOFTGROUND_OT_create_ground(bpy.types.Operator):

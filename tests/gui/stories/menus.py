@@ -26,7 +26,9 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     # a terrain with a material of its own
     select(terrain)
     yield from hand.press_button("softground.use_as_ground", offset=0.75)
-    yield 0.5
+    yield from ended(hand)
+    yield 1.0
+    facts["predicted"] = scene().softground.depth_cm
     facts["ground"] = scene().softground.ground.name if scene().softground.ground else ""
 
     # the preset menu
