@@ -155,11 +155,15 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
 
 def _shown(touching: Mask, seen: Contacts) -> Mask:
     """What touches by its speed, without what the skin shows in the air, and without the contacts in which the skin of
-    a sole never bears that bears at other times."""
+    a sole never bears that bears at other times; but for those that an end of the shot cuts, where the sole is as low
+    as when it bears: there the skin shows less."""
     shown = touching.copy() if seen.aloft is None else touching & ~seen.aloft
     for sole in np.flatnonzero(seen.touching.any(axis=0)):
+        bears, clearance = seen.touching[:, sole], seen.clearance[:, sole]
+        low = clearance[bears].max()
         for first, last in zip(*runs(shown[:, sole]), strict=True):
-            shown[first:last, sole] = seen.touching[first:last, sole].any()
+            is_cut = first == 0 or last == len(shown)
+            shown[first:last, sole] = bears[first:last].any() or (is_cut and clearance[first:last].min() <= low)
     return shown
 
 
