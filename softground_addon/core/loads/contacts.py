@@ -145,10 +145,10 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     clearance = np.stack([track.clearance for track in tracks], axis=1) - offset
     if seen is None:
         return Contacts(touching, offset, normal, clearance)
-    touching = _shown(touching, seen)
     # What a limb that rolls turns to the ground has no speed of its own; and calm skin on the ground bears where
     # nothing else does.
     limb = np.array([sole.sole.prop is not None for sole in motion.soles])
+    touching = np.where(limb, touching, _shown(touching, seen))
     touching |= seen.touching & (limb | ~touching.any(axis=1, keepdims=True))
     return Contacts(touching, offset, normal, clearance, seen.aloft)
 
