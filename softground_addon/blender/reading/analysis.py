@@ -32,6 +32,7 @@ from ...core.loads.cell_limits import check_cell_size, pressed_area
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
 from ...core.record.typical_depth import typical_of
+from ...core.response.response import at_scene_frames
 from ...core.response.root_motion import travel_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
@@ -81,11 +82,12 @@ class Analysis:
     @cached_property
     def belts(self) -> dict[str, Array]:
         """Velocity of the belt on which each character walks on the spot, by its name, (2,) [m/s]: as Root Motion's."""
-        return {
-            one.motion.name: -travel_velocity(one.motion, one.contacts.touching, self.shot.terrain)
-            for one in self.loads
-            if treadmill_speed(one.motion, one.contacts) > 0
-        }
+        belts = {}
+        for motion, one in zip(self.shot.motions, self.loads, strict=True):
+            if treadmill_speed(one.motion, one.contacts) > 0:
+                touching = at_scene_frames(one.contacts.touching, one.motion.frames, motion)
+                belts[motion.name] = -travel_velocity(motion, touching, self.shot.terrain)
+        return belts
 
 
 _known: dict[int, Analysis] = {}

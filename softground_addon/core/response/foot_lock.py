@@ -66,25 +66,25 @@ class Underside:
         """Height of the lowest point, (F,) [m]."""
         return np.asarray(self.heights.min(axis=1))
 
-    def bearing(self) -> Array:
+    def bearing(self, most: float = MOST) -> Array:
         """How much each point bears (F, Q), 1 in all of a frame.
 
-        Those at the lowest do, of the piece with most of them: where the toes lie flat, the ball of the foot that
-        bends up from them rolls off the floor.
+        Those at the lowest do, of the piece with most of them, and of another with a part as many (`most`): where the
+        toes lie flat, the ball of the foot that bends up from them rolls off the floor.
         """
         above = self.heights - self.lowest()[:, None]
-        bears = np.exp(-above / (YIELD * max(self.length, 1e-9))) * self._of_bearing_piece(above)
+        bears = np.exp(-above / (YIELD * max(self.length, 1e-9))) * self._of_bearing_piece(above, most)
         return np.asarray(bears / bears.sum(axis=1, keepdims=True))
 
     def planted(self) -> Mask:
         """Which points bear (F, Q): those no higher than `PLANTED` above the lowest, of a piece that bears."""
         above = self.heights - self.lowest()[:, None]
-        return (above <= PLANTED * self.length) & self._of_bearing_piece(above)
+        return (above <= PLANTED * self.length) & self._of_bearing_piece(above, MOST)
 
-    def _of_bearing_piece(self, above: Array) -> Mask:
+    def _of_bearing_piece(self, above: Array, most: float) -> Mask:
         near = above <= PLANTED * self.length
         count = np.stack([near[:, self.piece == one].sum(axis=1) for one in range(self.piece.max() + 1)], axis=1)
-        return np.asarray((count >= MOST * count.max(axis=1, keepdims=True))[:, self.piece])
+        return np.asarray((count >= most * count.max(axis=1, keepdims=True))[:, self.piece])
 
 
 def underside_on(motion: SoleMotion, floor: PressedGround, frames: Array) -> Underside:

@@ -15,6 +15,8 @@ from .foot_lock import rolled, underside_on
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+BOTH = 0.5
+"""Pieces of a sole with this part as many points on the belt both tell its speed, while the foot rolls over them."""
 AGREES = 0.05
 """What moves as the median does, to about this part of its speed, rests on the belt; the rest lands or leaves."""
 
@@ -40,7 +42,7 @@ def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -
         if not touching[:, number].any():
             continue
         under = underside_on(sole, floor, motion.frames)
-        weight = under.bearing()
+        weight = under.bearing(BOTH)
         for first, end in zip(*runs(touching[:, number]), strict=True):
             frames.append(np.arange(first + 1, end))
             moves.append(rolled(under.points[first:end, :, :2], weight[first:end]))
