@@ -115,7 +115,7 @@ def _cleaned(
         _check(motion, of_character, rig)
         touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
         stands = yield from meanwhile(now, standing.slices(motion, touching, shot.terrain, asked.holds))
-        response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds))
+        response = yield from meanwhile(now, clean.slices(motion, touching, shot.terrain, asked.holds, stands))
         missed += [
             f"'{hold.foot}' of '{motion.name}' is not planted at frame {hold.frame:g}: its foot lock was ignored."
             for hold in missed_holds(motion, touching, asked.holds)

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.loads.sliding import treadmill_speed
 from ...core.motion.motion import CharacterMotion
-from ...core.response.response import at_scene_frames
-from ...core.response.root_motion import travel_velocity
+from ...core.response.root_motion import lacking_velocity
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
 from .. import settings
 from ..animation_layer.layer_curves import LayerCurve
@@ -82,11 +80,12 @@ def root_motion(scene: bpy.types.Scene) -> Job[tuple[Travel, ...]]:
     loads = yield from estimate_shot(wanted, shot)
     layers: list[tuple[ObjectName, Travel, list[LayerCurve]]] = []
     for one, motion, of_character in zip(wanted.characters, shot.motions, loads, strict=True):
-        if not one.armature or treadmill_speed(of_character.motion, of_character.contacts) == 0.0:
+        if not one.armature:
             continue
-        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
-        work = travel_velocity.slices(motion, touching, shot.terrain)
+        work = lacking_velocity.slices(motion, of_character, shot.terrain)
         velocity = yield from meanwhile(Progress("simulate", 1.0), work)
+        if velocity is None:
+            continue
         travel, curves = _layer(scene, one, motion, wanted, velocity)
         layers.append((one.armature, travel, curves))
     if not layers:

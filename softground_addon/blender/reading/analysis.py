@@ -30,10 +30,8 @@ from ...core.files import report
 from ...core.ground.material import GroundMaterial, Pressure
 from ...core.loads.cell_limits import check_cell_size, pressed_area
 from ...core.loads.estimate import CharacterLoads
-from ...core.loads.sliding import treadmill_speed
 from ...core.record.typical_depth import typical_of
-from ...core.response.response import at_scene_frames
-from ...core.response.root_motion import travel_velocity
+from ...core.response.root_motion import lacking_velocity
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
 from ..ground import ground_mesh
@@ -82,12 +80,9 @@ class Analysis:
     @cached_property
     def belts(self) -> dict[str, Array]:
         """Velocity of the belt on which each character walks on the spot, by its name, (2,) [m/s]: as Root Motion's."""
-        belts = {}
-        for motion, one in zip(self.shot.motions, self.loads, strict=True):
-            if treadmill_speed(one.motion, one.contacts) > 0:
-                touching = at_scene_frames(one.contacts.touching, one.motion.frames, motion)
-                belts[motion.name] = -travel_velocity(motion, touching, self.shot.terrain)
-        return belts
+        each = zip(self.shot.motions, self.loads, strict=True)
+        lacking = {motion.name: lacking_velocity(motion, loads, self.shot.terrain) for motion, loads in each}
+        return {name: -velocity for name, velocity in lacking.items() if velocity is not None}
 
 
 _known: dict[int, Analysis] = {}

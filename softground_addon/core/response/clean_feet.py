@@ -60,7 +60,11 @@ def standing(motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: S
 
 @sliced
 def clean(
-    motion: CharacterMotion, touching: Mask, terrain: Terrain, holds: Sequence[FootHold] = ()
+    motion: CharacterMotion,
+    touching: Mask,
+    terrain: Terrain,
+    holds: Sequence[FootHold] = (),
+    stands: Mask | None = None,
 ) -> Slices[Response]:
     """What makes the feet stand where their contacts say that they stand.
 
@@ -73,11 +77,14 @@ def clean(
         The floor.
     holds : sequence of FootHold
         Contacts that are held in another way than by what bears.
+    stands : (F, S) bool array, optional
+        What `standing` tells of these, where it is known.
     """
     floor, frames = GroundHistory(terrain), motion.frames
     placements: dict[str, tuple[int, Placement]] = {}
     offsets = []
-    stands = yield from standing.slices(motion, touching, terrain, holds)
+    if stands is None:
+        stands = yield from standing.slices(motion, touching, terrain, holds)
     for side, number in leg_soles(motion).items():
         sole, touches = motion.soles[number], touching[:, number]
         contacts = HeldContacts.of(holds, sole.sole.name, frames, touches)

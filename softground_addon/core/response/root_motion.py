@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.heightfield import Terrain
+from ..loads.estimate import CharacterLoads
+from ..loads.sliding import treadmill_speed
 from ..motion.motion import CharacterMotion
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from ..record.ground_history import GroundHistory
 from .foot_lock import rolled, underside_on
+from .response import at_scene_frames
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -19,6 +22,24 @@ BOTH = 0.5
 """Pieces of a sole with this part as many points on the belt both tell its speed, while the foot rolls over them."""
 AGREES = 0.05
 """What moves as the median does, to about this part of its speed, rests on the belt; the rest lands or leaves."""
+
+
+@sliced
+def lacking_velocity(motion: CharacterMotion, loads: CharacterLoads, terrain: Terrain) -> Slices[Array | None]:
+    """Velocity (2,) that a character which walks on the spot lacks [m/s]; None for one that travels by itself.
+
+    Parameters
+    ----------
+    motion : CharacterMotion
+        At scene frames.
+    loads : CharacterLoads
+        Of the same motion, on its time grid.
+    terrain : Terrain
+    """
+    if treadmill_speed(loads.motion, loads.contacts) == 0.0:
+        return None
+    touching = at_scene_frames(loads.contacts.touching, loads.motion.frames, motion)
+    return (yield from travel_velocity.slices(motion, touching, terrain))
 
 
 @sliced

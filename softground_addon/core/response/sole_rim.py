@@ -46,10 +46,11 @@ def posed_rim(motion: SoleMotion) -> Array:
 
     The hinge of the toes is above the sole, and where they bend, rigid pieces would slide over each other.
     """
-    pieces, share = rim(motion.sole), _shares(motion.sole)
+    pieces = rim(motion.sole)
+    share = _shares(motion.sole, pieces)
     if share.max(axis=0).min() == 1.0:
         return posed_points(motion, pieces)
-    level = _levels(motion.sole)
+    level = _levels(motion.sole, pieces)
     posed = np.zeros((len(motion.transforms), share.shape[1], 3))
     for patch, of_patch in enumerate(share):
         as_of = [(patch, places + np.array((0.0, 0.0, level[own] - level[patch]))) for own, places in pieces]
@@ -59,12 +60,11 @@ def posed_rim(motion: SoleMotion) -> Array:
 
 def rim_pieces(sole: Sole) -> NDArray[np.intp]:
     """The rigid piece that each point of the rim goes with most, (Q,)."""
-    return np.asarray(_shares(sole).argmax(axis=0))
+    return np.asarray(_shares(sole, rim(sole)).argmax(axis=0))
 
 
-def _shares(sole: Sole) -> Array:
+def _shares(sole: Sole, pieces: Pieces) -> Array:
     """How much of each piece's motion each point of the rim takes part in, (P, Q), 1 in all."""
-    pieces = rim(sole)
     if len(sole.patches) < 2 or not sole.bend:
         return np.repeat(np.eye(len(pieces)), [len(places) for _, places in pieces], axis=1)
     x = np.concatenate([places[:, 0] for _, places in pieces])
@@ -78,10 +78,10 @@ def _seam(behind: Array, before: Array) -> tuple[float, float]:
     return float(before[:, 0].min()), float(behind[:, 0].max())
 
 
-def _levels(sole: Sole) -> Array:
+def _levels(sole: Sole, pieces: Pieces) -> Array:
     """Height of each patch's frame in that of the first, (P,) [m], by the heights of both where they overlap."""
     level = np.zeros(len(sole.patches))
-    for number, ((_, behind), (_, before)) in enumerate(itertools.pairwise(rim(sole))):
+    for number, ((_, behind), (_, before)) in enumerate(itertools.pairwise(pieces)):
         seam = before[before[:, 0] <= _seam(behind, before)[1]]
         patch = sole.patches[number]
         level[number + 1] = level[number] + np.mean(
