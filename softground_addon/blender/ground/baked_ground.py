@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...batch.manifest import FRAME_LIMIT
 from ...core.after.events import Event, as_edited
 from ...core.errors import InputError
 from ...core.ground.material import MATERIAL_RANGES
@@ -33,8 +34,6 @@ Indices = NDArray[np.intp]
 UNITS = ("frame_rate", "time_stretch", "gravity_m_s2", "unit_scale_m", "cell_size_m")
 LARGEST_UNIT = 1e12
 """Of any of these, and 1 over the smallest: what is beyond is damage."""
-LAST_FRAME = 1_048_574
-"""Blender's last frame; its first is the same before 0."""
 EVENTS = "events"
 """What is known about footprints: the table of their events."""
 
@@ -302,7 +301,7 @@ def frames_of(inputs: Mapping[str, Any]) -> tuple[int, int]:
         If they are damaged.
     """
     first, last = map(int, inputs["frames"])
-    if not -LAST_FRAME <= first <= last <= LAST_FRAME:
+    if not -FRAME_LIMIT <= first <= last <= FRAME_LIMIT:
         raise ValueError("no scene has such frames")
     return first, last
 

@@ -116,10 +116,10 @@ def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) ->
     footprints, about = baked_ground.load(ground)
     with damage_named(ground):
         inputs = about["inputs"]
-        known, units = of_bake(inputs), baked_ground.units_of(inputs)
+        known, units = of_bake(about), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
-        matter = matter_on(footprints, inputs)
+        matter = matter_on(footprints, about)
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
     since = places.times[:, 1]
@@ -140,16 +140,17 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
 
 
-def matter_on(footprints: Sequence[Footprint], inputs: Mapping[str, Any]) -> Matter:
-    """How the ground of a bake takes weather, by its footprints and inputs."""
-    depth = baked_ground.baked_with({"inputs": inputs}, "layer_depth")
-    return matter_of(str(inputs["surface"]), depth, section_of(footprints))
+def matter_on(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> Matter:
+    """How the ground of a bake takes weather, by its footprints and what its record says about it."""
+    depth = baked_ground.baked_with(about, "layer_depth")
+    return matter_of(str(about["inputs"]["surface"]), depth, section_of(footprints))
 
 
-def of_bake(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """What `weather_places` takes of a bake's inputs; what `baked_ground.units_of` raises where they are damaged."""
+def of_bake(about: Mapping[str, Any]) -> dict[str, Any]:
+    """What `weather_places` takes of a bake; what `units_of` and `baked_with` of `baked_ground` raise for damage."""
+    inputs = about["inputs"]
     units = baked_ground.units_of(inputs)
-    material = {name: baked_ground.baked_with({"inputs": inputs}, name) for name in ("blur_sigma", "layer_depth")}
+    material = {name: baked_ground.baked_with(about, name) for name in ("blur_sigma", "layer_depth")}
     return {
         "cell_size": units["cell_size_m"],
         "time_stretch": units["time_stretch"],

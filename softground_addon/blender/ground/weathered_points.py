@@ -81,7 +81,7 @@ def weathered_points(
     display_mesh = baked_ground.display_mesh_of(ground)
     footprints, about = baked_ground.load(ground)
     with weather.damage_named(ground):
-        known, matter = weather.of_bake(about["inputs"]), weather.matter_on(footprints, about["inputs"])
+        known, matter = weather.of_bake(about), weather.matter_on(footprints, about)
     count, table = len(position), keyframe_tables(over_time)
     start, end = np.full(count, NOT_YET), np.full(count, -NOT_YET)
     start[table.point] = known["time_stretch"] * table.frame[table.first[:-1]]

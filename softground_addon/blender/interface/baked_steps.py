@@ -146,7 +146,7 @@ def bake_on(ground: bpy.types.Object | None) -> ShownBake:
             steps = [
                 BakedStep(**vars(one), number=number, feet=soles) for number, one in enumerate(left.steps, start=1)
             ]
-            shown = ShownBake(steps, left.edited, baked_ground.baked_with(dict(left.about), "rim_reach"))
+            shown = ShownBake(steps, left.edited, baked_ground.baked_with(left.about, "rim_reach"))
             _known.clear()
             _known[key] = shown
     except InputError:

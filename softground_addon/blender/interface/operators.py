@@ -56,9 +56,7 @@ def _added(
     try:
         reports = yield from _add(scene, active, selected)
         yield jobs.Progress("sample", recognition.SHARE)
-        if not bpy.app.background:
-            with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-                yield from analysis.reading(scene)
+        yield from _read_for_prediction(scene)
         stays = True
     finally:
         if not stays:
@@ -69,6 +67,13 @@ def _added(
             for group, field in fresh:
                 group.property_unset(field)
     return reports
+
+
+def _read_for_prediction(scene: bpy.types.Scene) -> jobs.Job[None]:
+    """Read the shot where there is a panel to show its prediction, if it can be read."""
+    if not bpy.app.background:
+        with suppress(InputError):  # it says so when the user asks for the depth, or bakes
+            yield from analysis.reading(scene)
 
 
 def _add(
@@ -127,9 +132,8 @@ def _taken_as_ground(scene: bpy.types.Scene, chosen: ObjectName) -> jobs.Job[str
         options.ground = ground = settings.found(chosen)
         name = ground.name
         yield jobs.Progress("sample", 0.0)
-        if options.characters and not bpy.app.background:
-            with suppress(InputError):  # it says so when the user asks for the depth, or bakes
-                yield from analysis.reading(scene)
+        if options.characters:
+            yield from _read_for_prediction(scene)
         stays = True
     finally:
         if not stays:
