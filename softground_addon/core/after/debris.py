@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
 
 THROWN_SHARE = 0.05
-"""Share of the displaced ground that a landing throws, for each unit of v²/(g·R) above 1."""
+"""Share of the ground that a landing drives down which it throws, for each unit of v²/(g·R) above 1."""
 MOST_THROWN = 0.3
-"""Largest share of it."""
+"""Largest share of it. What the ground swallows as it is compacted cannot fly: nothing is thrown beyond the rim."""
 SPEED, SPEED_FALL = 0.7, -1 / 0.55
 """Speed of what is thrown, over sqrt(g·R), at the edge of the contact, and its exponent over the distance."""
 NEAREST, FARTHEST = 0.5, 1.2
@@ -62,7 +62,7 @@ ALL_PIECES = 250_000
 MOST_SHED = 300
 """That a sole sheds."""
 LANDING_TIME = 0.1
-"""What is displaced within this time after the strike is displaced by the landing [s, of an adult]."""
+"""What is compressed within this time after the strike is compressed by the landing [s, of an adult]."""
 BREADTH = 0.3
 """Breadth of what a foot sheds from, over the length between its landmarks: these lie along its middle."""
 
@@ -112,7 +112,7 @@ class Source:
 
 
 def thrown_share(speed: float, radius: float, gravity: float) -> float:
-    """Share of what a landing displaces that it throws.
+    """Share of what a landing drives down that it throws.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def throws_of(loads: Sequence[CharacterLoads], footprints: Sequence[Footprint], 
 
 
 def sources(thrown: Sequence[Throw], steps: Sequence[EditableStep], *, surface: str, gravity: float) -> list[Source]:
-    """All that the steps of a record throw, at most `MOST_THROWN` of the rim of each.
+    """All that the steps of a record throw, at most the rim of each: that is what compaction leaves of what they press.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def sources(thrown: Sequence[Throw], steps: Sequence[EditableStep], *, surface: 
             continue
         ways = [one.placed(step.baked, step.left, step.edit) for one in of_steps.get(step.index % count, ())]
         volumes = [_volume(way, step.left, MATTER[surface], gravity) for way in ways]
-        scale = min(1.0, MOST_THROWN * step.left.rim_m3 / max(sum(volumes), 1e-300))
+        scale = min(1.0, step.left.rim_m3 / max(sum(volumes), 1e-300))
         found += [Source(way, step, volume * scale) for way, volume in zip(ways, volumes, strict=True) if volume > 0]
     return found
 
@@ -298,7 +298,7 @@ def _volume(throw: Throw, left: Footprint, matter: ThrownMatter, gravity: float)
     amount = float(throw.samples[:, WEIGHT].astype(np.float64).sum())
     if throw.kind == 0:
         share = thrown_share(throw.speed, _radius(throw, left), gravity)
-        return share * left.rim_m3 * _landing_part(left, throw.landed_by) if share else 0.0
+        return share * left.compressed_m3 * _landing_part(left, throw.landed_by) if share else 0.0
     if throw.kind == 1:
         return np.sqrt(left.area_m2) / 2 * PUSH_DEPTH * amount
     return matter.film * left.area_m2 * amount

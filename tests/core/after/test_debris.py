@@ -69,10 +69,26 @@ def test_a_landing_throws_what_the_formula_says_by_hand(record, speed):
         volumes = np.diff(total[np.asarray(one.compression.first)])
         start = next(p for p in phases.phases(loads) if p.kind == "land").at / 1.0 + 1.0
         early = volumes[np.asarray(one.compression.frames) <= start + 12 + 1e-6].sum() / volumes.sum()
-        assert heard.volume[number] == pytest.approx(share * early * one.rim_m3, rel=1e-6, abs=1e-15)
+        assert heard.volume[number] == pytest.approx(share * early * one.compressed_m3, rel=1e-6, abs=1e-15)
     spheres = np.bincount(heard.step, 4 / 3 * np.pi * heard.radius**3, len(record))
     assert spheres == pytest.approx(heard.volume, rel=1e-9, abs=1e-15)
     assert (len(heard.birth) == 0) == (speed < 0.5)
+
+
+@pytest.mark.parametrize(("speed", "litres"), [(0.4, (0.0, 0.0)), (1.5, (0.1, 0.6)), (4.0, (0.6, 2.0))])
+def test_in_powder_what_the_ground_swallows_cannot_fly_and_all_that_it_leaves_can(speed, litres):
+    """A walk throws nothing, a run a plume at each foot, a jump all that its rims would hold; the sums are exact."""
+    loads, powder = jump(speed), find("fresh_snow").material
+    _, record = pressed(loads, powder, cell_size=0.02)
+    heard = Heard([loads], BakeRecord(record, {}), surface="snow")
+    for step, thrown_volume in zip(heard.left.steps, heard.volume, strict=True):
+        rim = 2 * powder.poisson_ratio * step.baked.compressed_m3
+        assert step.left.rim_m3 + thrown_volume == pytest.approx(rim, rel=1e-6)
+        on_ground = step.left.tile(step.left.rim).sum() * step.left.cell_size**2
+        assert on_ground + thrown_volume == pytest.approx(rim, rel=1e-6)
+        assert (step.left.rim_m3 < 1e-9) == (speed == 4.0)
+    low, high = litres
+    assert low <= 1e3 * heard.volume.max() <= high
 
 
 def test_flights_are_the_closed_form(record):
