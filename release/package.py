@@ -1,7 +1,7 @@
 """The extension as users install it: `python -m release.package build/softground.zip`.
 
-Blender's own tool builds the zip and finds it valid. In between, its entries are put in order and lose the times and
-rights that they have on this machine: the same sources give the same bytes everywhere.
+Blender's own tool builds the zip and finds it valid. In between, the manual is added, and the entries are put in order
+and lose the times and rights that they have on this machine: the same sources give the same bytes everywhere.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from pathlib import Path
 
 from softground_addon.core.files import files
 
+from . import manual
+
 REPOSITORY = Path(__file__).parents[1]
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -27,7 +29,7 @@ def build(target: Path, sources: Path = REPOSITORY) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with files.replacing(target.resolve()) as package:
         _run("build", "--source-dir", str(sources), "--output-filepath", str(package))
-        _normalise(package)
+        _complete(package, manual.files(sources))
         _run("validate", str(package))
 
 
@@ -48,11 +50,12 @@ def _run(*arguments: str) -> None:
         sys.exit(done.stdout + done.stderr)
 
 
-def _normalise(package: Path) -> None:
+def _complete(package: Path, added: dict[str, bytes]) -> None:
+    """Add files, and write all in an order and with times and rights that are the same everywhere."""
     with zipfile.ZipFile(package) as built:
-        content = {name: built.read(name) for name in sorted(built.namelist())}
+        content = {name: built.read(name) for name in built.namelist()} | added
     with zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, text in content.items():
+        for name, text in sorted(content.items()):
             entry = zipfile.ZipInfo(name, EPOCH)
             entry.compress_type, entry.create_system, entry.external_attr = zipfile.ZIP_DEFLATED, 3, 0o100644 << 16
             archive.writestr(entry, text)

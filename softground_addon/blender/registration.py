@@ -16,6 +16,7 @@ from .interface import (
     character_editing,
     foot_locks_panel,
     ground_options_panel,
+    help,
     menus,
     modal_bake,
     operators,
@@ -60,6 +61,7 @@ CLASSES = (
     *add_weather.CLASSES,
     *export_formats.CLASSES,
     *menus.CLASSES,
+    *help.CLASSES,
     *import_capture.CLASSES,
     *panels.CLASSES,
     *ground_options_panel.CLASSES,
@@ -87,7 +89,7 @@ def register() -> None:
         for owner, group in _SETTINGS:
             owner.softground = bpy.props.PointerProperty(name="SoftGround", type=group)
             undo.callback(delattr, owner, "softground")
-        for part in (handlers, overlay, step_dragging, menus, import_capture):
+        for part in (handlers, overlay, step_dragging, menus, help, import_capture):
             part.register()
             undo.callback(part.unregister)
         look_followers.append(_follow_look)

@@ -136,21 +136,21 @@ class Hand:
             yield 0.1
             y -= ROW
 
-    def find_button(self, operator: str, offset: float = 0.5) -> Any:
+    def find_button(self, operator: str, offset: float = 0.5, region: Any = None) -> Any:
         """Place of the button that runs an operator, by what Ctrl-C copies from it; None where there is none.
 
-        A generator like the others: `place = yield from hand.find_button(...)`. Scrolls down if it is not in sight.
+        A generator like the others: `place = yield from hand.find_button(...)`. Looks in the sidebar if no other region
+        is given, and scrolls down if the button is not in sight.
         """
         for _ in range(PAGES):
-            place = yield from self._find_in_sight(operator, offset)
+            place = yield from self._find_in_sight(operator, offset, region or self.region())
             if place:
                 return place
             for _turn in range(6):
                 yield from self.key("WHEELDOWNMOUSE")
         return None
 
-    def _find_in_sight(self, operator: str, offset: float) -> Any:
-        region = self.region()
+    def _find_in_sight(self, operator: str, offset: float, region: Any) -> Any:
         x = region.x + int(region.width * offset)
         for y in range(region.y + region.height - ROW, region.y, -ROW):
             bpy.context.window_manager.clipboard = ""
@@ -184,10 +184,10 @@ class Hand:
         self.event("LEFTMOUSE", "RELEASE")
         yield SHORT
 
-    def press_button(self, operator: str, offset: float = 0.5) -> Steps:
-        place = yield from self.find_button(operator, offset)
+    def press_button(self, operator: str, offset: float = 0.5, region: Any = None) -> Steps:
+        place = yield from self.find_button(operator, offset, region)
         if place is None:
-            raise LookupError(f"there is no button for {operator} in the sidebar")
+            raise LookupError(f"there is no button for {operator}")
         yield from self.click(*place)
 
 

@@ -42,6 +42,17 @@ def test_the_add_menu_has_the_sample_figure(facts):
     assert facts["added"] == ["Walking Figure"]
 
 
+def test_the_preferences_open_the_manual_that_came_with_the_add_on(facts):
+    (address,) = facts["manual"]
+    assert address.startswith("file:///")
+    assert address.endswith("/softground/manual/index.html")
+
+
+def test_the_preferences_copy_what_a_bug_report_needs(facts):
+    for word in ("SoftGround", "Blender", "Mesa", "Terrain"):
+        assert word in facts["bug report"]
+
+
 def test_clear_bake_leaves_nothing(facts):
     assert facts["cleared"] == [["Meadow"], []]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from release import package
+from release import manual, package
 
 ROOT = Path(__file__).parents[2]
 ABOUT = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
@@ -35,8 +35,11 @@ def test_it_holds_the_extension_and_nothing_else(built):
     code = [path for kind in ("*.py", "*.json", "*.png") for path in (ROOT / "softground_addon").rglob(kind)]
     about = ("blender_manifest.toml", "__init__.py", "README.md", "LICENSE", "CHANGELOG.md")
     with zipfile.ZipFile(built) as archive:
-        assert archive.namelist() == sorted([*about, *(path.relative_to(ROOT).as_posix() for path in code)])
-        assert all(archive.read(name) == (ROOT / name).read_bytes() for name in archive.namelist())
+        pages = manual.files(ROOT)
+        own = [*about, *(path.relative_to(ROOT).as_posix() for path in code)]
+        assert archive.namelist() == sorted([*own, *pages])
+        assert all(archive.read(name) == (ROOT / name).read_bytes() for name in own)
+        assert all(archive.read(name) == pages[name] for name in pages)
 
 
 def test_it_is_small_and_so_are_the_pictures_of_its_page(built):
@@ -72,12 +75,18 @@ def test_the_version_stands_in_the_manifest_only():
 
 INSTALL = """
 import sys
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 import bpy
 import addon_utils
+import bl_operators
 assert bpy.ops.extensions.package_install_files(
     filepath=sys.argv[1], repo="user_default", enable_on_install=True) == {"FINISHED"}
 assert "bl_ext.user_default.softground" in bpy.context.preferences.addons
 assert bpy.context.scene.softground is not None
+page = bl_operators.wm.WM_OT_doc_view_manual._lookup_rna_url("bpy.ops.softground.live", verbose=False)
+assert Path(unquote(urlsplit(page).path)).is_file(), page
+assert bpy.ops.softground.open_manual.poll()
 addon_utils.disable("bl_ext.user_default.softground", default_set=True)
 assert not hasattr(bpy.types.Scene, "softground")
 addon_utils.enable("bl_ext.user_default.softground", default_set=True)

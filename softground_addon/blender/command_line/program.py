@@ -6,17 +6,22 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 
-_PACKAGE = Path(__file__).parents[3]
+PACKAGE = Path(__file__).parents[3]
 """The folder of the extension, with its manifest."""
+
+
+def about() -> dict[str, Any]:
+    """What the extension's manifest says of it."""
+    return tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
 def made_by() -> str:
     """The programs that decide what a bake gives: SoftGround and Blender, with their versions."""
-    about = tomllib.loads((_PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
-    return f"SoftGround {about['version']}, Blender {bpy.app.version_string}"
+    return f"SoftGround {about()['version']}, Blender {bpy.app.version_string}"
 
 
 def worker_command(shot: Path, options: Sequence[str]) -> list[str]:

@@ -41,6 +41,8 @@ class SOFTGROUND_MT_object(bpy.types.Menu):
         layout.operator("softground.final_mesh", icon="MESH_DATA")
         layout.separator()
         layout.operator("softground.copy_bake_command", icon="COPYDOWN")
+        layout.separator()
+        layout.operator("softground.open_manual", icon="HELP")
 
 
 def draw_in_object_menu(menu: Any, _context: bpy.types.Context) -> None:

@@ -32,3 +32,6 @@ class SoftGroundPreferences(bpy.types.AddonPreferences):
         layout: Any = self.layout
         layout.use_property_split = True
         layout.prop(self, "default_preset")
+        doors = layout.row()
+        doors.operator("softground.open_manual", text="Manual", icon="HELP")
+        doors.operator("softground.report_bug", icon="URL")

@@ -3,8 +3,12 @@ curves in the Graph Editor."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -12,7 +16,7 @@ import bpy
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
 from tests.gui.stories.first_minutes import ended, tracks
-from tests.gui.stories.interrupted_bake import scene, with_viewport
+from tests.gui.stories.interrupted_bake import ADD_ON, scene, with_viewport
 from tests.gui.stories.presets_and_search import search
 
 
@@ -86,6 +90,39 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from search(hand, "Clear Bake")
     yield 0.5
     facts["cleared"] = materials(terrain), tracks(armature)
+
+    # the preferences: a manual and a bug report
+    yield from open_preferences(hand, area)
+    yield from hand.picture("preferences", in_docs=False)
+    with addresses_noted(hand.pictures) as opened:
+        for operator, offset in (("open_manual", 0.3), ("report_bug", 0.8)):
+            bpy.context.window_manager.clipboard = ""
+            yield from hand.press_button(f"softground.{operator}", offset, window_of(hand.area("PREFERENCES")))
+            yield 1.0
+        facts["manual"] = opened()
+    facts["bug report"] = bpy.context.window_manager.clipboard
+
+
+def open_preferences(hand: Hand, area: bpy.types.Area) -> Steps:
+    """Show the add-on's preferences all over the window."""
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "SoftGround"
+    area.type = "PREFERENCES"
+    with bpy.context.temp_override(window=hand.window, area=area):
+        bpy.ops.preferences.addon_expand(module=ADD_ON)
+        bpy.ops.screen.screen_full_area()
+    yield 1.0
+
+
+@contextmanager
+def addresses_noted(folder: Path) -> Iterator[Callable[[], list[str]]]:
+    """While a program that writes addresses down stands in for the web browser; gives what they were."""
+    noted, program = folder / "addresses.txt", folder / "browser.sh"
+    program.write_text(f"#!/bin/sh\necho \"$1\" >> '{noted}'\n")
+    program.chmod(0o755)
+    browser, os.environ["BROWSER"] = os.environ.get("BROWSER", ""), str(program)
+    yield lambda: noted.read_text().splitlines() if noted.exists() else []
+    os.environ["BROWSER"] = browser
 
 
 def terrain_of_the_user() -> bpy.types.Object:
