@@ -60,6 +60,14 @@ def test_open_ground_has_three_octaves_apart_and_none_of_them_repeats(ensure_mat
     assert max(sizes) > 2.0  # at 20 m
 
 
+@pytest.mark.parametrize("surface", ["sand", "soil"])
+def test_what_rain_wets_shines_in_patches(ensure_material, surface):
+    shader = principled(ensure_material(surface))
+    for name in ("Roughness", "Specular IOR Level"):
+        textures = [node for node in upstream(shader.inputs[name]) if node.type == "TEX_NOISE"]
+        assert any(0.03 < 1.0 / node.inputs["Scale"].default_value < 0.3 for node in textures)
+
+
 def test_only_dry_sand_has_ripples_and_prints_bury_them(ensure_material):
     for surface in SURFACES:
         nodes = ensure_material(surface).node_tree.nodes

@@ -34,8 +34,8 @@ COLOURS = {
     "soil": (0.16, 0.10, 0.06, 1.0),
 }
 """Of pieces: the grain and the waves of a ground's look are too coarse for them."""
-BRIGHT = ("snow", "sand")
-"""Surfaces whose pieces let light through: they glow against the sun."""
+THROUGH = {"snow": 0.5, "sand": 0.15}
+"""Share of light that pieces let through: they glow against the sun. Sand that lies turns dark by more of it."""
 GLOSSY = ("wet_sand", "mud")
 """Surfaces whose pieces shine."""
 
@@ -82,9 +82,10 @@ def _material(surface: str) -> bpy.types.Material:
     shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = material.diffuse_color = COLOURS[surface]
     shader.inputs["Roughness"].default_value = 0.3 if surface in GLOSSY else 0.9
-    if surface in BRIGHT:
+    if surface in THROUGH:
         through, mixed = nodes.new("ShaderNodeBsdfTranslucent"), nodes.new("ShaderNodeMixShader")
         through.inputs["Color"].default_value = COLOURS[surface]
+        mixed.inputs[0].default_value = THROUGH[surface]
         for number, one in enumerate((shader, through), 1):
             links.new(one.outputs[0], mixed.inputs[number])
         links.new(mixed.outputs[0], material.node_tree.get_output_node("ALL").inputs["Surface"])

@@ -355,22 +355,31 @@ _VECTOR = {"data_type": "VECTOR"}
 def _soil(graph: Graph, ground: Ground) -> Look:
     """Dull crumbs of all sizes; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
     loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
-    stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.020
+    stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.007
     stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
     wavy = graph.out(stirred)  # crumbs are no honeycomb
-    large, middle, small = (
-        graph.ramp(graph.out(graph.cells(wavy, size)), 0.1, 0.75, 1.0, 0.0) for size in (0.030, 0.017, 0.009)
-    )
+    large, middle, small = (_lumps(graph, wavy, size) for size in (0.030, 0.014, 0.007))
     dust = graph.noise(ground.place, 0.0035, 3.0, 0.7)
     clods = graph.ramp(graph.noise(ground.place, 0.06, 2.0), 0.50, 0.66)
-    crumbs = large * clods * 0.010 + middle * ground.risen * 0.013 + small * graph.blend(ground.risen, 0.0022, 0.0060)
+    crumbs = large * graph.blend(clods, 0.004, 0.020) + middle * graph.blend(ground.risen, 0.0085, 0.014)
+    crumbs = crumbs + small * graph.blend(ground.risen, 0.0045, 0.0065)
     relief = crumbs * loose + dust * graph.blend(ground.pressed, 0.0018, 0.0012)
     relief = relief + graph.noise(ground.place, 0.012, 3.0, 0.7) * ground.edge * 0.008 + ground.tread
     tint = graph.ramp(graph.noise(ground.place, 0.016, 4.0, 0.7), 0.30, 0.75)
     colour = graph.mix(tint, (0.072, 0.042, 0.026), (0.195, 0.122, 0.077))
+    colour = graph.mix(graph.math("MAXIMUM", middle, small) * 0.20, colour, (0.24, 0.15, 0.095))
+    gaps = graph.ramp(large + middle + small, 0.0, 0.30, 0.55, 0.0) * loose  # bump throws no shadows
+    colour = graph.mix(gaps, colour, (0.034, 0.020, 0.013))
     colour = graph.mix(ground.risen * middle * 0.6, colour, (0.28, 0.18, 0.115))
     colour = graph.mix(ground.pressed * 0.7, colour, (0.060, 0.036, 0.022))
     return Look(relief, {"Base Color": colour, "Roughness": 0.95, "Specular IOR Level": 0.15})
+
+
+def _lumps(graph: Graph, place: Socket, size: float) -> Socket:
+    """Rounded lumps of about a size [m] between 0 and 1 high, most of them low."""
+    cells = graph.cells(place, size)
+    random = graph.out(graph.node("ShaderNodeSeparateColor", {0: graph.out(cells, 1)}))
+    return graph.ramp(graph.out(cells), 0.15, 0.70, 1.0, 0.0) * graph.math("POWER", random, 2.0)
 
 
 _WIDE: dict[str, tuple[float, float, float]] = {

@@ -22,6 +22,8 @@ DULL = 0.2
 """Specular level of dry grains."""
 FULL = 0.004
 """Water that hides the grain of the ground [m]."""
+FILM = 0.07
+"""Size of the patches of wet ground that shine [m]."""
 
 
 def bare(graph: Graph) -> Socket:
@@ -55,8 +57,12 @@ def _wet(graph: Graph, surface: str, shown: dict[str, Any], relief: Socket) -> t
         return graph.mix(dried, colour, pale), relief
     wet, water = graph.attribute(WETNESS), graph.ramp(graph.attribute(WATER), 0.0, FULL)
     dark = _times(graph, colour, SOAKED)
-    shown["Roughness"] = graph.blend(water, graph.blend(wet, shown["Roughness"], 0.45), 0.04)
-    shown["Specular IOR Level"] = graph.blend(wet, shown.get("Specular IOR Level", 0.5), 0.5)
+    # Water films shine in patches only: where all is glossy, a low sun makes concrete of it.
+    film = graph.ramp(graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), FILM, 3.0), 0.45, 0.80)
+    gloss = graph.blend(wet, shown["Roughness"], graph.blend(film, 0.75, 0.50))
+    shown["Roughness"] = graph.blend(water, gloss, 0.04)
+    mirror = graph.blend(wet, shown.get("Specular IOR Level", 0.5), graph.blend(film, 0.20, 0.4))
+    shown["Specular IOR Level"] = graph.blend(water, mirror, 0.5)
     return graph.mix(wet, colour, dark), relief * graph.math("SUBTRACT", 1.0, water)
 
 
