@@ -4,27 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import bmesh
 import bpy
-import numpy as np
 
+from ...core.ground.crumbs import lumps
 from .debris_nodes import MARK
-
-ROUGHNESS = {"snow": 0.35, "sand": 0.25, "wet_sand": 0.3, "mud": 0.15, "soil": 0.4}
-"""How far their corners are from a sphere."""
-STRETCH = {
-    "snow": ((1.0, 1.0, 0.6),) * 4,
-    "mud": (
-        (1.0, 0.9, 0.35),
-        (1.0, 0.7, 0.45),
-        (1.0, 0.85, 0.25),
-        (1.0, 0.8, 0.6),
-        (1.0, 0.45, 0.3),
-        (1.0, 0.25, 0.2),
-    ),
-}
-"""Along three axes, of each shape: broken crust is flat, mud comes down as flat clods, drops and strings."""
-_ROUND = ((1.0, 1.0, 0.85),) * 4
 
 COLOURS = {
     "snow": (0.87, 0.90, 0.94, 1.0),
@@ -45,8 +28,10 @@ def collection_of(surface: str) -> bpy.types.Collection:
     material = _material(surface)
     shapes = bpy.data.collections.new(f"SoftGround {surface.replace('_', ' ').title()} Pieces")
     shapes[MARK] = True
-    for number in range(len(STRETCH.get(surface, _ROUND))):
-        mesh = _shape(f"{shapes.name} {number + 1}", surface, number)
+    for number, lump in enumerate(lumps(surface), 1):
+        mesh = bpy.data.meshes.new(f"{shapes.name} {number}")
+        mesh.from_pydata(lump.vertices.tolist(), [], lump.faces.tolist())
+        mesh.shade_smooth()
         mesh.materials.append(material)
         shapes.objects.link(bpy.data.objects.new(mesh.name, mesh))
     return shapes
@@ -90,21 +75,3 @@ def _material(surface: str) -> bpy.types.Material:
             links.new(one.outputs[0], mixed.inputs[number])
         links.new(mixed.outputs[0], material.node_tree.get_output_node("ALL").inputs["Surface"])
     return material
-
-
-def _shape(name: str, surface: str, number: int) -> bpy.types.Mesh:
-    """A lump that has the volume of a sphere of radius 1."""
-    random = np.random.default_rng(number)
-    mesh = bpy.data.meshes.new(name)
-    lump = bmesh.new()
-    bmesh.ops.create_icosphere(lump, subdivisions=1, radius=1.0)
-    stretch = STRETCH.get(surface, _ROUND)[number]
-    for vertex in lump.verts:
-        size = 1.0 + ROUGHNESS[surface] * (2 * random.random() - 1)
-        vertex.co = [vertex.co[axis] * size * stretch[axis] for axis in range(3)]
-    scale = (4 / 3 * np.pi / lump.calc_volume()) ** (1 / 3)
-    bmesh.ops.scale(lump, vec=(scale,) * 3, verts=list(lump.verts))
-    lump.to_mesh(mesh)
-    lump.free()
-    mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
-    return mesh

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..ground import crumbs
 from ..loads.estimate import CharacterLoads
 from ..record.footprints import Footprint
 from ..record.record import EditableStep
@@ -53,13 +54,11 @@ LUMP = 0.01
 """How far from the middle of a lump its pieces are at most, along each axis [m]."""
 LONGEST_SHED = 0.6
 """After that it is clean [s]."""
-SIZE_FALL = 2.5
-"""Exponent with which the number of pieces falls over their size."""
 LARGEST_SHARE = 0.25
 """Of what a step throws in one phase, in its largest piece."""
 ALL_PIECES = 250_000
 """That all landings and pushes of a bake throw together: what is more is drawn as larger ones."""
-MOST_SHED = 300
+MOST_SHED = 1000
 """That a sole sheds."""
 LANDING_TIME = 0.1
 """What is compressed within this time after the strike is compressed by the landing [s, of an adult]."""
@@ -338,7 +337,7 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float, most: int) -> 
     throw = source.throw
     digest = hashlib.sha256(f"{source.step.name} {throw.kind}".encode()).digest()
     random = np.random.default_rng(int.from_bytes(digest[:8], "big"))
-    fine = matter.fine * source.volume
+    fine = matter.fine * source.volume * (throw.kind != 2)  # what a sole carries sticks together
     most = max(min(most, MOST_SHED if throw.kind == 2 else matter.most), 1)
     radius = _radii(source.volume - fine, matter.sizes, most, random)
     if fine:
@@ -374,15 +373,11 @@ def _pieces(source: Source, matter: ThrownMatter, gravity: float, most: int) -> 
 
 
 def _radii(volume: float, sizes: tuple[float, float], most: int, random: np.random.Generator) -> Array:
-    """Radii of pieces whose spheres have a volume together [m]: their number falls as d^-2.5."""
+    """Radii of pieces whose spheres have a volume together [m]."""
     low, high = sizes
     high = max(min(high, (6 / np.pi * LARGEST_SHARE * volume) ** (1 / 3)), 2 * low)
-    power = 1.0 - SIZE_FALL
-    # mean of d³ over the distribution
-    mean = power / (power + 3) * (high ** (power + 3) - low ** (power + 3)) / (high**power - low**power)
-    count = int(np.clip(np.ceil(volume / (np.pi / 6 * mean)), 1, most))
-    part = random.random(count)
-    diameter = (low**power + part * (high**power - low**power)) ** (1 / power)
+    count = int(np.clip(np.ceil(volume / (np.pi / 6 * crumbs.mean_cube((low, high)))), 1, most))
+    diameter = crumbs.diameters((low, high), random.random(count))
     scale = (volume / (np.pi / 6 * (diameter**3).sum())) ** (1 / 3)
     return np.asarray(diameter * scale / 2)
 

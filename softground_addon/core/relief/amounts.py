@@ -26,7 +26,6 @@ LAYERS: Mapping[str, type[Layer]] = {
     "lip": Lip,
     "cracks": Cracks,
     "fissures": Fissures,
-    "crumbs": Crumbs,
 }
 """The layers by the names that a table gives them; several of one kind are a list."""
 
@@ -88,6 +87,9 @@ class Amounts:
     tread : Tread or None
     water : Water or None
     layers : tuple of Layer
+    crumbs : Crumbs or None
+    surface : str
+        That the crumbs are of, see `core.ground.crumbs`.
     """
 
     depth: float
@@ -99,6 +101,8 @@ class Amounts:
     tread: Tread | None = None
     water: Water | None = None
     layers: tuple[Layer, ...] = ()
+    crumbs: Crumbs | None = None
+    surface: str = ""
 
 
 @cache
@@ -115,11 +119,11 @@ def of_look(look: str, folder: Path = FOLDER) -> Amounts:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"Relief '{path}' cannot be read: {error}") from None
-    return parse(text, f"Relief '{path}'")
+    return parse(text, f"Relief '{path}'", look)
 
 
-def parse(text: str, origin: str) -> Amounts:
-    """The amounts in the text of a table.
+def parse(text: str, origin: str, surface: str) -> Amounts:
+    """The amounts in the text of a table, for a surface.
 
     Raises
     ------
@@ -140,12 +144,13 @@ def parse(text: str, origin: str) -> Amounts:
     parts: dict[str, Any] = {}
     for name in ("bends", "ledges"):
         parts[name] = tuple(_made(Bend, one, f"{origin}, {name}") for one in _list(table.pop(name, [])))
-    for name, kind in (("chunks", Chunks), ("tread", Tread), ("water", Water)):
+    for name, kind in (("chunks", Chunks), ("tread", Tread), ("water", Water), ("crumbs", Crumbs)):
         if name in table:
             parts[name] = _made(kind, table.pop(name), f"{origin}, {name}")
     with_depth = table.pop("bends_with_depth", False) is True
     plain = _made(Amounts, table, origin)
-    return Amounts(plain.depth, wall=plain.wall, bends_with_depth=with_depth, layers=tuple(layers), **parts)
+    parts |= {"wall": plain.wall, "bends_with_depth": with_depth, "layers": tuple(layers), "surface": surface}
+    return Amounts(plain.depth, **parts)
 
 
 def _list(values: Any) -> list[Any]:

@@ -261,25 +261,14 @@ _BENT = ((0, 16.0, 6.0), (1, 5.0, 1.8))
 
 @dataclass(frozen=True)
 class Crumbs:
-    """Crumbs of a `size`, the highest `height` high and most far lower, out to about a `width` from the outline."""
+    """Crumbs about the outline, out to about a `width` from it, fewer inside: see `ScatteredCrumbs`.
 
-    size: float
-    height: float
+    `share` is how full of the largest the ground is on the outline (see `scattered`), `within` the part of it inside.
+    """
+
+    share: float
     width: float = 16.0
     within: float = 0.25
 
-    def heights(self, around: Around) -> Array:
-        """Heights [m]."""
-        size = around.length(self.size)
-        if size < 1.5 * around.finest:
-            return np.zeros(len(around.x))
-        lumps = cells(around.seed + int(181 + self.size), size, around.x, around.y)
-        luck = uniform(5, lumps.number.astype(np.int64))
-        radius = (0.35 + 0.2 * luck) * size
-        dome = np.sqrt(np.maximum(1.0 - (lumps.x**2 + lumps.y**2) / radius**2, 0.0))
-        near = around.near(self.width) * (1.0 - (1.0 - self.within) * around.pressed)
-        there = uniform(6, lumps.number.astype(np.int64)) < 0.9 * near + 0.1
-        return dome * luck**2.5 * there * np.minimum(2.0 * near, 1.0) * around.length(self.height)
 
-
-Layer = Edge | Lumps | Floor | Apron | Streaks | Fans | Lip | Cracks | Fissures | Crumbs
+Layer = Edge | Lumps | Floor | Apron | Streaks | Fans | Lip | Cracks | Fissures

@@ -14,6 +14,7 @@ from .drag import Drag, drags_of
 from .lattice_noise import cells, noise, rise, uniform
 from .layers import MM, Around
 from .print_shape import CORE, PrintShape, shape_of
+from .scattered_crumbs import ScatteredCrumbs, scattered
 from .tread import GROOVE, LENGTH, SoleTread, Under
 
 Array = NDArray[np.float64]
@@ -22,6 +23,8 @@ SHALLOW = 0.5
 """Prints down to this part of the depth that heights are given for carry them whole; shallower ones lower heights."""
 NEARLY = 0.8
 """Sizes down to this part of the vertices' distance are shown."""
+FINEST_CRUMB = 1.5
+"""Least diameter of crumbs that are shown, over the finest size."""
 FULL = 0.9
 """How far ground is pressed where water may stand: within the walls."""
 MEAN_TREAD = 0.3
@@ -69,6 +72,11 @@ class PrintRelief:
         Its height over that of the amounts.
     drags : sequence of Drag
         Where the sole slid.
+
+    Attributes
+    ----------
+    crumbs : list of ScatteredCrumbs
+        That lie about it.
     """
 
     def __init__(
@@ -88,9 +96,11 @@ class PrintRelief:
         self._tread_strength = tread_strength
         self._drags = drags
         self._wider, self._deeper, self._level = 0.0, 0.0, -np.inf
+        self.crumbs: list[ScatteredCrumbs] = []
         x, y = (place.ravel() for place in np.meshgrid(*shape.window.centres(shape.cell_size)))
         places = self._look_up(x, y)
         self._wider = self._widening(places)
+        self.crumbs = self._crumbs(x, y)
         relief = self._relief(places)
         weight = places.fade * relief.pressed * places.floor
         self._deeper = float(np.clip(relief.height.sum() / max(weight.sum(), 1e-12), -MOST_VOLUME, MOST_VOLUME))
@@ -114,6 +124,30 @@ class PrintRelief:
         growth = (wider - excess) / step
         limit = self._amounts.wall * MM
         return float(np.clip(-excess / growth, -limit, limit)) if growth < 0 else 0.0
+
+    def _crumbs(self, x: Array, y: Array) -> list[ScatteredCrumbs]:
+        """The crumbs within all places of its window (N,)."""
+        wanted, shape = self._amounts.crumbs, self._shape
+        if wanted is None:
+            return []
+
+        def chance(x: Array, y: Array) -> Array:
+            places = self._look_up(x, y)
+            pressed = self._rebuilt(places, self._wider)[2]
+            near = self._around(places, pressed).near(wanted.width)
+            return near * (1.0 - (1.0 - wanted.within) * pressed)
+
+        low, high = (np.array([place(x), place(y)]) for place in (np.min, np.max))
+        return scattered(
+            self._amounts.surface, self._seed + 181, low, high, chance,
+            share=wanted.share, smallest=FINEST_CRUMB * self._finest, fineness=shape.fineness,
+        )  # fmt: skip
+
+    def _around(self, places: _Places, pressed: Array) -> Around:
+        return Around(
+            self._seed, places.x, places.y, places.foot_x, places.foot_y, places.inward + self._wider, pressed,
+            self._finest, self._shape.fineness,
+        )  # fmt: skip
 
     def _look_up(self, x: Array, y: Array) -> _Places:
         shape, amounts = self._shape, self._amounts
@@ -171,11 +205,8 @@ class PrintRelief:
     def _relief(self, places: _Places) -> Relief:
         height, compression, pressed = self._rebuilt(places, self._wider)
         share = min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
-        around = Around(
-            self._seed, places.x, places.y, places.foot_x, places.foot_y, places.inward + self._wider, pressed,
-            self._finest, self._shape.fineness,
-        )  # fmt: skip
-        made_of = (*self._amounts.layers, *self._drags)
+        around = self._around(places, pressed)
+        made_of = (*self._amounts.layers, *self.crumbs, *self._drags)
         layers = sum((layer.heights(around) for layer in made_of), np.zeros(len(places.x)))
         layers = share * (layers + self._standing(places, around))
         deeper = self._deeper * pressed * places.floor * places.fade

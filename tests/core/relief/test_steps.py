@@ -154,7 +154,7 @@ def test_tables_name_what_is_wrong():
         ("{}", "lacks depth"),
     ):
         with pytest.raises(InputError, match=message):
-            amounts.parse(text, "Relief 'x'")
+            amounts.parse(text, "Relief 'x'", "soil")
 
 
 def test_water_lies_level_in_mud_and_a_later_step_takes_it_along():
