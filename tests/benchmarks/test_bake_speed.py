@@ -88,3 +88,24 @@ def test_keys_are_read_in_half_the_time_in_which_they_are_evaluated(scene):
     evaluated = min(milliseconds() for _ in range(5))
     print(f"\nms per frame: read {read:.3f}, evaluated {evaluated:.3f}; ratio {read / evaluated:.2f}")
     assert read < 0.5 * evaluated
+
+
+@pytest.mark.parametrize("preset", ["Snow", "Mud", "Dry Sand"])
+def test_a_bake_under_weather_takes_at_most_a_tenth_longer(scene, preset):
+    heavy_walker(scene, FRAMES)
+    bpy.ops.softground.add_character()
+    bpy.ops.softground.load_preset(name=preset)
+    jobs.run(bake_job.bake(scene))
+    seconds = {False: [], True: []}
+    for _ in range(6):
+        for under_weather, taken in seconds.items():
+            if under_weather:
+                bpy.ops.softground.add_weather()
+            elif bpy.ops.softground.remove_weather.poll():
+                bpy.ops.softground.remove_weather()
+            started = time.process_time()
+            jobs.run(bake_job.bake(scene))
+            taken.append(time.process_time() - started)
+    without, with_weather = min(seconds[False]), min(seconds[True])
+    print(f"\n{preset}: {without:.2f} s, with weather {with_weather:.2f} s, {with_weather / without:.3f} times")
+    assert with_weather <= 1.1 * without

@@ -489,6 +489,19 @@ def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened
     assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
 
 
+@pytest.mark.parametrize("felt", [False, True])
+def test_a_bake_gives_its_weather_what_it_would_find_in_the_stored_record(opened, felt):
+    scene = opened("sand")
+    bpy.ops.softground.add_weather(preset="SHOWER")
+    key(scene, "Rain", {1: 10.0, 200: 40.0})
+    scene.softground.steps_feel_weather = felt
+    bpy.ops.softground.bake()
+    baked = contents(carrier(scene).data)
+    bpy.ops.softground.add_weather()
+    assert contents(carrier(scene).data) == baked
+    assert np.frombuffer(baked[nodes.POOL], np.float32).any()
+
+
 def test_an_attribute_of_the_users_is_left_alone(opened):
     scene = opened()
     carrier(scene).data.attributes.new(nodes.PRESSED, "FLOAT", "POINT")

@@ -226,7 +226,7 @@ def write_prints(
         del place  # it is as large as what is pressed, and not needed to the end
         published = yield from publishing
     ground = settings.found(wanted.ground) if wanted.ground else published.display_mesh
-    weather.renew(ground, weather_before)
+    weather.renew(ground, weather_before, left)
     return Written(ground, published.display_mesh, published.error, findings)
 
 

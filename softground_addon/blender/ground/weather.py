@@ -17,6 +17,7 @@ from ...core.after.weather_places import NOT_YET, POWERS, WeatherPlaces, section
 from ...core.errors import InputError
 from ...core.playback.keyframe_tables import NO_CONTACT
 from ...core.record.footprints import Footprint
+from ...core.record.record import BakeRecord
 from ...core.settings import BakeSettings
 from .. import compat, settings
 from . import baked_ground, ground_mesh, own_data, weather_keys, weather_modifier
@@ -39,8 +40,14 @@ PRESETS: Mapping[str, tuple[str, Mapping[str, float]]] = {
 of thaw, ten minutes of wind, half an hour of rain, eight hours of sun."""
 
 
-def add(ground: bpy.types.Object) -> Any:
+def add(ground: bpy.types.Object, left: BakeRecord | None = None) -> Any:
     """Put weather on a ground with a bake, or renew what there is; the modifier.
+
+    Parameters
+    ----------
+    ground : bpy.types.Object
+    left : BakeRecord, optional
+        What its bake left, where that need not be read.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def add(ground: bpy.types.Object) -> Any:
     _check_names(display_mesh)
     tree = there.node_group if there else nodes.new()
     try:
-        _fit(ground, display_mesh, tree)
+        _fit(ground, display_mesh, tree, *((left.edited, left.about) if left else baked_ground.load(ground)))
     except BaseException:
         weather_modifier.remove_unused()
         raise
@@ -70,12 +77,12 @@ def values_of(ground: bpy.types.Object) -> dict[str, float]:
     return {name: values[key] for name, key in weather_modifier.inputs_of(modifier).items() if key in values}
 
 
-def renew(ground: bpy.types.Object, values: Mapping[str, float]) -> None:
-    """Fit weather to the bake that a ground has now, with the values that it had before it; nothing if it had none."""
+def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
+    """Fit weather to what a new bake left, with the values that the ground had before it; nothing if it had none."""
     there = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
     if there is None and not values:
         return
-    modifier = add(ground)
+    modifier = add(ground, left)
     if there is None:
         _set(modifier, values)
 
@@ -111,15 +118,21 @@ def felt(wanted: BakeSettings) -> BakeSettings:
     return replace(wanted, weather=replace(wanted.weather, **weather_keys.rates(modifier, span_of(first, last))))
 
 
-def _fit(ground: bpy.types.Object, display_mesh: bpy.types.Object, tree: Any) -> None:
+def _fit(
+    ground: bpy.types.Object,
+    display_mesh: bpy.types.Object,
+    tree: Any,
+    footprints: list[Footprint],
+    about: Mapping[str, Any],
+) -> None:
     """Write what the group reads, and fill it."""
-    footprints, about = baked_ground.load(ground)
     with damage_named(ground):
         inputs = about["inputs"]
         known, units = of_bake(about), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
         matter = matter_on(footprints, about)
+        known["puddles"] = matter.soaking is not None
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
     since = places.times[:, 1]

@@ -90,7 +90,7 @@ def weathered_points(
     points = bpy.data.meshes.new("SoftGround Points")
     try:
         points.vertices.add(count)
-        places = weather_places(footprints, position, final, start, end, **known)
+        places = weather_places(footprints, position, final, start, end, **known, puddles=matter.soaking is not None)
         weather.store(points, places, matter, weather_keys.moments_of(display_mesh))
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:

@@ -60,7 +60,7 @@ def felt_in(inputs: Mapping[str, Any]) -> FeltWeather | None:
     if not isinstance(known, Mapping):
         raise TypeError("the weather is no table")
     values: Any = {
-        name: str(one) if name == "surface" else tuple(map(float, one)) if isinstance(one, list) else float(one)
+        name: str(one) if name == "surface" else tuple(map(float, one)) if isinstance(one, list | tuple) else float(one)
         for name, one in known.items()
     }
     weather = FeltWeather(**values)

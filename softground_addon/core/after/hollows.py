@@ -24,16 +24,19 @@ def filled(heights: Array) -> Array:
     >>> filled(np.array([[2.0, 2.0, 2.0], [2.0, 0.0, 1.0], [2.0, 2.0, 2.0]]))[1]
     array([2., 1., 1.])
     """
-    level = np.full(heights.shape, np.inf)
-    for border in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]):
-        level[border] = heights[border]
+    straight = [np.maximum.accumulate(heights, axis=axis) for axis in (0, 1)]
+    straight += [np.maximum.accumulate(heights[::-1, ::-1], axis=axis)[::-1, ::-1] for axis in (0, 1)]
+    around = np.pad(np.min(straight, axis=0), 1, constant_values=np.inf)
+    level = around[1:-1, 1:-1]
     while True:
-        around = np.pad(level, 1, constant_values=np.inf)
-        lowest = np.min([around[:-2, 1:-1], around[2:, 1:-1], around[1:-1, :-2], around[1:-1, 2:]], axis=0)
-        lower = np.minimum(level, np.maximum(heights, lowest))
-        if (lower == level).all():
-            return level
-        level = lower
+        lowest = np.minimum(around[:-2, 1:-1], around[2:, 1:-1])
+        np.minimum(lowest, around[1:-1, :-2], out=lowest)
+        np.minimum(lowest, around[1:-1, 2:], out=lowest)
+        np.maximum(lowest, heights, out=lowest)
+        np.minimum(lowest, level, out=lowest)
+        if (lowest == level).all():
+            return lowest
+        level[:] = lowest
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ground.display_blur import CUT_OFF, blurred, blurred_window
-from ..ground.heightfield import HeightField, SparseGrid, Window
+from ..ground.heightfield import HeightField, SparseGrid, Window, side_by_side
 from ..record.footprints import Footprint, recompose
 from . import hollows
 from .weather import SEALING
@@ -84,6 +84,7 @@ def weather_places(
     layer_depth: float,
     time_stretch: float = 1.0,
     felt: bool = False,
+    puddles: bool = True,
 ) -> WeatherPlaces:
     """What weather needs to know of places.
 
@@ -103,14 +104,16 @@ def weather_places(
         Frames of the animation for each frame of the footprints.
     felt : bool
         Whether steps felt the weather: their record then has in it how high the open ground was.
+    puddles : bool
+        Whether water stands in hollows; without, there is none.
     """
     places = position[:, :2].T
     ground, trodden = recompose(footprints, cell_size=cell_size), _contacts(footprints, cell_size, time_stretch)
     # The blur of the display is in what is shown already.
-    at_sigma = [blurred(ground, float(np.hypot(sigma, blur_sigma))).sample(*places) for sigma in SIGMAS]
+    at_sigma = _sampled([blurred(ground, float(np.hypot(sigma, blur_sigma))) for sigma in SIGMAS], *places)
     # What the record has of the level of open ground ends where its display does.
     narrowest = blur_sigma if felt else SIGMAS[0]
-    bounds = [blurred(trodden, sigma).sample(*places) for sigma in (narrowest, *SIGMAS[1:])]
+    bounds = _sampled([blurred(trodden, sigma) for sigma in (narrowest, *SIGMAS[1:])], *places)
     inside = [share for share, *_ in bounds]
     first, last = (_mean_frame(bounds, number) for number in (1, 2))
     last, compression = np.maximum(last, ended), at_sigma[0][0]
@@ -118,7 +121,8 @@ def weather_places(
         started = started + 0.5 * time_stretch  # over a frame, of which the end is recorded
         pressed = blurred(_pressed(footprints, cell_size), float(np.hypot(SIGMAS[0], blur_sigma)))
         (compression,) = pressed.sample(*places)
-    pool, levels = _pools(footprints, ground, position, blur_sigma, layer_depth, time_stretch)
+    filling = footprints if puddles else ()
+    pool, levels = _pools(filling, ground, position, blur_sigma, layer_depth, time_stretch)
     blur_before, again = _before_the_last(footprints, position, cell_size, blur_sigma, time_stretch)
     return WeatherPlaces(
         blur=_steps_of_blur(relief, at_sigma),
@@ -163,6 +167,11 @@ def _contacts(footprints: Sequence[Footprint], cell_size: float, time_stretch: f
         touched.reshape(-1)[cells] = 1.0
         grid.write(footprint.window, values)
     return grid
+
+
+def _sampled(grids: Sequence[SparseGrid], x: Array, y: Array) -> list[Array]:
+    """What each of some grids of as many channels has at places (N,), (channels, N)."""
+    return np.split(side_by_side(grids).sample(x, y), len(grids))
 
 
 def _steps_of_blur(relief: Array, at_sigma: Sequence[Array]) -> Array:

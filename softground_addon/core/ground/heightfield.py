@@ -7,7 +7,7 @@ the touched ground and not its extent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -254,10 +254,22 @@ class SparseGrid:
         used = np.zeros(len(keys), dtype=bool)
         used[slot] = True
         if used.any():
-            stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()])
-            place = (np.cumsum(used) - 1)[slot]
-            values[:, known] = stack[place, :, row[known] % TILE, column[known] % TILE].T
+            stack = np.stack([self.tiles[keys[number]] for number in np.flatnonzero(used).tolist()], axis=1)
+            place = ((np.cumsum(used) - 1)[slot] * TILE + row[known] % TILE) * TILE + column[known] % TILE
+            values[:, known] = stack.reshape(self.channels, -1)[:, place]
         return values
+
+
+def side_by_side(grids: Sequence[SparseGrid]) -> SparseGrid:
+    """The channels of grids of one cell size, in one grid, where they are looked up together; 0 where nothing is."""
+    first = np.cumsum([0, *(grid.channels for grid in grids)]).tolist()
+    together = SparseGrid(grids[0].cell_size, channels=first[-1])
+    for grid, channel in zip(grids, first, strict=False):
+        for key, tile in grid.tiles.items():
+            if key not in together.tiles:
+                together.tiles[key] = np.zeros((together.channels, TILE, TILE))
+            together.tiles[key][channel : channel + grid.channels] = tile
+    return together
 
 
 class HeightField(SparseGrid):
