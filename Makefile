@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes assets heroes gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
+.PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -38,6 +38,10 @@ assets: $(READY)
 # The large pictures of docs/gallery.md.
 heroes: $(READY)
 	$(BIN)/python -m sample_scenes.make_all heroes --samples 16
+
+# Each ground from 0.3, 2 and 20 m in Cycles, EEVEE and Material Preview, and a print that grows, into build/ground_sheets.
+ground_sheets: $(READY)
+	$(BIN)/python -m sample_scenes.ground_sheets
 
 # What `make scenes` builds, and then the pictures into docs/images and the small .blend files into sample_scenes.
 gallery: scenes

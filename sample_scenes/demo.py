@@ -145,13 +145,15 @@ def import_motion(path: Path, scale: float, up: str | None) -> bpy.types.Object:
     return rig
 
 
-def bake_lane(scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cell_size: float | None) -> Lane:
+def bake_lane(
+    scene: bpy.types.Scene, walker: bpy.types.Object, preset: str, cell_size: float | None, margin: float = 0.0
+) -> Lane:
     """Set up and bake one ground, as a user does it in the panel."""
     started = time.perf_counter()
     settings = scene.softground
     settings.ground = None
     settings.characters.clear()
-    settings.ground_margin = 0.0  # they lie side by side
+    settings.ground_margin = margin  # at 0 they lie side by side
     if cell_size:
         settings.cell_size = cell_size
     bpy.ops.object.select_all(action="DESELECT")

@@ -354,7 +354,8 @@ _VECTOR = {"data_type": "VECTOR"}
 
 def _soil(graph: Graph, ground: Ground) -> Look:
     """Dull crumbs of all sizes; crushed even and dark under the foot, in clods on the rim, which dries lightest."""
-    loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10)
+    trodden = graph.ramp(graph.noise(ground.place, 0.4, 3.0, 0.6), 0.35, 0.62, 0.25, 1.0)  # no gravel to the horizon
+    loose = graph.ramp(ground.pressed, 0.0, 1.0, 1.0, 0.10) * graph.math("MAXIMUM", trodden, ground.risen)
     stirred = graph.noise(ground.place, 0.010, 3.0, 0.6) * 0.007
     stirred = graph.node("ShaderNodeVectorMath", {0: ground.place, 1: stirred}, operation="ADD")
     wavy = graph.out(stirred)  # crumbs are no honeycomb
