@@ -5,6 +5,7 @@ import itertools
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.core.errors import InputError
@@ -93,6 +94,42 @@ def test_without_names_the_upper_body_is_read_from_the_rest_pose_too(scene, turn
     for side, letter in enumerate("lr"):
         expected |= {f"{joint}_{letter}": numbers[f"{segment}{side}"] for joint, segment in SEGMENT_OF_JOINT.items()}
     assert {joint: mapping.joints[joint][0] for joint in expected} == expected
+
+
+def laid_along_one_axis(armature):
+    """Lay all bones along x at rest, as some motion files do, and pose them as they lay before."""
+    bpy.context.view_layer.objects.active = armature
+    stood = {bone.name: bone.matrix_local.copy() for bone in armature.data.bones}
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:
+        bone.use_connect = False
+    before = {bone.name: (bone.head.copy(), bone.length) for bone in armature.data.edit_bones}
+    for bone in armature.data.edit_bones:  # parents first
+        head, length = before[bone.name]
+        apart = (head - before[bone.parent.name][0]).length if bone.parent else 0.0
+        bone.head = (bone.parent.head.x + apart, 0.0, 0.0) if bone.parent else (0.0, 0.0, 0.0)
+        bone.tail = (bone.head.x + length, 0.0, 0.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name, matrix in stood.items():
+        armature.pose.bones[name].matrix = matrix
+        bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 2, -0.7])
+@pytest.mark.parametrize("stride", [0.0, 0.45])
+def test_a_rig_whose_rest_pose_says_nothing_either_is_read_from_its_pose(scene, turn, stride):
+    armature, numbers = nameless(turn)
+    expected = map_rig(armature)
+    laid_along_one_axis(armature)
+    for side, way in ((0, 1), (1, -1)):
+        thigh = armature.pose.bones[numbers[f"thigh{side}"]]
+        across = Matrix.Rotation(turn, 3, "Z").col[0]
+        hip = Matrix.Translation(thigh.head)
+        thigh.matrix = hip @ Matrix.Rotation(way * stride, 4, across) @ hip.inverted() @ thigh.matrix
+        bpy.context.view_layer.update()
+    mapping = map_rig(armature)
+    assert mapping.soles == expected.soles
+    assert mapping.joints == expected.joints
 
 
 @pytest.mark.parametrize(

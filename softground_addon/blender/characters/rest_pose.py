@@ -1,6 +1,8 @@
 """Feet and limbs of a rig whose names say nothing, from the shape of its rest pose.
 
-Legs are the mirrored chains that reach lowest; left and right come from the way the feet point.
+Legs are the mirrored chains that reach lowest; left and right come from the way the feet point. Where no such shows, as
+in motion files whose rest pose lays all bones along one axis, the pose of the current frame is looked at: its legs are
+the chains of equal bones that reach lowest.
 """
 
 from __future__ import annotations
@@ -22,6 +24,9 @@ _Pair = tuple[list[int], list[int]]
 
 _LOW = 0.2
 """A leaf counts as a foot when its lowest end is in this part of the rig's height."""
+
+_RAISED = 0.35
+"""The same in a pose, in which a foot may be lifted."""
 
 _ANKLE_LEVEL = 0.3
 """The foot starts below this part of the hip's height (the ankle of a human is at 0.08, the knee at 0.54)."""
@@ -46,6 +51,8 @@ class _Skeleton:
     parents: list[int]
     heads: Array
     tails: Array
+    is_posed: bool = False
+    """Whether this is a pose of the animation, in which limbs are not mirror images."""
 
     @property
     def height(self) -> float:
@@ -73,10 +80,14 @@ class _Skeleton:
 def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
     """Joints and feet (name, side, bone, toe bone) from the rest pose, or None where no pair of legs shows.
 
-    Steering bones are left out: where some bones deform, only those count.
+    Steering bones are left out: where some bones deform, only those count. Where no legs show at rest, the current pose
+    serves.
     """
     skeleton = _read_skeleton(armature)
     pairs = _mirrored_legs(skeleton)
+    if not pairs:
+        skeleton = _read_skeleton(armature, posed=True)
+        pairs = _mirrored_legs(skeleton)
     if not pairs:
         return None
     forward = _forward(skeleton, pairs)
@@ -192,8 +203,8 @@ def _neck_joints(skeleton: _Skeleton, neck: Sequence[int]) -> Joints:
     return joints
 
 
-def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
-    """The deforming bones in world axes, each hung from its nearest ancestor that deforms."""
+def _read_skeleton(armature: bpy.types.Object, *, posed: bool = False) -> _Skeleton:
+    """The deforming bones in world axes, at rest or posed, each hung from its nearest ancestor that deforms."""
     bones = list(armature.data.bones)
     deforming = [bone for bone in bones if bone.use_deform] or bones
     index = {bone.name: place for place, bone in enumerate(deforming)}
@@ -201,18 +212,18 @@ def _read_skeleton(armature: bpy.types.Object) -> _Skeleton:
     turn = np.array(armature.matrix_world.to_3x3())
     if np.linalg.det(turn) < 0:
         turn = turn * (-1, 1, 1)  # sides are those of the character, not of its mirror image
-    return _Skeleton(
-        names=[bone.name for bone in deforming],
-        parents=parents,
-        heads=np.array([bone.head_local for bone in deforming]) @ turn.T,
-        tails=np.array([bone.tail_local for bone in deforming]) @ turn.T,
-    )
+    names = [bone.name for bone in deforming]
+    ends = [(bone.head_local, bone.tail_local) for bone in deforming]
+    if posed:
+        ends = [(bone.head, bone.tail) for bone in map(armature.pose.bones.__getitem__, names)]
+    heads, tails = np.moveaxis(np.array(ends), 1, 0) @ turn.T
+    return _Skeleton(names, parents, heads, tails, posed)
 
 
 def _mirrored_legs(skeleton: _Skeleton) -> list[_Pair]:
     """Pairs of chains, from below where they part to the lowest bones; the lowest and longest pair first."""
     floor = min(skeleton.heads[:, 2].min(), skeleton.tails[:, 2].min())
-    limit = floor + _LOW * skeleton.height
+    limit = floor + (_RAISED if skeleton.is_posed else _LOW) * skeleton.height
     lowest = np.minimum(skeleton.heads[:, 2], skeleton.tails[:, 2])
     chains = [skeleton.chain(leaf) for leaf in skeleton.leaves if lowest[leaf] < limit]
     return _one_per_limb(skeleton, _mirrored_pairs(skeleton, chains))
@@ -237,11 +248,14 @@ def _shared_length(first: Sequence[int], second: Sequence[int]) -> int:
 
 
 def _are_mirrored(skeleton: _Skeleton, left: Sequence[int], right: Sequence[int]) -> bool:
-    """Whether two chains are images of each other in a vertical plane."""
+    """Whether two chains are images of each other in a vertical plane; in a pose, whether their bones are as long."""
+    tolerance = _MIRROR_TOLERANCE * skeleton.height
+    if skeleton.is_posed:
+        one, other = (np.array(skeleton.lengths(chain)[:-1]) for chain in (left, right))  # tips end anywhere
+        return bool(np.abs(one - other).max() < tolerance)
     a, b = skeleton.heads[list(left)], skeleton.heads[list(right)]
     normal = (a - b).mean(axis=0) * (1, 1, 0)
     gap = float(np.linalg.norm(normal))
-    tolerance = _MIRROR_TOLERANCE * skeleton.height
     if gap < tolerance:
         return False
     normal /= gap

@@ -78,7 +78,7 @@ def map_rig(armature: bpy.types.Object) -> RigMapping:
             mapping = by_shape if mapping is None else _completed(mapping, by_shape)
     if mapping is None:
         raise InputError(
-            f"No feet found in '{armature.name}', neither by the names of its bones nor by its rest pose: "
+            f"No feet found in '{armature.name}', neither by the names of its bones nor by how they lie: "
             f"{CHOOSE_CONTACTS}."
         )
     return mapping
