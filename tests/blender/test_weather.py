@@ -287,6 +287,18 @@ def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
     assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
 
 
+def test_sliders_change_nothing_that_is_stored(opened):
+    scene = opened("sand")
+    bpy.ops.softground.add_weather()
+    record = bytes(baked_ground.stored_record(scene.softground.ground))
+    kept = contents(carrier(scene).data)
+    still = positions(scene, 300)
+    set_to(scene, **SOME)
+    assert positions(scene, 300).tobytes() != still.tobytes()
+    assert bytes(baked_ground.stored_record(scene.softground.ground)) == record
+    assert contents(carrier(scene).data) == kept
+
+
 def test_weather_comes_behind_the_playback_and_before_what_is_the_users(opened):
     scene = opened()
     ground = carrier(scene)
@@ -333,17 +345,26 @@ def test_the_final_mesh_of_a_slowed_down_scene_stands_under_the_weather_of_its_l
     assert read(still, "position", 3) == pytest.approx(wanted, abs=1e-6)
 
 
-def test_alembic_carries_the_weather(opened, tmp_path):
-    scene = opened()
+@pytest.mark.parametrize("kind", ["abc", "usdc"])
+def test_alembic_and_usd_carry_the_weather(opened, tmp_path, kind):
+    scene, path = opened(), tmp_path / f"ground.{kind}"
     bpy.ops.softground.add_weather(preset="SNOWFALL")
-    wanted = positions(scene, 200)
-    exports.export_alembic(scene, scene.softground.ground, tmp_path / "ground.abc", 200, 201)
-    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "ground.abc"), as_background_job=False)
+    wanted, fresh = positions(scene, 200), read(shown(scene, 200), nodes.FRESH)
+    there = set(bpy.data.objects)
+    if kind == "abc":
+        exports.export_alembic(scene, scene.softground.ground, path, 200, 201)
+        bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
+    else:
+        exports.export_usd(scene, scene.softground.ground, path, 200, 201)
+        bpy.ops.wm.usd_import(filepath=str(path))
     scene.frame_set(200)
-    imported = max(bpy.context.selected_objects, key=lambda obj: len(obj.data.polygons))  # the other is debris
+    meshes = [obj for obj in set(bpy.data.objects) - there if obj.type == "MESH"]
+    imported = max(meshes, key=lambda obj: len(obj.data.polygons))  # the other is debris
     mesh = imported.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     world = read(mesh, "position", 3) @ np.array(imported.matrix_world.to_3x3()).T
     assert np.sort(world[:, 2]) == pytest.approx(np.sort(wanted[:, 2]), abs=1e-5)
+    if kind == "usdc":  # Alembic holds no such numbers of a mesh
+        assert np.sort(read(mesh, nodes.FRESH)) == pytest.approx(np.sort(fresh), abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -419,7 +440,6 @@ def test_each_preset_has_something_to_show(opened, preset):
     assert changed > 5e-3 or read(now, nodes.WETNESS).min() < 0.6
 
 
-@pytest.mark.slow
 def content_of(tree):
     """All that a node group is: its nodes with their properties and values, and its links."""
     names = {node: number for number, node in enumerate(tree.nodes)}

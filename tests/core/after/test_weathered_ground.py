@@ -223,6 +223,20 @@ def test_wind_fills_and_conserves_nothing_but_rain_moves_ground_alone(left):
     assert np.abs(relief + rain.height).max() < np.abs(relief).max()
 
 
+@pytest.mark.parametrize(
+    "weather", [Weather(wind=9.0, time_scale=60.0), Weather(snowfall=3e-2 / HOUR, time_scale=2880.0)]
+)
+def test_creeping_sand_and_draping_snow_move_what_is_there_and_lose_none_of_it(left, weather):
+    raw, relief, places = left
+    alike = replace(places, times=np.where([True, True, False], SPAN.first, places.times))  # all of one age
+    bottomless = 1e9  # so that wind fills nothing
+    moved = at((raw, relief, alike), weather, 300.0, "sand", bottomless)
+    cover = course_of(weather, matter_of("sand", 0.3, bottomless), frame=300.0, span=SPAN).cover[0]
+    change = moved.height - cover
+    assert np.abs(change).sum() > 0.5 * np.abs(relief).sum()
+    assert abs(change.sum()) < 1e-4 * np.abs(relief).sum()
+
+
 def test_puddles_are_level_and_spill_no_higher_than_their_brim(left):
     _, relief, places = left
     rain = at(left, Weather(rain=40e-3 / HOUR, time_scale=240.0), 900.0, "mud")
