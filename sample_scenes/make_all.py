@@ -24,7 +24,16 @@ SCENES = (
 )
 """Modules of this package that `production.run` knows how to run, in the order of the paper's figures."""
 
-HEROES = ("snow_at_dusk", "path_after_rain", "dune_runner", "bare_feet", "fox_in_powder", "before_after", "time_lapse")
+HEROES = (
+    "snow_at_dusk",
+    "path_after_rain",
+    "dune_runner",
+    "powder_runner",
+    "bare_feet",
+    "fox_in_powder",
+    "before_after",
+    "time_lapse",
+)
 """Scenes out of doors, whose pictures take minutes."""
 
 
