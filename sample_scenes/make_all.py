@@ -27,6 +27,7 @@ SCENES = (
 HEROES = (
     "snow_at_dusk",
     "path_after_rain",
+    "tyre_and_boot",
     "dune_runner",
     "powder_runner",
     "bare_feet",

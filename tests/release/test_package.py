@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from release import manual, package
 
@@ -45,6 +46,18 @@ def test_it_holds_the_extension_and_nothing_else(built):
 def test_it_is_small_and_so_are_the_pictures_of_its_page(built):
     assert built.stat().st_size < 10_000_000
     assert all(path.stat().st_size < 500_000 for path in (ROOT / "docs/images").glob("*.jpg"))
+
+
+def test_the_page_has_an_icon_a_featured_picture_and_six_more():
+    sizes = {}
+    for row in (ROOT / "docs" / "publishing.md").read_text(encoding="utf-8").splitlines():
+        if row.startswith(("| icon", "| featured picture", "| six pictures")):
+            names = re.findall(r"\(images/([\w.]+)\)", row)
+            sizes[row[2:6]] = [Image.open(ROOT / "docs" / "images" / name).size for name in names]
+    assert sizes["icon"] == [(256, 256)]
+    assert sizes["feat"] == [(1920, 1080)]
+    assert len(sizes["six "]) == 6
+    assert all(width >= 1280 for width, _ in sizes["six "])
 
 
 def test_the_same_sources_give_the_same_bytes_whatever_their_times_and_rights(built, tmp_path):
