@@ -97,6 +97,22 @@ def pieces(obj):
     return shapes, points
 
 
+def points_of(obj):
+    """Attributes of all round points that are seen, in world space, by name: (N, 1 or 3)."""
+    found = {name: [] for name in ("position", "velocity", "age", "radius", "kind", "step")}
+    for one in bpy.context.evaluated_depsgraph_get().object_instances:  # each lives for its turn only
+        if one.is_instance and one.parent and one.parent.original == obj and one.object.type == "POINTCLOUD":
+            for name, parts in found.items():
+                size = 3 if name in ("position", "velocity") else 1
+                part = np.empty(len(one.object.data.points) * size, np.float32)
+                one.object.data.attributes[name].data.foreach_get("vector" if size == 3 else "value", part)
+                parts.append(part.reshape(-1, size))
+            matrix = np.array(one.matrix_world)
+            found["position"][-1] = found["position"][-1] @ matrix[:3, :3].T + matrix[:3, 3]
+            found["velocity"][-1] = found["velocity"][-1] @ matrix[:3, :3].T
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
 def shown(obj):
     """Places of all pieces, by place."""
     shapes, points = pieces(obj)
@@ -128,6 +144,30 @@ def test_debris_flies_as_the_closed_form_says_in_any_order_of_frames(scene):
             assert np.abs(np.sort(places, axis=0) - np.sort(expected, axis=0)).max() < 1e-4
     assert counts[0] == counts[3] == len(obj.data.vertices) or counts[0] == counts[3] > counts[4]
     assert counts[1] < counts[0]
+
+
+@pytest.mark.parametrize("frame", [9, 13, 24])
+def test_points_know_their_age_velocity_radius_kind_and_step(scene, frame):
+    obj = debris_object.of(scene.softground.ground)
+    scene.frame_set(frame)
+    seen = points_of(obj)
+    since = (frame - values(obj, "softground_birth")).astype(float) / 24.0
+    start = values(obj, "softground_start", "vector", 3) + np.array(obj.location)
+    launch, drag = values(obj, "softground_launch", "vector", 3), values(obj, "softground_drag").astype(float)
+    flies = since < values(obj, "softground_flight")
+    time = np.clip(since, 0.0, values(obj, "softground_flight"))
+    at = flight.position(start.astype(float), launch, drag, time, 9.81)
+    fall = np.array([0.0, 0.0, -9.81]) * drag[:, None]
+    speed = (fall + (launch - fall) * np.exp(-time / drag)[:, None]) * flies[:, None]
+    expected = {"age": since, "velocity": speed}
+    expected |= {name: values(obj, name) for name in ("radius", "kind", "step")}
+    born = np.flatnonzero(since >= 0)
+    apart, which = KDTree(at[born]).query(seen["position"])
+    assert len(apart) > 100
+    assert apart.max() < 1e-4
+    for name, wanted_of in expected.items():
+        wrong = np.abs(seen[name] - wanted_of[born][which].reshape(len(which), -1)).max(axis=1)
+        assert (wrong > 1e-3).mean() < 0.02, name  # a few lie in one place
 
 
 def test_wind_and_amount_act_at_once(scene):
