@@ -14,11 +14,13 @@ COLOURS = {
     "sand": (0.66, 0.48, 0.29, 1.0),
     "wet_sand": (0.24, 0.16, 0.09, 1.0),
     "mud": (0.10, 0.065, 0.04, 1.0),
-    "soil": (0.16, 0.10, 0.06, 1.0),
+    "soil": (0.16, 0.09, 0.045, 1.0),
 }
 """Of pieces: the grain and the waves of a ground's look are too coarse for them."""
 THROUGH = {"snow": 0.5, "sand": 0.15}
 """Share of light that pieces let through: they glow against the sun. Sand that lies turns dark by more of it."""
+ANGULAR = ("soil",)
+"""Surfaces whose pieces break along faces: clods, which smooth shading makes pebbles of."""
 GLOSSY = ("wet_sand", "mud")
 """Surfaces whose pieces shine."""
 
@@ -31,7 +33,8 @@ def collection_of(surface: str) -> bpy.types.Collection:
     for number, lump in enumerate(lumps(surface), 1):
         mesh = bpy.data.meshes.new(f"{shapes.name} {number}")
         mesh.from_pydata(lump.vertices.tolist(), [], lump.faces.tolist())
-        mesh.shade_smooth()
+        if surface not in ANGULAR:
+            mesh.shade_smooth()
         mesh.materials.append(material)
         shapes.objects.link(bpy.data.objects.new(mesh.name, mesh))
     return shapes
