@@ -15,7 +15,7 @@ MOTION ?=
 SCALE ?= 0.01
 UP ?=
 
-.PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
+.PHONY: ready blenders demo scenes assets heroes ground_sheets gallery moving film test slow versions marathon bench validate zoo sheets gui pictures package lint types clean
 
 $(READY): requirements/test.txt
 	$(PYTHON) -m venv $(VENV)
@@ -52,6 +52,13 @@ moving: $(READY)
 	$(BIN)/python -m sample_scenes.moving_picture --output build/moving --samples 8
 	cp build/moving/moving_picture.webp docs/images/
 	$(BIN)/python -m sample_scenes.preset_pictures
+
+# SoftGround in use: recorded in the window of a real Blender 4.3, and a night of snow.
+film: $(READY)
+	$(MAKE) blenders BLENDERS=trixie
+	$(PYTEST) -m film -rs tests/gui/test_filmed.py -k trixie
+	$(BIN)/python -m sample_scenes.in_use --output build/in_use --samples 8
+	cp build/in_use/in_use.webp docs/images/
 
 # Processes side by side gain nothing from threads that wait for each other's processors.
 test slow marathon: export OPENBLAS_NUM_THREADS := 1

@@ -55,20 +55,24 @@ class TimeLapse:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> TimeLapse:
     """The same walk on each ground, far from the others."""
-    body, bakes = Body(), {}
+    return TimeLapse({preset: track(scene, preset, cell_size, options) for preset in WEATHER})
+
+
+def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options: Options | None) -> Bake:
+    """The walk on the ground that a preset of weather goes over, and the weather."""
+    number, body = list(WEATHER).index(preset), Body()
     scene.frame_start, scene.frame_end = 1, FRAMES
-    for number, (preset, ground) in enumerate(WEATHER.items()):
-        walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
-        walker.location = (APART * number, 0.0, 0.0)
-        write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-        chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"} | dict(options or {})
-        bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], ground, cell_size, options=chosen)
-        modifier = weather.add(bakes[preset].ground)
-        weather.set_preset(modifier, preset)
-        if preset in AFTERWARDS:
-            _set_in(modifier, FRAMES)
-        stage.hide(walker)
-    return TimeLapse(bakes)
+    walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
+    walker.location = (APART * number, 0.0, 0.0)
+    write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
+    chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"} | dict(options or {})
+    bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
+    modifier = weather.add(bake.ground)
+    weather.set_preset(modifier, preset)
+    if preset in AFTERWARDS:
+        _set_in(modifier, FRAMES)
+    stage.hide(walker)
+    return bake
 
 
 def _set_in(modifier: Any, frame: int) -> None:
@@ -83,14 +87,19 @@ def _set_in(modifier: Any, frame: int) -> None:
 
 def claims(built: TimeLapse) -> list[Claim]:
     """What the weather does to the hollow of a step, from the end of the walk to the last picture."""
-    shown = [(preset, _hollow(bake, FRAMES), _hollow(bake, FRAMES + LASTS)) for preset, bake in built.bakes.items()]
-    kept = {preset: after / before for preset, before, after in shown}
+    kept = {preset: hollow_left(bake) for preset, bake in built.bakes.items()}
     return [
         Claim("Hollow left by a night of snow", kept["SNOWFALL"], 0.0, 0.7),
         Claim("Hollow left by a thaw: trodden snow melts last and stands up", kept["THAW"], -3.0, 0.7),
         Claim("Hollow left by ten minutes of wind", kept["WINDY_DUNES"], 0.0, 0.9),
         Claim("Hollow left by a drying beach", kept["DRYING_BEACH"], 0.5, 1.01),
     ]
+
+
+def hollow_left(bake: Bake) -> float:
+    """The share of a step's depth that is left in the last picture."""
+    before, after = (_hollow(bake, frame) for frame in (FRAMES, FRAMES + LASTS))
+    return after / before
 
 
 def _step(bake: Bake) -> Footprint:
@@ -110,24 +119,31 @@ def _hollow(bake: Bake, frame: int) -> float:
 
 
 def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
-    """Twelve moments of each, low over a step."""
+    """Twelve moments of each."""
     scene = bpy.context.scene
     stage.add_sun(scene, radians(40), radians(22))
-    camera = stage.add_camera(scene, "Over a Step", lens=45.0)
     made = []
     for preset, bake in built.bakes.items():
-        step = np.array(_step(bake).position)
-        moments = []
-        part = np.linspace(0.0, 1.0, MOMENTS) ** PACE.get(preset, EARLY)
-        for number, frame in enumerate((FRAMES + LASTS * part).round().astype(int)):
-            scene.frame_set(int(frame))
-            level = _level(bake)
-            stage.aim(camera, (step[0] + 0.75, step[1] + 1.25, level + 0.85), (step[0] - 0.02, step[1] + 0.10, level))
-            moments.append(folder / f"time_lapse_{preset.lower()}_{number:02d}.png")
-            stage.render(scene, camera, moments[-1], PICTURE, samples)
+        moments = take(bake, preset, PICTURE, folder / f"time_lapse_{preset.lower()}", samples)
         made.append(stage.contact_sheet(moments, COLUMNS, folder / f"time_lapse_{preset.lower()}.jpg"))
         made.append(animate(moments, PAUSE, folder / f"time_lapse_{preset.lower()}.webp"))
     return made
+
+
+def take(bake: Bake, preset: str, size: tuple[int, int], path: Path, samples: int) -> list[Path]:
+    """Twelve pictures of a track under its weather, low over a step; their names begin with a path."""
+    scene = bpy.context.scene
+    camera = stage.add_camera(scene, "Over a Step", lens=45.0)
+    step = np.array(_step(bake).position)
+    moments = []
+    part = np.linspace(0.0, 1.0, MOMENTS) ** PACE.get(preset, EARLY)
+    for number, frame in enumerate((FRAMES + LASTS * part).round().astype(int)):
+        scene.frame_set(int(frame))
+        level = _level(bake)
+        stage.aim(camera, (step[0] + 0.75, step[1] + 1.25, level + 0.85), (step[0] - 0.02, step[1] + 0.10, level))
+        moments.append(path.with_name(f"{path.name}_{number:02d}.png"))
+        stage.render(scene, camera, moments[-1], size, samples)
+    return moments
 
 
 def _level(bake: Bake) -> float:

@@ -31,7 +31,12 @@ WORKER = os.environ.get("PYTEST_XDIST_WORKER", "alone")
 STORY_SECONDS = 1200
 """Longest story on a machine that does other things too; a quiet one takes a minute or two."""
 
-WINDOWS = {"pauses": (640, 480), "live_answers": (1100, 760), "first_minutes": (1100, 760)}
+WINDOWS = {
+    "pauses": (640, 480),
+    "live_answers": (1100, 760),
+    "first_minutes": (1100, 760),
+    "filmed": (880, 600),
+}
 """Width and height of the window of stories that do not want all of the screen [px]: a small one is drawn sooner; that
 of the first minutes leaves 600 px to the sidebar."""
 
