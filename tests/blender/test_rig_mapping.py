@@ -127,9 +127,14 @@ def test_a_rig_whose_rest_pose_says_nothing_either_is_read_from_its_pose(scene, 
         hip = Matrix.Translation(thigh.head)
         thigh.matrix = hip @ Matrix.Rotation(way * stride, 4, across) @ hip.inverted() @ thigh.matrix
         bpy.context.view_layer.update()
-    mapping = map_rig(armature)
+    mapping = map_rig(armature, posed=True)
     assert mapping.soles == expected.soles
     assert mapping.joints == expected.joints
+    with pytest.raises(InputError, match="No feet found"):
+        map_rig(armature)
+    bpy.ops.softground.add_character()
+    (character,) = scene.softground.characters
+    assert {sole.bone for sole in character.soles} == {sole.bone for sole in expected.soles}
 
 
 @pytest.mark.parametrize(

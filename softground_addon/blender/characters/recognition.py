@@ -77,17 +77,16 @@ def recognise(
         If the armature or its meshes cannot be read.
     """
     require_armature(armature)
-    try:
-        mapping = map_rig(armature)
-    except InputError:
-        mapping = RigMapping(method="skin")
+    mapping = _mapped(armature)
     if armature.mode == "EDIT":
         return Recognised(mapping)
     rig, begun, read = name_of(armature), jobs.Progress("sample", 0.0), jobs.Progress("sample", SHARE)
     skin = yield from jobs.meanwhile(begun, read_skin.slices(scene, armature))
     armature = found(rig)
-    if skin is None or armature.mode == "EDIT":
+    if armature.mode == "EDIT":
         return Recognised(mapping)
+    if skin is None:
+        return Recognised(mapping if mapping.soles else _mapped(armature, posed=True))
     units = units_of(scene)
     samples = range(scene.frame_current, scene.frame_current + 1)
     moves = bool(frames) and is_animated(armature) and armature.data.pose_position != "REST"
@@ -102,6 +101,14 @@ def recognise(
         return Recognised(replace(mapping, mass=mass), skin)
     seen = yield from jobs.meanwhile(read, _shown_by_skin(found(rig), skin, recording))
     return Recognised(replace(_joined(found(rig), mapping, seen), mass=mass), skin, recording)
+
+
+def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
+    """What names and rest pose say, or without a skin the current pose; empty where they say nothing."""
+    try:
+        return map_rig(armature, posed=posed)
+    except InputError:
+        return RigMapping(method="skin")
 
 
 def _joined(armature: bpy.types.Object, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:

@@ -1,8 +1,8 @@
 """Feet and limbs of a rig whose names say nothing, from the shape of its rest pose.
 
-Legs are the mirrored chains that reach lowest; left and right come from the way the feet point. Where no such shows, as
-in motion files whose rest pose lays all bones along one axis, the pose of the current frame is looked at: its legs are
-the chains of equal bones that reach lowest.
+Legs are the mirrored chains that reach lowest; left and right come from the way the feet point. Motion files may lay
+all bones along one axis at rest: there the pose of the current frame tells, whose legs are the chains of equal bones
+that reach lowest.
 """
 
 from __future__ import annotations
@@ -77,17 +77,14 @@ class _Skeleton:
         return path[::-1]
 
 
-def map_by_rest_pose(armature: bpy.types.Object) -> tuple[Joints, Feet] | None:
+def map_by_rest_pose(armature: bpy.types.Object, *, posed: bool = False) -> tuple[Joints, Feet] | None:
     """Joints and feet (name, side, bone, toe bone) from the rest pose, or None where no pair of legs shows.
 
-    Steering bones are left out: where some bones deform, only those count. Where no legs show at rest, the current pose
-    serves.
+    Steering bones are left out: where some bones deform, only those count. If `posed`, the current pose is looked at in
+    place of the rest pose.
     """
-    skeleton = _read_skeleton(armature)
+    skeleton = _read_skeleton(armature, posed=posed)
     pairs = _mirrored_legs(skeleton)
-    if not pairs:
-        skeleton = _read_skeleton(armature, posed=True)
-        pairs = _mirrored_legs(skeleton)
     if not pairs:
         return None
     forward = _forward(skeleton, pairs)

@@ -50,13 +50,15 @@ CHOOSE_CONTACTS = (
 """What to do where no feet are found."""
 
 
-def map_rig(armature: bpy.types.Object) -> RigMapping:
+def map_rig(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
     """Joints and feet of an armature.
 
     Parameters
     ----------
     armature : bpy.types.Object
         Only read; may be linked or overridden.
+    posed : bool
+        Whether the current pose stands in for the rest pose.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def map_rig(armature: bpy.types.Object) -> RigMapping:
     bones = armature.data.bones
     mapping = _map_by_names(bones)
     if mapping is None or not mapping.joints.keys() >= _WHOLE_BODY:
-        shape = map_by_rest_pose(armature)
+        shape = map_by_rest_pose(armature, posed=posed)
         if shape is not None:
             joints, feet = shape
             by_shape = RigMapping(joints, tuple(SoleSource(*foot) for foot in feet), method="rest pose")
