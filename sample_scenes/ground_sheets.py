@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from sample_scenes import demo, stage
-from sample_scenes.four_grounds import EXPOSURE, SUN_ELEVATION, close_up_of
+from sample_scenes.four_grounds import EXPOSURE, close_up_of, light
 from sample_scenes.production import addon
 from softground_addon.core.record.footprints import Footprint
 
@@ -58,7 +58,7 @@ def shoot(preset: str, folder: Path, samples: int) -> list[Path]:
 def _set_up(scene: bpy.types.Scene, preset: str, step: Footprint) -> None:
     """A low sun and the cameras, at the end of the walk."""
     stage.set_up_rendering(scene)
-    stage.add_sun(scene, step.heading - radians(125), SUN_ELEVATION)
+    light(scene, step)
     scene.view_settings.exposure = EXPOSURE.get(preset, 0.0)
     scene.render.resolution_x, scene.render.resolution_y = TILE
     scene.frame_set(scene.frame_end)

@@ -15,6 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from sample_scenes import production, stage
+from sample_scenes.moving_picture import put_together
 from sample_scenes.production import Claim, Options
 from sample_scenes.time_lapse import CELL_SIZE, TimeLapse, hollow_left, take, track
 
@@ -48,7 +49,9 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     stage.add_sun(bpy.context.scene, radians(40), radians(22))
     width, height = shown[0].size
     moments = take(built.bakes[WEATHER], WEATHER, (width // 2, height // 2), folder / "in_use", samples)
-    return [put_together([*shown, *flowing(moments, shown[0].size)], folder / "in_use.webp")]
+    pictures = [*shown, *flowing(moments, shown[0].size)]
+    pause = round(1000 * PLAYED / bpy.context.scene.render.fps)
+    return [put_together(pictures, pause, folder / "in_use.webp", LARGEST, (80, 70, 60, 50), effort=4)]
 
 
 def window(folder: Path) -> list[Image.Image]:
@@ -69,18 +72,6 @@ def flowing(moments: list[Path], size: tuple[int, int]) -> list[Image.Image]:
     pictures = [Image.open(moment).convert("RGB").resize(size, Image.Resampling.LANCZOS) for moment in moments]
     mixed = [Image.blend(*pair, part / MIXED) for pair in pairwise(pictures) for part in range(MIXED)]
     return mixed + pictures[-1:]
-
-
-def put_together(pictures: list[Image.Image], path: Path) -> Path:
-    """Pictures one after another, for ever; as large as `LARGEST` at most."""
-    pause = round(1000 * PLAYED / bpy.context.scene.render.fps)
-    for quality in (80, 70, 60, 50):
-        pictures[0].save(
-            path, save_all=True, append_images=pictures[1:], duration=pause, loop=0, quality=quality, method=4
-        )
-        if path.stat().st_size <= LARGEST:
-            break
-    return path
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
@@ -83,11 +84,24 @@ def animate(frames: list[Path], duration: int, path: Path) -> Path:
     """Pictures one after another [ms each], for ever, the last one for longer; as large as `LARGEST` at most."""
     pictures = [Image.open(frame).convert("RGB") for frame in frames]
     durations = [duration] * (len(frames) - 1) + [LAST_HOLD]
-    for quality in (95, 88, 80, 70):
+    return put_together(pictures, durations, path, LARGEST, (95, 88, 80, 70), effort=6)
+
+
+def put_together(
+    pictures: Sequence[Image.Image],
+    durations: int | list[int],
+    path: Path,
+    largest: int,
+    qualities: Sequence[int],
+    *,
+    effort: int,
+) -> Path:
+    """Pictures one after another [ms each], for ever, in the first of some qualities that is no larger [bytes]."""
+    for quality in qualities:
         pictures[0].save(
-            path, save_all=True, append_images=pictures[1:], duration=durations, loop=0, quality=quality, method=6
+            path, save_all=True, append_images=pictures[1:], duration=durations, loop=0, quality=quality, method=effort
         )
-        if path.stat().st_size <= LARGEST:
+        if path.stat().st_size <= largest:
             break
     return path
 

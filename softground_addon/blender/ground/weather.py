@@ -128,11 +128,9 @@ def _fit(
     """Write what the group reads, and fill it."""
     with damage_named(ground):
         inputs = about["inputs"]
-        known, units = of_bake(about), baked_ground.units_of(inputs)
+        (known, matter), units = of_bake(footprints, about), baked_ground.units_of(inputs)
         stretch, rate, unit_scale = units["time_stretch"], units["frame_rate"], units["unit_scale_m"]
         first, last = (frame * stretch for frame in baked_ground.frames_of(inputs))
-        matter = matter_on(footprints, about)
-        known["puddles"] = matter.soaking is not None
     up = ground_mesh.up_of(display_mesh, unit_scale)
     places = _places(display_mesh, footprints, up, unit_scale, known)
     since = places.times[:, 1]
@@ -153,23 +151,24 @@ def damage_named(ground: bpy.types.Object) -> Iterator[None]:
         raise InputError(f"The bake on '{ground.name}' does not say how it was made: bake again.") from None
 
 
-def matter_on(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> Matter:
-    """How the ground of a bake takes weather, by its footprints and what its record says about it."""
-    depth = baked_ground.baked_with(about, "layer_depth")
-    return matter_of(str(about["inputs"]["surface"]), depth, section_of(footprints))
+def of_bake(footprints: Sequence[Footprint], about: Mapping[str, Any]) -> tuple[dict[str, Any], Matter]:
+    """What `weather_places` takes of a bake, and how its ground takes weather.
 
-
-def of_bake(about: Mapping[str, Any]) -> dict[str, Any]:
-    """What `weather_places` takes of a bake; what `units_of` and `baked_with` of `baked_ground` raise for damage."""
+    By its footprints and what its record says about it; raises what `units_of` and `baked_with` of `baked_ground` do
+    for damage.
+    """
     inputs = about["inputs"]
     units = baked_ground.units_of(inputs)
     material = {name: baked_ground.baked_with(about, name) for name in ("blur_sigma", "layer_depth")}
-    return {
+    matter = matter_of(str(inputs["surface"]), material["layer_depth"], section_of(footprints))
+    known = {
         "cell_size": units["cell_size_m"],
         "time_stretch": units["time_stretch"],
         "felt": felt_in(inputs) is not None,
+        "puddles": matter.soaking is not None,
         **material,
     }
+    return known, matter
 
 
 def _places(

@@ -81,7 +81,7 @@ def weathered_points(
     display_mesh = baked_ground.display_mesh_of(ground)
     footprints, about = baked_ground.load(ground)
     with weather.damage_named(ground):
-        known, matter = weather.of_bake(about), weather.matter_on(footprints, about)
+        known, matter = weather.of_bake(footprints, about)
     count, table = len(position), keyframe_tables(over_time)
     start, end = np.full(count, NOT_YET), np.full(count, -NOT_YET)
     start[table.point] = known["time_stretch"] * table.frame[table.first[:-1]]
@@ -90,7 +90,7 @@ def weathered_points(
     points = bpy.data.meshes.new("SoftGround Points")
     try:
         points.vertices.add(count)
-        places = weather_places(footprints, position, final, start, end, **known, puddles=matter.soaking is not None)
+        places = weather_places(footprints, position, final, start, end, **known)
         weather.store(points, places, matter, weather_keys.moments_of(display_mesh))
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:

@@ -10,7 +10,7 @@ from mathutils import Euler
 
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
-from tests.gui.stories.live_answers import answering, heights, scene
+from tests.gui.stories.live_answers import answering, heights, on_new_ground, scene
 
 FRAMES, FIRST, LAST = 100, 8, 84
 """Of the walk, and of it what is shown."""
@@ -23,11 +23,7 @@ def tell(hand: Hand, facts: dict) -> Steps:
     with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region("WINDOW")):
         bpy.ops.screen.screen_full_area(use_hide_panels=True)
     yield 0.5
-    yield from hand.open_sidebar()
-    yield from hand.press_button("softground.add_character")
-    yield 0.2
-    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
-    yield from hand.press_button("softground.create_ground", offset=0.25)
+    yield from on_new_ground(hand)
     yield 0.5
     yield from hand.press_button("softground.live")
     field = yield from hand.find_field("depth_cm", BEGUN)

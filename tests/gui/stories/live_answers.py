@@ -16,11 +16,7 @@ FRAME = 150
 
 def tell(hand: Hand, facts: dict) -> Steps:
     open_walk(FRAME)
-    yield from hand.open_sidebar()
-    yield from hand.press_button("softground.add_character")
-    yield 0.2
-    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
-    yield from hand.press_button("softground.create_ground", offset=0.25)
+    yield from on_new_ground(hand)
     yield 0.5
     yield from hand.look_at_walk()
     yield from hand.press_button("softground.live")
@@ -61,6 +57,15 @@ def tell(hand: Hand, facts: dict) -> Steps:
 
 def scene():
     return bpy.context.window_manager.windows[0].scene
+
+
+def on_new_ground(hand: Hand) -> Steps:
+    """Add the selected character and make a ground for it, in the panel."""
+    yield from hand.open_sidebar()
+    yield from hand.press_button("softground.add_character")
+    yield 0.2
+    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
+    yield from hand.press_button("softground.create_ground", offset=0.25)
 
 
 def live():

@@ -9,15 +9,12 @@ from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
 from tests.gui.shot import open_walk
 from tests.gui.stories.interrupted_bake import with_viewport
+from tests.gui.stories.live_answers import on_new_ground
 
 
 def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one after the other)
     open_walk(96)
-    yield from hand.open_sidebar()
-    yield from hand.press_button("softground.add_character")
-    yield 0.2
-    yield from hand.wait_for(lambda: not bpy.context.window_manager.softground.is_baking, 60)
-    yield from hand.press_button("softground.create_ground", offset=0.25)
+    yield from on_new_ground(hand)
     yield 0.3
     facts["ground"] = scene().softground.ground.name
 
