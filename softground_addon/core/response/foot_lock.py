@@ -37,6 +37,9 @@ TRAVEL = 0.15
 FARTHEST = 0.5
 """A foot that slides farther than this in one contact glides all along, however slowly, in leg lengths: hips that
 stayed with it would leave the animation."""
+REFITS = 5
+"""Times that each frame of a contact is fitted to where its planted points were planted: from then on, a tenth of a
+percent of what they slide is left to gain."""
 STILL = 0.004
 """A contact is held where its foot moves slowest: frames with less slide than this count alike, in sole lengths."""
 
@@ -163,14 +166,31 @@ def _bearing_in_both(weight: Array) -> Array:
 
 def _held(points: Array, weight: Array, length: float) -> tuple[Array, Array]:
     """Turn (K,) and shift (K, 2) of one contact's frames: x goes to R(turn)·x + shift, and what bears stays."""
-    turns, shifts, _ = _steps(points, weight, length)
+    turns, shifts, on_purpose = _steps(points, weight, length)
     turn = np.concatenate([[0.0], np.cumsum(turns)])
     shift = np.concatenate([np.zeros((1, 2)), np.cumsum(turned_level(turn[:-1], shifts), axis=0)])
+    if not on_purpose:
+        turn, shift = _refitted(points, weight, length, turn, shift)
     slid = np.linalg.norm(np.gradient(shift, axis=0), axis=1) if len(shift) > 1 else np.zeros(1)
     slow = (1.0 / (1.0 + (slid / (STILL * length)) ** 2))[:, None] * weight
     held = turned_level(turn[:, None], points) + shift[:, None]
     back, away = _fitted(held.reshape(1, -1, 2), points.reshape(1, -1, 2), slow.reshape(1, -1), AXLE * length)
     return turn + back, turned_level(back, shift) + away
+
+
+def _refitted(points: Array, weight: Array, length: float, turn: Array, shift: Array) -> tuple[Array, Array]:
+    """Turn (K,) and shift (K, 2) with which planted points are as near as can be to where they were planted.
+
+    Where skin bends, they cannot all stay: from step to step those that bear most would have their way, and what the
+    others slide would add up.
+    """
+    bears = weight >= np.exp(-PLANTED / YIELD) * weight.max(axis=1, keepdims=True)
+    since = _planted_since(bears)[..., None]
+    for _ in range(REFITS):
+        held = turned_level(turn[:, None], points) + shift[:, None]
+        back, away = _fitted(held, np.take_along_axis(held, since, axis=0), bears.astype(float), AXLE * length)
+        turn, shift = turn + back, turned_level(back, shift) + away
+    return turn, shift
 
 
 def _fitted(start: Array, end: Array, weight: Array, axle: float) -> tuple[Array, Array]:
@@ -245,10 +265,14 @@ def slides(sole: Underside, touching: Mask) -> Array:
 
 def _since_planted(points: Array, planted: Mask) -> Array:
     """Distance of planted points (K, Q, 2) from where they were planted, at each of the frames in which they are."""
-    starts = planted & ~np.concatenate([np.zeros((1, planted.shape[1]), bool), planted[:-1]])
-    since = np.maximum.accumulate(np.where(starts, np.arange(len(points))[:, None], 0), axis=0)
-    first = np.take_along_axis(points, since[..., None], axis=0)
+    first = np.take_along_axis(points, _planted_since(planted)[..., None], axis=0)
     return np.asarray(np.linalg.norm(points - first, axis=-1)[planted])
+
+
+def _planted_since(planted: Mask) -> NDArray[np.intp]:
+    """In which frame each planted point (K, Q) came to be so, at each of the frames in which it is."""
+    starts = planted & ~np.concatenate([np.zeros((1, planted.shape[1]), bool), planted[:-1]])
+    return np.maximum.accumulate(np.where(starts, np.arange(len(planted))[:, None], 0), axis=0)
 
 
 def moved(motion: SoleMotion, carry: Array) -> SoleMotion:

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.rigid import carried, displacement, rotation
-from softground_addon.core.response.foot_lock import Underside, lock, slides
+from softground_addon.core.response.foot_lock import Underside, lock, slides, turned_level
 from softground_addon.core.response.foot_placement import posed_points
 from softground_addon.core.response.sole_rim import posed_rim, rim, rim_pieces
 from tests.core.walkers import foot_sole, pose
@@ -72,3 +73,28 @@ def test_a_sole_that_bends_up_at_both_ends_slides_less_than_rigid_pieces_would(s
         worst.append(slides(replace(under, points=held), touching).max())
     assert worst[0] < 1e-3
     assert worst[0] < 0.2 * worst[1]
+
+
+def planted_slides(under, placement):
+    """Distances of planted points from where they were planted (N, 2), of frames turned and shifted (3 F,) as told."""
+    turn, shift = placement.reshape(-1, 3)[:, 0], placement.reshape(-1, 3)[:, 1:]
+    points = turned_level(turn[:, None], under.points[..., :2]) + shift[:, None]
+    planted, found, first = under.planted(), [], np.zeros_like(points[0])
+    for frame, bears in enumerate(planted):
+        new = bears & ~planted[frame - 1] if frame else bears
+        first[new] = points[frame][new]
+        found.append((points[frame] - first)[bears])
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("toes", [0.5, -0.3], ids=["toes bend up", "toes follow the heel"])
+def test_no_other_level_way_of_a_bending_sole_would_slide_less(sole, toes):
+    """Against a general least-squares solver."""
+    motion, touching = rolling(sole, toes), np.ones(FRAMES, bool)
+    points = posed_rim(motion)
+    under = Underside(points, points[..., 2] - points[..., 2].min(axis=1, keepdims=True), rim_pieces(sole), sole.length)
+    held = replace(under, points=carried(lock(under, touching)[:, None], points))
+    still = np.zeros(3 * FRAMES)
+    best = least_squares(lambda placement: planted_slides(under, placement).ravel(), still, max_nfev=30)
+    left, least = (np.sqrt((found**2).mean()) for found in (planted_slides(held, still), best.fun))
+    assert left < 1.01 * least
