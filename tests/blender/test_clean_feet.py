@@ -206,6 +206,15 @@ def test_reference_motions_keep_the_bars(scene, name):
     check_bars(scene, name, before)
 
 
+def test_knees_keep_the_pace_of_a_fast_run_whose_feet_are_stopped(scene):
+    """On a treadmill at 4 m/s: what slows one knee makes another too fast, many times over."""
+    shots.import_file(shots.MotionFile("gait/hamner04_run400.bvh", 0.01, "-Z", "Y"))
+    bpy.ops.softground.add_character()
+    before = fastest_knee(responders.legs(scene))
+    jobs.run(clean_feet(scene))
+    check_bars(scene, "run at 4 m/s", before)
+
+
 def lock_contact(scene, mode, **options):
     """A foot lock on the contact of the foot that is lowest in a frame, as the panel's button adds it."""
     scene.frame_set(20)

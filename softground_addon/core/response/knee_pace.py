@@ -3,8 +3,8 @@
 A leg that is nearly straight turns its knee by tens of degrees for a centimetre of hip or foot. Where the response
 would ask that of it, the hips and the feet in the air share the least and smoothest correction that keeps the pace: a
 least-squares problem over time, solved by Gauss-Newton steps (Nocedal and Wright 2006, "Numerical Optimization",
-chapters 10 and 17: quadratic penalties that grow, with a line search). Where no knee is too fast and every ankle is
-in reach, nothing is corrected.
+chapters 10 and 17: quadratic penalties that grow, with a line search; a step that helps one knee and harms another is
+taken again with both in view). Where no knee is too fast and every ankle is in reach, nothing is corrected.
 """
 
 from __future__ import annotations
@@ -126,23 +126,28 @@ def relieve(
     per_frame = _FRAME * time_scale / step
     change = np.zeros((len(paced[0].stands), 1 + len(paced)))  # of the hips, then of each foot
 
-    def violated(change: Array, weight: float) -> list[_Equations]:
+    def violated(change: Array, weight: float, ahead: Array | None = None) -> list[_Equations]:
         found = []
         for number, (leg, pace) in enumerate(zip(paced, paces, strict=True), start=1):
-            found += _pace_and_reach(change, number, leg, pace, leg_length, weight * per_frame**2)
+            found += _pace_and_reach(change, number, leg, pace, leg_length, weight * per_frame**2, ahead)
         return found
 
     if any(len(one.wanted) for one in violated(change, 1.0)):
         steps, most = (STEPS + FURTHER_STEPS, FIRM * TOO_FAST) if as_source else (STEPS, TOO_FAST)
         for weight in np.geomspace(TOO_FAST / 100.0, most, steps):
             yield
-            now = violated(change, weight) + _small_and_smooth(change, paced, bends, leg_length)
-            toward = _solution(now, change)
-            for part in _PARTS:
-                there = change + part * toward
-                if _cost(violated(there, weight) + _small_and_smooth(there, paced, bends, leg_length)) < _cost(now):
-                    change = there
-                    break
+            own, asked = _small_and_smooth(change, paced, bends, leg_length), violated(change, weight)
+            cost = _cost(asked + own)
+
+            def is_better(there: Array, weight: float = weight, cost: float = cost) -> bool:
+                return _cost(violated(there, weight) + _small_and_smooth(there, paced, bends, leg_length)) < cost
+
+            toward = _solution(asked + own, change)
+            part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+            if not part:
+                toward = _solution(violated(change, weight, change + toward) + own, change)
+                part = next((part for part in _PARTS if is_better(change + part * toward)), 0.0)
+            change = change + part * toward
     return Relief(change[:, 0], {side: change[:, number] for number, side in enumerate(legs, start=1)})
 
 
@@ -191,18 +196,30 @@ def _allowed_turn(leg: PacedLeg, step: float, time_scale: float) -> Array:
 
 
 def _pace_and_reach(
-    change: Array, number: int, leg: PacedLeg, pace: Array, leg_length: float, weight: float
+    change: Array,
+    number: int,
+    leg: PacedLeg,
+    pace: Array,
+    leg_length: float,
+    weight: float,
+    ahead: Array | None = None,
 ) -> list[_Equations]:
-    """What is asked of a leg where its knee turns too fast or its ankle is out of reach."""
+    """What is asked of a leg where its knee turns too fast or its ankle is out of reach: with a correction, or also
+    with another, `ahead`."""
     count, width = change.shape
-    axis = leg.hip + change[:, :1] * (0.0, 0.0, 1.0) - leg.ankle
-    distance = np.linalg.norm(axis, axis=1)
-    span = distance - change[:, number]
-    by_hips, by_foot = axis[:, 2] / np.maximum(distance, 1e-9), np.where(leg.stands, 0.0, -1.0)
+    axis, span = _hip_to_ankle(change, number, leg)
+    by_hips, by_foot = axis[:, 2] / np.maximum(np.linalg.norm(axis, axis=1), 1e-9), np.where(leg.stands, 0.0, -1.0)
     hips = np.arange(count) * width
     flexion, slope = leg.source.flexion_at(span, NEARLY_STRAIGHT)
     turn = np.diff(flexion)
-    fast = np.flatnonzero(np.abs(turn) > pace)
+    limit, is_far = np.clip(turn, -pace, pace), span > leg.reach
+    is_fast = np.abs(turn) > pace
+    if ahead is not None:
+        span_ahead = _hip_to_ankle(ahead, number, leg)[1]
+        turn_ahead = np.diff(leg.source.flexion_at(span_ahead)[0])
+        limit = np.where(is_fast, limit, np.copysign(pace, turn_ahead))
+        is_fast, is_far = is_fast | (np.abs(turn_ahead) > pace), is_far | (span_ahead > leg.reach)
+    fast, far = np.flatnonzero(is_fast), np.flatnonzero(is_far)
     then = fast + 1
     gradient = [
         -slope[fast] * by_hips[fast],
@@ -210,12 +227,11 @@ def _pace_and_reach(
         slope[then] * by_hips[then],
         slope[then] * by_foot[then],
     ]
-    far = np.flatnonzero(span > leg.reach)
     return [
         _Equations(
             np.stack([hips[fast], hips[fast] + number, hips[then], hips[then] + number]),
             np.stack(gradient),
-            np.sign(turn[fast]) * (pace[fast] - np.abs(turn[fast])),
+            (limit - turn)[fast],
             weight,
         ),
         _Equations(
@@ -225,6 +241,12 @@ def _pace_and_reach(
             OUT_OF_REACH * weight,
         ),
     ]
+
+
+def _hip_to_ankle(change: Array, number: int, leg: PacedLeg) -> tuple[Array, Array]:
+    """From the ankle to the hip (F, 3), and how far the foot is then from the hip (F,) [m]."""
+    axis = leg.hip + change[:, :1] * (0.0, 0.0, 1.0) - leg.ankle
+    return axis, np.linalg.norm(axis, axis=1) - change[:, number]
 
 
 def _small_and_smooth(change: Array, legs: Sequence[PacedLeg], bends: float, leg_length: float) -> list[_Equations]:
