@@ -39,6 +39,8 @@ def lacking_velocity(motion: CharacterMotion, loads: CharacterLoads, terrain: Te
     if treadmill_speed(loads.motion, loads.contacts) == 0.0:
         return None
     touching = at_scene_frames(loads.contacts.touching, loads.motion.frames, motion)
+    if not (touching[1:] & touching[:-1]).any():  # of contacts that last a single frame, only the time grid shows a way
+        return (yield from travel_velocity.slices(loads.motion, loads.contacts.touching, terrain))
     return (yield from travel_velocity.slices(motion, touching, terrain))
 
 

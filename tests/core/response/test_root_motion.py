@@ -1,12 +1,15 @@
 """The travel that resting feet imply, against belts whose speed is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.numerics.intervals import runs
+from softground_addon.core.response import root_motion
 from softground_addon.core.response.root_motion import travel_velocity
 from tests.core.walkers import walk
 
@@ -50,3 +53,14 @@ def test_what_never_touches_has_no_travel():
     motion = walk(steps=2).motion
     nothing = np.zeros((len(motion.frames), len(motion.soles)), bool)
     assert travel_velocity(motion, nothing, FlatTerrain()) == pytest.approx(np.zeros(2))
+
+
+def test_contacts_that_last_a_single_scene_frame_have_the_velocity_that_they_have_between_frames(monkeypatch):
+    fine = on_a_belt(walk(steps=8).motion, BELT)
+    touching = detect_contacts(walk(steps=8).motion, FlatTerrain()).touching
+    longest = max(int((ends - starts).max()) for starts, ends in (runs(side) for side in touching.T))
+    coarse = fine.of(np.arange(len(fine.frames)) % (longest + 1) == 0)
+    loads = SimpleNamespace(motion=fine, contacts=SimpleNamespace(touching=touching))
+    monkeypatch.setattr(root_motion, "treadmill_speed", lambda *_: 1.0)
+    found = root_motion.lacking_velocity(coarse, loads, FlatTerrain())
+    np.testing.assert_allclose(found, -BELT, atol=0.01 * np.linalg.norm(BELT))
