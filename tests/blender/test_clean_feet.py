@@ -11,7 +11,7 @@ import pytest
 from softground_addon.blender import jobs, settings
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking.clean_feet import clean_feet
-from softground_addon.blender.characters.rest_pose import legs_of_feet
+from softground_addon.blender.characters.rest_pose import legs_of_feet, legs_on_shins
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
@@ -320,12 +320,53 @@ def test_feet_that_hang_on_the_root_find_their_legs(scene):
     assert legs_of_feet(armature, [numbers["hips"]]) == {}
 
 
+def without_feet(scene):
+    """The walker as a figure of blocks, whose shins carry the feet: its bones under names that say nothing."""
+    armature = shots.walker(scene)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature.data.edit_bones
+    for bone in [bone for bone in bones if bone.name.split(".")[0] in ("foot", "toe")]:
+        bones.remove(bone)
+    numbers = {bone.name: f"b{number}" for number, bone in enumerate(bones)}
+    for bone in bones:
+        bone.name = numbers[bone.name]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return armature, numbers
+
+
+def test_legs_that_end_in_shins_are_found_by_the_bones_on_which_they_stand(scene):
+    armature, numbers = without_feet(scene)
+    legs = {
+        f"{joint}_{side.lower()}": (numbers[f"{bone}.{side}"], "head")
+        for side in "LR"
+        for joint, bone in (("hip", "thigh"), ("knee", "shin"))
+    }
+    shins, hands = ([numbers[f"{bone}.{side}"] for side in "RL"] for bone in ("shin", "hand"))
+    assert legs_on_shins(armature, shins) == legs
+    assert legs_on_shins(armature, shins[:1]) == legs, "whichever of them stands"
+    assert legs_on_shins(armature, [numbers["hips"], *hands]) == {}
+
+
 RIGS = shots.SHARED / "rigs"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["fox_walk", "rat_walk", "trex_run", "trex_idle", "scifi_walk", "robot_run", "rogue_walk", "bandai_walk"]
+    "name",
+    [
+        "fox_walk",
+        "rat_walk",
+        "trex_run",
+        "trex_idle",
+        "scifi_walk",
+        "robot_run",
+        "rogue_walk",
+        "bandai_walk",
+        "cmu_walk",
+        "boxman_idle",
+        "boxman_run",
+    ],
 )
 def test_rigs_of_other_people_keep_the_bars(scene, tmp_path, name):
     if not RIGS.exists():

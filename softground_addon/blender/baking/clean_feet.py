@@ -22,7 +22,7 @@ from ...core.response.sole_rim import posed_rim
 from ...core.settings import BakeSettings, CharacterSettings
 from .. import settings
 from ..characters.character_setup import characters_of
-from ..characters.rest_pose import legs_of_feet
+from ..characters.rest_pose import legs_of_feet, legs_on_shins
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
@@ -93,11 +93,11 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
 
 
 def _with_legs(character: CharacterSettings) -> CharacterSettings:
-    """A character with the legs of feet that hang elsewhere, where no leg of it is mapped."""
+    """A character with the legs of feet that hang elsewhere or are the ends of shins, where no leg of it is mapped."""
     if not character.armature or any(f"hip_{side}" in character.joints for side in "lr"):
         return character
-    feet = [sole.bone for sole in character.soles if sole.bone]
-    legs = legs_of_feet(settings.found(character.armature), feet)
+    armature, soles = settings.found(character.armature), [one.bone for one in character.soles if one.bone]
+    legs = legs_of_feet(armature, soles) or legs_on_shins(armature, soles)
     return replace(character, joints={**character.joints, **legs})
 
 
@@ -136,11 +136,11 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
     legs = leg_soles(motion)
     if not legs:
         raise InputError(
-            f"'{motion.name}' has no leg with hip, knee and ankle to clean: complete its joints in "
-            "Advanced > Body Bones. A leg needs a bone of its own for the foot."
+            f"'{motion.name}' has no leg with hip, knee and foot to clean: complete its joints in Advanced > Body "
+            "Bones. A leg needs two bones at least, and a foot: a bone of its own, or the end of the shin."
         )
     parts = {control.part for control in rig.controls}
-    if not all(f"foot_{side}" in parts for side in legs):
+    if not all({f"shank_{side}", f"foot_{side}"} & parts for side in legs):
         raise InputError(
             f"The legs of '{motion.name}' cannot take a layer, as their IK depends on another object or other bones "
             "drive them: bake its action to FK bones (Animation > Bake Action) and clean its feet then."

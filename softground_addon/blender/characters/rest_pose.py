@@ -130,6 +130,29 @@ def legs_of_feet(armature: bpy.types.Object, feet: Sequence[str]) -> Joints:
         if (np.diff(skeleton.heads[leg, 2]) < 0).all():
             legs.append(leg)
     pairs = [(one, other) for one, other in combinations(legs, 2) if _are_mirrored(skeleton, one, other)]
+    return _hindmost(skeleton, pairs, ("hip", "knee", "ankle"))
+
+
+def legs_on_shins(armature: bpy.types.Object, soles: Sequence[str]) -> Joints:
+    """Hips and knees of the hindmost legs that stand on the ends of their shins, as of figures made of blocks; empty if
+    there are none.
+
+    Such a leg is two bones below where it parts from its mirror image; where arms are too, legs begin lower.
+    """
+    skeleton = _read_skeleton(armature)
+    chains = [skeleton.chain(bone) for bone in range(len(skeleton.names))]
+    pairs = []
+    for one in (chains[skeleton.names.index(sole)] for sole in soles if sole in skeleton.names):
+        for other in (chain for chain in chains if len(chain) == len(one)):
+            fork = _shared_length(one, other)
+            if len(one) - fork == 2 and _are_mirrored(skeleton, one[fork:], other[fork:]):
+                pairs.append((one[fork:], other[fork:]))
+    level = min((float(skeleton.heads[leg[0], 2]) for leg, _ in pairs), default=0.0) + _LOW * skeleton.height
+    return _hindmost(skeleton, [pair for pair in pairs if skeleton.heads[pair[0][0], 2] <= level], ("hip", "knee"))
+
+
+def _hindmost(skeleton: _Skeleton, pairs: Sequence[_Pair], joints: Sequence[str]) -> Joints:
+    """The joints at which the bones of the hindmost pair of legs begin; empty if there is none."""
     if not pairs:
         return {}
     forward = _forward(skeleton, pairs)
@@ -139,7 +162,7 @@ def legs_of_feet(armature: bpy.types.Object, feet: Sequence[str]) -> Joints:
     return {
         f"{joint}_{side}": (skeleton.names[bone], "head")
         for side, leg in zip("lr", sides, strict=True)
-        for joint, bone in zip(("hip", "knee", "ankle"), leg, strict=True)
+        for joint, bone in zip(joints, leg, strict=True)
     }
 
 

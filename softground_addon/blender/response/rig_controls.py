@@ -66,8 +66,9 @@ def find_controls(armature: bpy.types.Object, evaluated: bpy.types.Object, mappi
     parts = {body: BODY}
     found: list[tuple[str, str, bool]] = [(body, BODY, True)]
     for side in "lr":
-        names = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
-        if all(names) and len(set(names)) == 3:
+        named = [mapping.joints.get(f"{joint}_{side}", ("", ""))[0] for joint in ("hip", "knee", "ankle")]
+        names = named if named[2] else named[:2]
+        if all(names) and len(set(names)) == len(names):
             leg = _leg_controls(rig, side, names, body)
             if leg:
                 found += leg
@@ -118,11 +119,11 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
     """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown.
 
     In game rigs, whose IK was baked, feet often hang on the root: such a bone does not go where the shank takes it.
+    Legs of thigh and shin alone have no bone for the foot.
     """
-    thigh, shin, foot = names
     trunk = set(rig.behind(body))
     solver = next(
-        (ik for bone in (foot, shin) for limb in rig.behind(bone) if limb not in trunk for ik in rig.solvers(limb)),
+        (ik for bone in names[:0:-1] for limb in rig.behind(bone) if limb not in trunk for ik in rig.solvers(limb)),
         None,
     )
     if solver is not None:
@@ -137,13 +138,13 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
             if pole is not None and target not in rig.behind(pole):
                 controls.append((pole, f"knee_{side}", True))
         return controls
-    bones = [rig.origin(bone) for bone in (thigh, shin, foot)]
-    if len(set(bones)) < 3 or not all(rig.is_free(bone) for bone in bones):
+    bones = [rig.origin(bone) for bone in names]
+    if len(set(bones)) < len(bones) or not all(rig.is_free(bone) for bone in bones):
         return []
     above = (body, *bones)
     return [
         (bone, f"{part}_{side}", above[i] not in rig.behind(bone))
-        for i, (bone, part) in enumerate(zip(bones, ("thigh", "shank", "foot"), strict=True))
+        for i, (bone, part) in enumerate(zip(bones, ("thigh", "shank", "foot"), strict=False))
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..record.ground_history import GroundHistory
 from .foot_holds import FootHold, HeldContacts
 from .foot_lock import lock, moved, slides, travelling, underside_on
 from .foot_placement import Placement, place_sole
-from .grounding import HIPS_TIME, Response, hips_go_along, leg_soles, settle, with_sole
+from .grounding import HIPS_TIME, Response, has_ankle, hips_go_along, leg_of, leg_soles, settle, with_sole
 from .sole_rim import posed_rim
 
 Array = NDArray[np.float64]
@@ -24,6 +24,11 @@ Mask = NDArray[np.bool_]
 
 LOCK_PASSES = 2
 """Times that a foot is locked: on relief, other points bear at the place that the lock before has moved it to."""
+ONE_PIECE_PASSES = 16
+"""Most times that feet of one piece with their shanks are put where they belong anew: as the knee bends, they tip, and
+stand on other points."""
+IN_PLACE = 1e-4
+"""Feet that move less than this from one time to the next are where they belong, in leg lengths."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +85,39 @@ def clean(
     stands : (F, S) bool array, optional
         What `standing` tells of these, where it is known.
     """
+    if stands is None:
+        stands = yield from standing.slices(motion, touching, terrain, holds)
+    response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, {})
+    middles = {side: leg_of(motion, side, sole).ankle for side, sole in leg_soles(motion).items()}
+    of_one_piece = [side for side in middles if not has_ankle(motion, side)]
+    for _ in range(ONE_PIECE_PASSES if of_one_piece else 0):
+        so_far = {side: response.legs[side].foot for side in of_one_piece}
+        response = yield from _cleaned.slices(motion, touching, terrain, holds, stands, so_far)
+        moves = [
+            carried(response.legs[side].foot, middles[side]) - carried(so_far[side], middles[side]) for side in so_far
+        ]
+        if np.abs(moves).max() < IN_PLACE * motion.leg_length:
+            break
+    return response
+
+
+@sliced
+def _cleaned(
+    motion: CharacterMotion,
+    touching: Mask,
+    terrain: Terrain,
+    holds: Sequence[FootHold],
+    stands: Mask,
+    so_far: Mapping[str, Array],
+) -> Slices[Response]:
+    """See `clean`; feet start from where they are so far, (F, 4, 4) by side, or from the source."""
     floor, frames = GroundHistory(terrain), motion.frames
     placements: dict[str, tuple[int, Placement]] = {}
     offsets = []
-    if stands is None:
-        stands = yield from standing.slices(motion, touching, terrain, holds)
     for side, number in leg_soles(motion).items():
-        sole, touches = motion.soles[number], touching[:, number]
+        source, touches = motion.soles[number], touching[:, number]
+        start = so_far.get(side, np.eye(4))
+        sole = moved(source, np.broadcast_to(start, (len(frames), 4, 4)))
         contacts = HeldContacts.of(holds, sole.sole.name, frames, touches)
         held = contacts.held(frames, stands[:, number])
         yield
@@ -108,9 +139,12 @@ def clean(
             align=0.0,
             points=posed_rim(lying),
         )
-        carry, lift = contacts.faded(sole, placed.carry @ locked, first.lift + placed.lift)
+        ankle = leg_of(motion, side, number).ankle
+        lift = first.lift + placed.lift
+        if side in so_far:
+            lift = lift + (carried(start, ankle) - ankle)[:, 2]
+        carry, lift = contacts.faded(source, placed.carry @ locked @ start, lift)
         placements[side] = number, Placement(carry, lift, np.zeros_like(lift), placed.room)
-        ankle = motion.joints[f"ankle_{side}"]
         offsets.append((carried(carry, ankle) - ankle)[:, :2])
     yield
     soles = [number for number, _ in placements.values()]

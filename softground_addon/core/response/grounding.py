@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import CharacterMotion, SoleMotion
+from ..numerics.orientation import rotation_vectors
 from ..numerics.plane_fit import smoothed, upper_envelope
 from ..numerics.rigid import carried, displacement, rotation, unit
 from ..numerics.slices import Slices, sliced
@@ -24,6 +25,10 @@ ON_THE_ANKLE = 0.4
 """A sole whose middle stays this near to the ankle is the foot's, in leg lengths."""
 RIGID = 0.05
 """What a contact shape may move against the ankle and still be worn on the foot, in leg lengths."""
+ONE_PIECE = 1e-3
+"""What the sole at the end of a shank may move as seen from the knee, in leg lengths: single precision."""
+SHORT_SHANK = 0.4
+"""Shanks are no shorter than this, over the thigh: a foot under its ankle is about a fifth of what it hangs from."""
 TIPTOES = 0.7
 """A sole of a side that moves with the ankle is the foot's up to here: toes of cartoon feet, as long as their legs, in
 leg lengths."""
@@ -90,10 +95,14 @@ class Response:
 
 
 def leg_soles(motion: CharacterMotion) -> dict[str, int]:
-    """For each side with a whole leg, the sole that it stands on: the lowest of those that go with the foot."""
+    """For each side with a leg, the sole that it stands on: the lowest of those that go with the foot.
+
+    A leg without an ankle, as of figures made of blocks, stands on the end of its shank: foot and shank are of one
+    piece.
+    """
     found: dict[str, int] = {}
     for side in "lr":
-        if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee", "ankle")):
+        if not all(f"{joint}_{side}" in motion.joints for joint in ("hip", "knee")):
             continue
         worn = [index for index, sole in enumerate(motion.soles) if _goes_with(motion, sole, side)]
         if worn:
@@ -101,14 +110,19 @@ def leg_soles(motion: CharacterMotion) -> dict[str, int]:
     return found
 
 
+def has_ankle(motion: CharacterMotion, side: str) -> bool:
+    """Whether the foot of a leg turns against its shank."""
+    return f"ankle_{side}" in motion.joints
+
+
 def leg_of(motion: CharacterMotion, side: str, sole: int) -> Leg:
-    """The joints of one leg."""
-    joints = motion.joints
+    """The joints of one leg; of one without an ankle, the middle of its sole is in the ankle's place."""
+    joints, stands = motion.joints, motion.soles[sole]
     return Leg(
         joints[f"hip_{side}"],
         joints[f"knee_{side}"],
-        joints[f"ankle_{side}"],
-        motion.soles[sole].transforms[:, 0, :3, 0],
+        joints[f"ankle_{side}"] if has_ankle(motion, side) else stands.landmark_positions().mean(axis=1),
+        stands.transforms[:, 0, :3, 0],
     )
 
 
@@ -234,8 +248,19 @@ def settle(
         solved = solve(leg, hip, ankles[side] + relief.feet[side][:, None] * unit(hip - ankles[side]), steady)
         foot = placements[side][1].carry.copy()
         foot[:, :3, 3] += carried(solved.shank, leg.ankle) - ankles[side]
-        responses[side] = LegResponse(solved.thigh, solved.shank, foot)
+        shank = solved.shank
+        if not has_ankle(motion, side):
+            foot = shank = _turned_as(foot, shank, leg)
+        responses[side] = LegResponse(solved.thigh, shank, foot)
     return Response(motion.frames, body, responses, lean)
+
+
+def _turned_as(foot: Array, shank: Array, leg: Leg) -> Array:
+    """A shank (F, 4, 4) turned about its own length as far as a foot (F, 4, 4) that is of one piece with it."""
+    ankle = carried(shank, leg.ankle)
+    axis = unit(carried(shank, leg.knee) - ankle)
+    more = rotation_vectors(foot[:, :3, :3] @ np.swapaxes(shank[:, :3, :3], -1, -2))
+    return displacement(rotation(np.sum(more * axis, axis=-1, keepdims=True) * axis), ankle, ankle) @ shank
 
 
 def heel_rises(
@@ -338,9 +363,22 @@ def _goes_with(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
     """Whether a sole is the foot of a side, or worn on it such as a snowshoe."""
     if sole.sole.side.lower() not in (side, ""):
         return False
+    if not has_ankle(motion, side):
+        return _is_end_of_shank(motion, sole, side)
     distance = np.linalg.norm(sole.landmark_positions().mean(axis=1) - motion.joints[f"ankle_{side}"], axis=-1)
     is_near = float(distance.mean()) <= ON_THE_ANKLE * motion.leg_length
     is_rigid = float(np.ptp(distance)) < RIGID * motion.leg_length
     if not sole.sole.side:
         return is_near and is_rigid
     return is_near or (is_rigid and float(distance.mean()) <= TIPTOES * motion.leg_length)
+
+
+def _is_end_of_shank(motion: CharacterMotion, sole: SoleMotion, side: str) -> bool:
+    """Whether a sole keeps its place as seen from the knee, as far from it as the end of a shank is, and the other knee
+    is not nearer."""
+    middle = sole.landmark_positions().mean(axis=1)
+    knees = [motion.joints[knee] for knee in (f"knee_{side}", "knee_l", "knee_r") if knee in motion.joints]
+    own, *both = (np.linalg.norm(middle - knee, axis=-1) for knee in knees)
+    thigh = float(np.linalg.norm(knees[0] - motion.joints[f"hip_{side}"], axis=-1).mean())
+    is_rigid, is_shank = float(np.ptp(own)) < ONE_PIECE * motion.leg_length, float(own.mean()) > SHORT_SHANK * thigh
+    return is_rigid and is_shank and float(own.mean()) <= min(float(far.mean()) for far in both)

@@ -150,7 +150,7 @@ def _hips(motion: CharacterMotion, touching: Mask, moved: Sequence[_Moved]) -> A
     carries, offsets = _carries(motion, touching, moved), []
     feet = leg_soles(motion)
     for side, sole in feet.items():
-        ankle = motion.joints[f"ankle_{side}"]
+        ankle = leg_of(motion, side, sole).ankle
         offsets.append((carried(carries[sole], ankle) - ankle)[:, :2] if sole in carries else np.zeros((len(ankle), 2)))
     return hips_go_along(motion, list(feet.values()), offsets, touching, HIPS_TIME)
 

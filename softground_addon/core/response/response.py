@@ -18,7 +18,7 @@ from ..record.footprints import Footprint
 from ..record.ground_history import GroundHistory
 from .foot_lock import moved
 from .foot_placement import Placement, lowest_clearance, place_sole, posed_points
-from .grounding import Response, heel_rises, leg_soles, responding, settle, with_sole
+from .grounding import Response, heel_rises, leg_of, leg_soles, responding, settle, with_sole
 from .moved_steps import Followed
 from .performance import BENT, DEPTH_TIME, Performance, body_depth, raised_arms, sinkage_over_time, swing_change
 from .tilt import TiltGains, along_heading, lean, ring_around
@@ -173,7 +173,7 @@ def _acted(
     }
     depth = body_depth(depths, DEPTH_TIME * motion.adult_second)
     feet = {
-        side: swing_change(motion.joints[f"ankle_{side}"], depths[side], touching[:, sole], acting, motion.leg_length)
+        side: swing_change(leg_of(motion, side, sole).ankle, depths[side], touching[:, sole], acting, motion.leg_length)
         for side, (sole, _) in placements.items()
         if acting.knee_lift or acting.hold
     }
