@@ -28,7 +28,7 @@ CELL_SIZE: float | None = None
 """Fitted to the soles."""
 
 FRAMES = 48  # 2 s: four steps
-SPACING = 1.2  # m from ground to ground
+SPACING, LENGTH = 1.2, 5.0  # m from ground to ground, and from row to row
 PICTURE = (640, 480)
 SUN_ELEVATION = radians(22)
 """Low, but the bottom of a print still sees the sun."""
@@ -48,17 +48,18 @@ def build(
     scene: bpy.types.Scene,
     cell_size: float | None = CELL_SIZE,
     options: Options | None = None,
-    presets: Sequence[str] | None = None,
+    presets: Sequence[str] = PRESETS,
+    row: int = 0,
 ) -> FourGrounds:
-    """The same short walk on each preset."""
+    """The same short walk on each preset, in a row of grounds that lies beside others."""
     body = Body()
     first = create_character("Hiker", body, scene.collection, production.COARSENESS)
     write_action(first, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     bakes, walkers = {}, []
-    for number, preset in enumerate(presets or PRESETS):
+    for number, preset in enumerate(presets):
         walker = copy_character(first, f"Hiker {preset}", scene.collection)
-        walker.location.x = number * SPACING
+        walker.location = (number * SPACING, row * LENGTH, 0.0)
         chosen = {"shape_keys": "false", "relief": "CLOSE_UP"} | dict(options or {})
         bakes[preset] = production.bake(scene, [Walker(walker, body.mass)], preset, cell_size, options=chosen)
         bakes[preset].ground.name = f"{preset} Ground"
@@ -120,19 +121,25 @@ def _rim_ahead(preset: str, built: FourGrounds) -> list[Claim]:
 
 def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
     """One print on each ground under a low sun, and all of them on one sheet."""
+    light(bpy.context.scene, close_up_of(built.bakes["Snow"].footprints))
+    pictures = close_ups(built, folder / "four_grounds", PICTURE, samples)
+    return [*pictures, stage.contact_sheet(pictures, 2, folder / "four_grounds.jpg")]
+
+
+def close_ups(built: FourGrounds, path: Path, size: tuple[int, int], samples: int) -> list[Path]:
+    """One print on each ground; the pictures' names begin with a path."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
     for walker in built.walkers:
         stage.hide(walker)
-    light(scene, close_up_of(built.bakes["Snow"].footprints))
     camera = stage.add_camera(scene, "Close-up", lens=50.0)
     pictures = []
     for preset, bake in built.bakes.items():
         aim_at_print(camera, close_up_of(bake.footprints))
-        scene.view_settings.exposure = EXPOSURE[preset]
-        pictures.append(folder / f"four_grounds_{preset.lower().replace(' ', '_')}.png")
-        stage.render(scene, camera, pictures[-1], PICTURE, samples)
-    return [*pictures, stage.contact_sheet(pictures, 2, folder / "four_grounds.jpg")]
+        scene.view_settings.exposure = EXPOSURE.get(preset, 0.0)
+        pictures.append(path.with_name(f"{path.name}_{preset.lower().replace(' ', '_')}.png"))
+        stage.render(scene, camera, pictures[-1], size, samples)
+    return pictures
 
 
 def light(scene: bpy.types.Scene, step: Footprint) -> None:

@@ -15,6 +15,7 @@ SCENES = (
     "walk_forces",
     "craters",
     "four_grounds",
+    "relief",
     "response_hill",
     "crossing",
     "four_legs",

@@ -222,10 +222,16 @@ def _water() -> bpy.types.Material:
     return material
 
 
-def add_grass(spots: Array, heights: Array, ground: terrain.Field, seed: int = 0) -> None:
-    """Tufts of bent blades on a ground, at places (N, 2), so high (N,) [m]."""
+def add_grass(
+    spots: Array,
+    heights: Array,
+    ground: terrain.Field,
+    seed: int = 0,
+    shapes: Sequence[bpy.types.Mesh] | None = None,
+) -> None:
+    """Tufts of bent blades on a ground, at places (N, 2), so high (N,) [m]; green, unless other `shapes` are given."""
     chance = np.random.default_rng(seed)
-    shapes = tufts(chance)
+    shapes = shapes or tufts(chance)
     for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
         tuft = bpy.data.objects.new("Grass", shapes[number % len(shapes)])
         tuft.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.01)

@@ -1,4 +1,4 @@
-"""A run in powder against the sun: the same moment with what the steps throw, and without."""
+"""A run in powder against the sun; also small, with what the steps throw and without."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage
+from sample_scenes import firs, open_air, production, stage
 from sample_scenes.body import Body
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.run import Run, run
@@ -24,8 +24,13 @@ POWDER = {"material.youngs_modulus": "1.5e5"}
 SPEED = 4.2  # m/s
 FRAMES = 76
 START = 9.5  # m along y; the run is toward -y, and toward the camera
-STEP, AFTER = -3, 2.0  # the step that is seen, and frames from its strike to the picture
-PICTURE = (960, 480)
+STEP, AFTER = -3, 3.0  # the step that is seen, and frames from its strike to the picture
+PICTURE = (1920, 1080)
+PAIR = (960, 540)
+FIRS = 170
+BOUNCES = 8
+"""Of light, from one piece of snow to the next."""
+_SKY = (radians(4.5), 2.4)  # see `snow_at_dusk`
 HEIGHT = open_air.rolling(swell=0.2, hills=14.0, seed=11)
 
 
@@ -40,7 +45,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     """A snow field, and a run toward the camera."""
     ground = open_air.add_ground(scene, "Powder", (-7.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.75, -1.55, 0.16), (-0.02, -0.5, 0.14), 40.0, (0.0, -0.5, 0.1), 8.0)
+    open_air.add_camera(scene, (0.56, -1.65, 0.10), (0.04, -0.5, 0.17), 40.0, (0.0, -0.5, 0.1), 6.3)
     motion = run(Body(), Run(speed=SPEED), FRAMES, scene.render.fps)
     chosen = POWDER | dict(options or {})
     return PowderRunner({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion)})
@@ -58,23 +63,31 @@ def claims(built: PowderRunner) -> list[Claim]:
 
 
 def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
-    """From just above the snow, with the sun ahead."""
+    """From just above the snow, against the sun; then small, with debris and without, above each other."""
     scene = bpy.context.scene
     bake = built.bakes[PRESET]
     step = bake.footprints[STEP]
-    scene.frame_set(round(step.start_frame + AFTER))
-    stage.aim(scene.camera, step.position + np.array((0.79, -1.0, 0.16)), step.position + np.array((0.02, 0.05, 0.14)))
-    open_air.add_low_sun(scene, radians(-72), radians(12), (1.0, 0.8, 0.6), 6.0, 0.3)
-    scene.view_settings.exposure = -0.4
+    moment = step.start_frame + AFTER
+    scene.frame_set(int(moment), subframe=moment % 1.0)
+    stage.aim(scene.camera, step.position + np.array((0.60, -1.10, 0.10)), step.position + np.array((0.08, 0.05, 0.17)))
+    open_air.add_low_sun(scene, radians(-58), radians(8), (1.0, 0.74, 0.52), 8.0, 0.13, _SKY)
+    chance = np.random.default_rng(5)
+    spots = np.column_stack([chance.normal(-10.0, 40.0, FIRS), chance.uniform(28.0, 120.0, FIRS)])
+    spots = spots[np.abs(spots[:, 0]) > 5.0]
+    firs.add_firs(spots, chance.uniform(5.0, 12.0, len(spots)), HEIGHT, (0.034, 0.056, 0.040), snow=0.7)
+    scene.cycles.max_bounces = scene.cycles.transmission_bounces = BOUNCES
+    scene.view_settings.exposure = 0.25
+    hero = folder / "powder_runner.jpg"
+    stage.render(scene, scene.camera, hero, PICTURE, samples)
     debris = debris_object.of(bake.ground)
     assert debris is not None
-    pictures = []
+    pair = []
     for name, hidden in (("with", False), ("without", True)):
         debris.hide_render = hidden
-        pictures.append(folder / f"powder_runner_{name}.png")
-        stage.render(scene, scene.camera, pictures[-1], PICTURE, samples)
+        pair.append(folder / f"powder_runner_{name}.png")
+        stage.render(scene, scene.camera, pair[-1], PAIR, samples)
     debris.hide_render = False
-    return [*pictures, stage.contact_sheet(pictures, 1, folder / "powder_runner.jpg")]
+    return [hero, *pair, stage.contact_sheet(pair, 1, folder / "debris.jpg")]
 
 
 if __name__ == "__main__":

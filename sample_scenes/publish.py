@@ -1,6 +1,6 @@
 """`make gallery`: puts what `make scenes` built where the project shows it.
 
-The pictures of docs/gallery.md and docs/figures.md go to docs/images, the .blend files that are small to sample_scenes.
+The pictures of the pages of docs go to docs/images, the .blend files that are small to sample_scenes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sample_scenes.production import OUTPUT
 
 ROOT = Path(__file__).parents[1]
 
-PAGES = ("gallery.md", "figures.md")
+PAGES = ("gallery.md", "figures.md", "ground.md", "after.md")
 
 LARGEST = 2_000_000
 """A .blend file larger than this stays out of the repository [bytes]."""

@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from sample_scenes import production, stage
+from sample_scenes import litter, open_air, production, stage
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
@@ -39,7 +39,14 @@ PACE = {"SNOWFALL": 1.0}
 EARLY = 2.0
 AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
 """Presets that set in when the walk is over; to the others, its steps are of different ages."""
-PICTURE = (360, 240)
+SUN = {"THAW": (30.0, 9.0), "WINDY_DUNES": (40.0, 14.0)}
+"""Where the light goes and how high it comes from [deg]: low, where little is left of prints; `HIGH_SUN` elsewhere."""
+HIGH_SUN = (40.0, 22.0)
+EXPOSURE = {"SNOWFALL": -0.3, "THAW": 0.0, "WINDY_DUNES": -0.5, "DRYING_BEACH": -0.45}
+"""In stops: these grounds are pale."""
+STRAW, ROOTS = 110, -0.26
+"""Tufts of dead grass below the snow that thaws, and how deep they are rooted [m]."""
+PICTURE = (480, 320)
 APART = 30.0
 """Distance of the tracks [m]."""
 PAUSE = 220
@@ -71,8 +78,19 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     weather.set_preset(modifier, preset)
     if preset in AFTERWARDS:
         _set_in(modifier, FRAMES)
+    if preset == "THAW":
+        _add_straw(walker.location.x)
     stage.hide(walker)
     return bake
+
+
+def _add_straw(middle: float) -> None:
+    """Dead grass beside a track along x = `middle` [m], which comes out of the snow as that melts."""
+    chance = np.random.default_rng(4)
+    aside = chance.uniform(0.26, 1.6, STRAW) * chance.choice((-1.0, 1.0), STRAW)
+    spots = np.column_stack([middle + aside, chance.uniform(-4.2, -0.4, STRAW)])
+    blades = litter.blades(open_air.tufts(chance), (0.20, 0.135, 0.07), (0.40, 0.30, 0.17))
+    open_air.add_grass(spots, chance.uniform(0.07, 0.27, STRAW), lambda x, _y: np.full_like(x, ROOTS), shapes=blades)
 
 
 def _set_in(modifier: Any, frame: int) -> None:
@@ -120,14 +138,23 @@ def _hollow(bake: Bake, frame: int) -> float:
 
 def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     """Twelve moments of each."""
-    scene = bpy.context.scene
-    stage.add_sun(scene, radians(40), radians(22))
     made = []
     for preset, bake in built.bakes.items():
+        _light(preset)
         moments = take(bake, preset, PICTURE, folder / f"time_lapse_{preset.lower()}", samples)
         made.append(stage.contact_sheet(moments, COLUMNS, folder / f"time_lapse_{preset.lower()}.jpg"))
         made.append(animate(moments, PAUSE, folder / f"time_lapse_{preset.lower()}.webp"))
     return made
+
+
+def _light(preset: str) -> None:
+    """The sun and the exposure of a preset's pictures, in place of another's."""
+    scene = bpy.context.scene
+    scene.view_settings.exposure = EXPOSURE[preset]
+    for light in [one for one in bpy.data.objects if one.type == "LIGHT"]:
+        bpy.data.objects.remove(light)
+    toward, elevation = SUN.get(preset, HIGH_SUN)
+    stage.add_sun(scene, radians(toward), radians(elevation))
 
 
 def take(bake: Bake, preset: str, size: tuple[int, int], path: Path, samples: int) -> list[Path]:
@@ -140,7 +167,7 @@ def take(bake: Bake, preset: str, size: tuple[int, int], path: Path, samples: in
     for number, frame in enumerate((FRAMES + LASTS * part).round().astype(int)):
         scene.frame_set(int(frame))
         level = _level(bake)
-        stage.aim(camera, (step[0] + 0.75, step[1] + 1.25, level + 0.85), (step[0] - 0.02, step[1] + 0.10, level))
+        stage.aim(camera, (step[0] + 0.62, step[1] + 0.95, level + 0.52), (step[0] - 0.03, step[1] - 0.08, level))
         moments.append(path.with_name(f"{path.name}_{number:02d}.png"))
         stage.render(scene, camera, moments[-1], size, samples)
     return moments

@@ -72,6 +72,8 @@ def test_pictures_of_the_gallery_and_small_scenes_are_published(tmp_path):
     built, project = tmp_path / "built", tmp_path / "project"
     for folder in (built, project / "docs" / "images", project / "sample_scenes"):
         folder.mkdir(parents=True)
+    for page in PAGES:
+        (project / "docs" / page).write_text("")
     (project / "docs" / "gallery.md").write_text("![One](images/craters.jpg) ![Two](images/not_built.png)")
     (project / "docs" / "figures.md").write_text("![Three](images/bicycle.jpg)")
     for name, size in {

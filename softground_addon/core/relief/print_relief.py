@@ -29,8 +29,9 @@ FULL = 0.9
 """How far ground is pressed where water may stand: within the walls."""
 MEAN_TREAD = 0.3
 """Part of a tread that is grooves, about."""
-FLESH = 0.7
-"""Height of what a bare foot leaves standing over the depth of its print."""
+FLESH, ARCH = 0.7, 0.018
+"""Height of what a bare foot leaves standing over the depth of its print, and the most of it [m]: its arch comes down
+into deep prints as well."""
 MOST_VOLUME = 0.2
 """Largest part by which a print is made deeper or shallower to keep its volume."""
 
@@ -240,7 +241,8 @@ class PrintRelief:
         for drag in self._drags:
             ridges = ridges * drag.kept(around)
         if self._tread.is_flesh:
-            return ridges * around.pressed * places.floor * FLESH * min(1.0, self._tread_strength)
+            height = np.minimum(places.floor * FLESH, ARCH * self._size)
+            return ridges * around.pressed * height * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
         lost = tread.kept + (tread.lost - tread.kept) * worn * worn
         within = rise((around.inward - around.length(3.0)) / around.length(6.0))

@@ -7,7 +7,7 @@ from softground_addon.core.composers.relief_plan import asked_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.relief import tread_map
 from softground_addon.core.relief.amounts import Amounts, Tread
-from softground_addon.core.relief.print_relief import relief_of_print
+from softground_addon.core.relief.print_relief import ARCH, FLESH, relief_of_print
 from softground_addon.core.relief.print_shape import shape_of
 from softground_addon.core.relief.tread import LENGTH, PATTERNS, SoleTread, Under, bare, of_map
 from tests.core.relief.test_steps import MATERIALS, steps_on
@@ -92,6 +92,26 @@ def test_a_bare_foot_is_on_its_heel_ball_and_five_toes_and_not_on_its_arch():
     assert stands(0.31, 0.15) > 0.6  # before the big toe
     row = bare(under(np.full(400, 0.385 * LENGTH), np.linspace(0.05, -0.05, 400)))
     assert np.diff((row < 0.5).astype(int)).tolist().count(1) >= 3  # toe by toe
+
+
+@pytest.mark.parametrize("look", ["wet_sand", "snow"])
+def test_an_arch_stands_high_in_a_shallow_print_and_comes_down_into_a_deep_one(look):
+    step, sigma = steps_on(look)[0], MATERIALS[look].blur_sigma
+    shape = shape_of(step, sigma)
+    more = {"blur_sigma": sigma, "finest": 0.0025, "seed": 1}
+    plain = Amounts(10.0, tread=Tread(HEIGHT))
+    grid = np.arange(-0.2, 0.2, 0.0025)
+    x, y = (axis.ravel() + middle for axis, middle in zip(np.meshgrid(grid, grid), step.position, strict=False))
+    inner = shape.at(x, y)[0] > 0.016
+    with_it, without = (relief_of_print(step, plain, tread=tread, **more) for tread in (SoleTread(bare), None))
+    stands = float(np.ptp((with_it.at(x, y).height - without.at(x, y).height)[inner]))
+    size = np.ptp(shape.along) / LENGTH
+    if look == "snow":
+        assert stands == pytest.approx(ARCH * size, rel=0.1)
+        assert stands < 0.8 * FLESH * shape.depth
+    else:
+        assert stands == pytest.approx(FLESH * shape.depth, rel=0.25)
+        assert stands < 0.8 * ARCH * size
 
 
 def ribbed(depth, pitch=0.014, slope=0.1, nodes=192):
