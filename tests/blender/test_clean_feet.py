@@ -12,10 +12,12 @@ from softground_addon.blender import jobs, settings
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking.clean_feet import clean_feet
 from softground_addon.blender.characters.rest_pose import legs_of_feet, legs_on_shins
+from softground_addon.blender.characters.rig_mapping import RigMapping
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
 from softground_addon.blender.response import response_job
+from softground_addon.blender.response.character_keys import controls_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.intervals import runs
@@ -346,6 +348,19 @@ def test_legs_that_end_in_shins_are_found_by_the_bones_on_which_they_stand(scene
     assert legs_on_shins(armature, shins) == legs
     assert legs_on_shins(armature, shins[:1]) == legs, "whichever of them stands"
     assert legs_on_shins(armature, [numbers["hips"], *hands]) == {}
+
+
+def test_legs_that_end_in_shins_are_keyed_by_their_bones_and_not_by_ik_that_cannot_turn_them(scene):
+    armature, numbers = without_feet(scene)
+    legs = legs_on_shins(armature, [numbers["shin.L"], numbers["shin.R"]])
+    mapping = RigMapping({"hips": (numbers["hips"], "head"), **legs})
+    parts = {f"{part}_{side}" for part in ("thigh", "shank") for side in "lr"}
+    assert {control.part for control in controls_of(scene, armature, mapping)} == {"body", *parts}
+    for side in "LR":
+        ik = armature.pose.bones[numbers[f"shin.{side}"]].constraints.new("IK")
+        ik.target, ik.subtarget, ik.chain_count = armature, numbers[f"hand.{side}"], 2
+    bpy.context.view_layer.update()
+    assert {control.part for control in controls_of(scene, armature, mapping)} == {"body"}
 
 
 RIGS = shots.SHARED / "rigs"

@@ -142,8 +142,9 @@ def _check(motion: CharacterMotion, loads: CharacterLoads, rig: ReadRig) -> None
     parts = {control.part for control in rig.controls}
     if not all({f"shank_{side}", f"foot_{side}"} & parts for side in legs):
         raise InputError(
-            f"The legs of '{motion.name}' cannot take a layer, as their IK depends on another object or other bones "
-            "drive them: bake its action to FK bones (Animation > Bake Action) and clean its feet then."
+            f"The legs of '{motion.name}' cannot take a layer, as their IK depends on another object or ends at the "
+            "shin, or other bones drive them: bake its action to FK bones (Animation > Bake Action) and clean its feet "
+            "then."
         )
     if treadmill_speed(loads.motion, loads.contacts) > 0:
         raise InputError(

@@ -119,7 +119,7 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
     """Bone, part and whether it is moved, of one leg: its IK target and pole, or its FK bones. Empty if unknown.
 
     In game rigs, whose IK was baked, feet often hang on the root: such a bone does not go where the shank takes it.
-    Legs of thigh and shin alone have no bone for the foot.
+    Legs of thigh and shin alone have no bone for the foot, and IK does not turn it.
     """
     trunk = set(rig.behind(body))
     solver = next(
@@ -127,7 +127,7 @@ def _leg_controls(rig: _Rig, side: str, names: list[str], body: str) -> list[tup
         None,
     )
     if solver is not None:
-        if solver.target != rig.armature or not solver.subtarget:
+        if solver.target != rig.armature or not solver.subtarget or len(names) < 3:
             return []
         target = rig.control_behind(solver.subtarget, trunk)
         if target is None:
