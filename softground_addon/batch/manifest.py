@@ -34,8 +34,25 @@ from ..core.files.files import identity, read_regular
 LONGEST_NAME = 150
 """Most bytes of a shot's name in UTF-8: file systems take 255, of which the names of partial files need some."""
 
-_NOT_IN_NAMES = '/\\<>:"|?*' if os.name == "nt" else "/\\"
-"""Letters that no part of a file's name may have; on Windows a colon would even hide the file within another."""
+_WINDOWS = os.name == "nt"
+
+_NOT_IN_NAMES = "/\\"
+"""Letters that no part of a file's name may have."""
+
+_NOT_ON_WINDOWS = re.compile(
+    r"""
+    .* [\x00-\x1f<>:"|?*] .*          # a colon would even hide the file within another
+    | .* [.\ ]                        # left out of the name: 'a.' would be the same file as 'a'
+    | (con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) \ * (\..*)?  # devices, whatever follows the dot
+    """,
+    re.VERBOSE | re.IGNORECASE | re.DOTALL,
+)
+"""Names that Windows takes for another file's or a device's.
+
+References
+----------
+Microsoft, "Naming Files, Paths, and Namespaces".
+"""
 
 LARGEST = 2**24
 """Size of a manifest that is read [bytes]: a hundred thousand shots."""
@@ -398,6 +415,11 @@ def _name(value: object, where: str) -> str:
         raise InputError(
             f"{where}: the name {name!r} cannot be part of a file's name: give a 'name' without any of {_NOT_IN_NAMES} "
             f"and of at most {LONGEST_NAME} bytes."
+        )
+    if _WINDOWS and _NOT_ON_WINDOWS.fullmatch(name):
+        raise InputError(
+            f"{where}: the name {name!r} cannot be part of a file's name on Windows: give a 'name' without any of "
+            '<>:"|?*, that does not end with a dot or a space and is no device such as CON.'
         )
     return name
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shlex
 import subprocess
 import tempfile
 import time
@@ -23,6 +22,7 @@ from ..core.errors import InputError
 from ..core.files import files
 from . import receipts
 from .manifest import BatchShot
+from .shell import command_line
 
 try:
     import fcntl
@@ -247,7 +247,7 @@ class _Batch:
                 [*shot.options, "--progress=json", f"--receipt={place.receipt(shot)}", f"--parent={os.getpid()}"],
             )
             log = place.log(shot).open("ab" if attempt > 1 else "wb", buffering=0)
-            log.write(f"$ {shlex.join(command)}\n".encode())
+            log.write(f"$ {command_line(command, windows=os.name == 'nt')}\n".encode())
             output = (self._printed / shot.name).open("wb")  # no pipe: it would have to be emptied all the time
             printed = (self._printed / shot.name).open("rb")
             inherited = {} if fcntl is None else {"pass_fds": (lock.fileno(),)}  # who outlives us keeps the lock
@@ -261,10 +261,11 @@ class _Batch:
                 env={ALGEBRA_THREADS: "1", **os.environ},
                 **inherited,  # type: ignore[call-overload]
             )
-        except OSError as error:
+        except (OSError, InputError) as error:
             if lock:
                 lock.close()
-            self._end(Outcome(shot, "refused", attempt - 1, spent, message=f"{error.filename}: {error.strerror}"))
+            message = f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)
+            self._end(Outcome(shot, "refused", attempt - 1, spent, message=message))
             return
         output.close()
         self._running[shot.name] = _Worker(shot, process, attempt, spent, lock, printed, log, started)

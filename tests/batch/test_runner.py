@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 
 from softground_addon.batch.manifest import BatchShot
 from softground_addon.batch.runner import Outcome, Step, Workplace, run
+from softground_addon.batch.shell import command_line
 from softground_addon.core.errors import InputError
 from softground_addon.core.files import files
 
@@ -280,6 +282,17 @@ def test_on_windows_a_shot_is_locked_too(batch, monkeypatch):
     (outcome,) = batch.run(batch.shot("b"))
     assert outcome.status == "refused"
     assert "another process is baking this shot" in outcome.message
+
+
+@pytest.mark.parametrize("windows", [False, True])
+def test_the_log_begins_with_the_command_line_as_the_systems_own_shell_takes_it(batch, monkeypatch, windows):
+    monkeypatch.setattr(
+        "softground_addon.batch.runner.command_line", lambda words, **_: command_line(words, windows=windows)
+    )
+    shot = batch.shot("it's a bog")
+    batch.run(shot)
+    first = (batch.folder / "state" / "it's a bog.log").read_text().splitlines()[0]
+    assert (f'"{shot.file}"' if windows else shlex.quote(str(shot.file))) in first
 
 
 def test_what_a_killed_worker_left_behind_is_removed(batch):
