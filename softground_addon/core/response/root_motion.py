@@ -74,7 +74,7 @@ def travel_velocity(motion: CharacterMotion, touching: Mask, terrain: Terrain) -
         return np.zeros(2)
     belt = np.median(move, axis=0)
     off = np.linalg.norm(move - belt, axis=1) / max(AGREES * float(np.linalg.norm(belt)), 1e-12)
-    agrees = np.exp(-(off**2) / 2)
+    agrees = np.exp((off.min() ** 2 - off**2) / 2)  # the nearest counts, however far it is
     total, resting, count = (
         np.zeros((len(motion.frames), 2)),
         np.zeros(len(motion.frames)),

@@ -49,6 +49,18 @@ def test_feet_that_slip_while_they_land_and_leave_are_outvoted():
     np.testing.assert_allclose(travel_velocity(moving, touching, FlatTerrain()), -BELT, rtol=1e-6, atol=1e-6)
 
 
+def test_where_no_two_frames_agree_as_in_a_turn_on_the_spot_the_nearest_to_the_median_tell():
+    motion = walk(steps=1).motion
+    still = replace(
+        motion, soles=tuple(replace(s, transforms=np.repeat(s.transforms[:1], 3, axis=0)) for s in motion.soles[:1])
+    )
+    still = replace(still, frames=np.arange(3.0) + 1, joints={})
+    speeds = np.array([0.5, 3.0])
+    still.soles[0].transforms[:, :, 0, 3] -= np.concatenate([[0.0], np.cumsum(speeds * still.time_step)])[:, None]
+    found = travel_velocity(still, np.ones((3, 1), bool), FlatTerrain())
+    np.testing.assert_allclose(found, (1.75, 0.0), atol=1e-6)
+
+
 def test_what_never_touches_has_no_travel():
     motion = walk(steps=2).motion
     nothing = np.zeros((len(motion.frames), len(motion.soles)), bool)
