@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from softground_addon.blender import compat
-from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_modifier
+from softground_addon.blender.ground import baked_ground, ground_mesh, weather, weather_keys, weather_modifier
 from softground_addon.blender.ground import weather_nodes as nodes
 from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
@@ -262,6 +262,25 @@ def test_a_changed_and_a_removed_key_count_at_once(opened):
     assert positions(scene, 300)[:, 2].max() < 0.1 * steady[:, 2].max()
 
 
+def test_a_group_that_has_its_nodes_itself_as_in_earlier_files_follows_keys_and_can_be_renewed(opened):
+    scene = opened()
+    bpy.ops.softground.add_weather(preset="SNOWFALL")
+    steady = positions(scene, 300)
+    modifier = weather_modifier.modifier_of(carrier(scene))
+    held = modifier.node_group
+    earlier = nodes.within(held)
+    earlier[nodes.MARK], earlier[weather_keys.LAST] = True, held[weather_keys.LAST]
+    modifier.node_group = earlier
+    set_to(scene, **weather.PRESETS["SNOWFALL"][1])
+    assert positions(scene, 300).tobytes() == steady.tobytes()
+    key(scene, "Snowfall", {1: 0.0, 150: 0.0, 151: 3.0}, "CONSTANT")
+    late = positions(scene, 300)
+    assert 0.4 < late[:, 2].max() / steady[:, 2].max() < 0.6
+    bpy.ops.softground.add_weather()
+    assert nodes.within(earlier) is not None
+    assert positions(scene, 300).tobytes() == late.tobytes()
+
+
 @pytest.mark.slow
 def test_keys_stay_through_a_bake(opened):
     scene = opened()
@@ -284,7 +303,7 @@ def test_at_nothing_each_frame_is_the_bakes_bit_for_bit(opened):
     assert {name: now[name] for name in kept} == kept
     bpy.ops.softground.remove_weather()
     assert contents(carrier(scene).data) == kept
-    assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
+    assert not [group for group in bpy.data.node_groups if group.name.startswith(nodes.GROUP)]
 
 
 def test_sliders_change_nothing_that_is_stored(opened):
@@ -485,9 +504,12 @@ def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon, change):
     about = {"up": (0.0, 0.0, 1.0), "span": span_of(1.0, 60.0, 24.0)}
     older, fresh = nodes.new(), nodes.new()
     nodes.build(older, matter=matter, soaking=(0.3, 0.9), **about)
-    change(older)
+    inner = nodes.within(older)
+    change(inner)
     nodes.build(older, matter=others, soaking=(0.2, 0.8), **about)
     nodes.build(fresh, matter=others, soaking=(0.2, 0.8), **about)
+    assert nodes.within(older) == inner
+    assert content_of(inner) == content_of(nodes.within(fresh))
     assert content_of(older) == content_of(fresh)
 
 
@@ -506,7 +528,7 @@ def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened
     bpy.ops.softground.clear_bake()
     assert contents(scene.softground.ground.data) == clear
     assert not scene.softground.ground.modifiers
-    assert not [group for group in bpy.data.node_groups if nodes.is_weather(group)]
+    assert not [group for group in bpy.data.node_groups if group.name.startswith(nodes.GROUP)]
 
 
 @pytest.mark.parametrize("felt", [False, True])

@@ -1,10 +1,9 @@
-"""What weather has done from any moment to now, as nodes: sums over parts of the time, on points that begin one each.
+"""What weather has done from any moment to now, as nodes: sums over time, on points of their own that are its rows.
 
 Rates are those of each part; within it every integral but that over the settling of its own layer is exact. A slider's
-value is that of the group's input, or of a curve if it is keyed, for each part. What has happened since each of the
-moments at which vertices were last stepped on is then between two of these sums, on points of their own: a thousand,
-whatever the ground has of vertices. What is read more than once is kept with the points, as nodes that ask for it would
-each have it worked out again.
+value is that of the group's input, or of a curve if it is keyed, for each part. Rows begin with the moments at which
+vertices were last stepped on: a thousand, whatever the ground has of vertices. What is read more than once is kept with
+them, as nodes that ask for it would each have it worked out again.
 """
 
 from __future__ import annotations
@@ -27,7 +26,9 @@ FIRST, STEP = "First Frame", "Frames in a Part"
 KEYED = "Keyed Sliders"
 """Node with how many sliders are keyed: 0 is none."""
 GAUSS = ((0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18))
-"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a part."""
+"""Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a row."""
+ROWS = MOMENTS + PARTS + 3
+"""Of the table: one of what has not begun, the moments, as many parts behind them, and now."""
 ENDLESS = 1e9
 LOWEST = "lowest"
 KEPT = {
@@ -35,7 +36,7 @@ KEPT = {
     "loss": ("filled", "thawed", "pale"),
     "hollows": ("low", "high", "seeped"),
 }
-"""What is kept of any moment, in vectors of these names: as `core.after.weather_course.Course` has it, but *filled* is
+"""What is kept of any row, in vectors of these names: as `core.after.weather_course.Course` has it, but *filled* is
 less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
 
 
@@ -49,35 +50,13 @@ def switch_of(name: str) -> str:
     return f"{name} Is Keyed"
 
 
-class PointTable:
-    """Points that keep numbers, up to three in a vector."""
-
-    def __init__(self, graph: NodeGraph, count: int) -> None:
-        points = graph.node("GeometryNodePoints")
-        graph.link(count, points.inputs["Count"])
-        self._graph, self.geometry = graph, points.outputs[0]
-
-    def keep(self, name: str, *numbers: Number) -> list[Number]:
-        """The same numbers as they are kept."""
-        pack = self._graph.combined(*(number.socket for number in numbers))
-        self.geometry = self.with_vector(name, pack)
-        return self._graph.parts(self._graph.attribute(name, "FLOAT_VECTOR"))[: len(numbers)]
-
-    def with_vector(self, name: str, vector: Any) -> Any:
-        """The points with a vector."""
-        return self._graph.store(self.geometry, name, vector, True, "FLOAT_VECTOR")
-
-    def at(self, name: str, index: Any) -> Any:
-        """A vector that is kept with one of the points."""
-        return self._graph.at_index(self.geometry, self._graph.attribute(name, "FLOAT_VECTOR"), index)
-
-
 class CourseNodes:
-    """What has happened since the parts began, and since the moments of vertices.
+    """What has happened since the first frame, and since the moments of vertices.
 
     What only a slider that is at zero would ask for is not worked out, unless any is keyed. `acts` tells by the names
     of sliders what may be above 0: warmth for *Temperature*. `around` has by the names of `KEPT` what has happened
-    since the first frame, `aged` the same as fields of `moments`; the first of these is of what has not begun.
+    since the first frame, `aged` the same as fields of `rows`; the first of these is of what has not begun, where
+    `begun` is 0 and not 1.
 
     Parameters
     ----------
@@ -104,52 +83,50 @@ class CourseNodes:
         falling = [self.acts[name] for name in SUMMED if name != "Time Scale"]
         self.is_any = sum(falling[1:], falling[0]) * self.acts["Time Scale"]
         self.is_any = self.is_any + self.acts["Water Table"] + self.acts["Halo"]
-        self._kept = [name for name in KEPT if matter.soaking or name != "hollows"]
-        self._parts, self.moments = PointTable(graph, PARTS + 2), PointTable(graph, MOMENTS + 2)
+        self._melting = (
+            self.acts["Temperature"] if matter.snow_depth else self.acts["Temperature"] * self.acts["Snowfall"]
+        )
+
+        points = graph.node("GeometryNodePoints")
+        graph.link(ROWS, points.inputs["Count"])
+        self.rows = points.outputs[0]
         self._index = graph.number(graph.node("GeometryNodeInputIndex").outputs["Index"])
-        self._through = (self._index * (1.0 / PARTS)).at_most(1.0)
-        self._number = (self.frame - self._first) / self._step
-
-        past = (self._number - self._index).at_least(0.0).at_most(self._index.above(PARTS - 0.5) * ENDLESS + 1.0)
-        past = past * (1.0 - self._index.above(PARTS + 0.5))
+        self.begun = self._index.above(0.5)
+        past, part = self._past(span)
+        self._through = (part * (1.0 / PARTS)).at_most(1.0)
         rates = {name: self._rate(name, said[name]) for name in SUMMED}
-        (self._time,) = self._parts.keep("time", past * self._step * rates["Time Scale"] * (1.0 / span.frame_rate))
-        self._sum(rates)
-        self.around = self._named(lambda name: self._parts.at(name, 0))
-        self.aged = self._since_moments(span)
-
-    @property
-    def begun(self) -> Number:
-        """0 of the first of the moments, 1 of all others."""
-        return self._index.above(0.5)
+        self._density = w.new_snow_density(rates["Temperature"]).where(self.acts["Snowfall"])
+        kept = self._sum(*self._amounts(rates, past * rates["Time Scale"] * (1.0 / span.frame_rate)))
+        self._vectors = dict(zip(KEPT, kept, strict=False))
+        self.aged = self._named(lambda vector: vector)
+        self.around = self._named(lambda vector: graph.at_index(self.rows, vector, 1))
 
     def between(self, left: Number) -> Number:
         """How far a share of soaking is through those for which there are sums."""
         low, high = self._soaking
         return ((left - low) * (1.0 / max(high - low, LEAST_RANGE))).within_one()
 
-    def _since_moments(self, span: Span) -> dict[str, Number]:
-        """What has happened since the moments; what has not begun is as if it began now."""
-        graph = self.graph
-        graph.next_row()
-        frame = (self._index - 1.0) * ((span.last - span.first) / MOMENTS) + span.first
-        frame = (frame + (1.0 - self.begun) * ENDLESS).at_most(self.frame)
-        number = ((frame - self._first) / self._step).at_least(0.0)
-        part = number.floor().at_most(PARTS)
-        through = ((number - part) / (self._number - part).at_most(1.0)).at_most(1.0)
-        (part, through) = self.moments.keep("part", part, through)
-        for name in self._kept:
-            begin, end = (self._parts.at(name, one.socket) for one in (part, part + 1.0))
-            more = graph.scaled(graph.vector("SUBTRACT", end, begin), through.socket)
-            self.moments.geometry = self.moments.with_vector(name, graph.vector("ADD", begin, more))
-        return self._named(lambda name: graph.attribute(name, "FLOAT_VECTOR"))
+    def hollows(self, index: Any) -> list[Number]:
+        """Excess at the low and the high share of soaking, and share that has seeped in, of a row."""
+        return self.graph.parts(self.graph.at_index(self.rows, self._vectors["hollows"], index))
 
-    def _named(self, vector_of: Callable[[str], Any]) -> dict[str, Number]:
-        """The numbers of `KEPT` in vectors of these names."""
-        named: dict[str, Number] = {}
-        for name in self._kept:
-            named |= zip(KEPT[name], self.graph.parts(vector_of(name)), strict=True)
-        return named
+    def _past(self, span: Span) -> tuple[Number, Number]:
+        """How many frames of each row are over, and number of the part in which it begins.
+
+        The first has not begun. Then they begin with the moments, and with the parts behind those; the last but one
+        never ends, and the last is now.
+        """
+        moment, behind = span.step * PARTS / MOMENTS, span.step * PARTS
+        shift = (self.graph.number(behind) / self._step).floor() - MOMENTS
+        now = (self.frame - self._first).at_least(0.0)
+
+        def begin(row: Number) -> Number:
+            within = row.at_most(MOMENTS) * moment
+            within = within.at_least((row + shift) * self._step).at_least(0.0)
+            return within + row.above(ROWS - 2.5) * ENDLESS
+
+        first = begin(self._index - 1.0)
+        return begin(self._index).at_most(now) - first.at_most(now), (first / self._step).floor()
 
     def _value(self, name: str, value: float) -> Number:
         node = self.graph.node("ShaderNodeValue", name=name, label=name)
@@ -168,99 +145,119 @@ class CourseNodes:
             chosen.node.name = chosen.node.label = switch_of(name)
         return graph.number(chosen)
 
-    def _sum(self, rates: Mapping[str, Number]) -> None:
-        """Keep with the parts what has happened from the beginning of each to now."""
-        graph, matter, parts, time = self.graph, self._matter, self._parts, self._time
+    def _amounts(self, rates: Mapping[str, Number], time: Number) -> list[Any]:
+        """What each row has of what falls and goes, as vectors that the rows keep.
+
+        The balance of snow, its settling, and what dries; rain, water of snow that melts, and time of rain; time, and
+        by how much it spreads and fills prints.
+        """
+        graph, matter = self.graph, self._matter
         graph.next_row()
         snow, warmth, wind, rain, drying = (self.acts[name] for name in SUMMED[:5])
-        melting = warmth if matter.snow_depth else warmth * snow
-
-        temperature = rates["Temperature"]
-        density = w.new_snow_density(temperature)
-        settling = (w.settling_rate(temperature) * time).where(snow)
-        fallen = (rates["Snowfall"] * density * (CENTIMETRES_AN_HOUR / w.WATER_DENSITY) * time).where(snow)
-        melted = (w.melting_rate(temperature) * time).where(warmth)
-        rained = (rates["Rain"] * MILLIMETRES_AN_HOUR * time).where(rain)
-        dried = (rates["Drying"] * MILLIMETRES_AN_HOUR * time).where(drying)
+        fallen = (rates["Snowfall"] * self._density * (CENTIMETRES_AN_HOUR / w.WATER_DENSITY)).where(snow)
+        melted = w.melting_rate(rates["Temperature"]).where(warmth)
+        settling = w.settling_rate(rates["Temperature"]).where(snow)
+        rained = (rates["Rain"] * MILLIMETRES_AN_HOUR).where(rain)
+        dried = (rates["Drying"] * MILLIMETRES_AN_HOUR).where(drying)
         drier = dried - rained - melted if matter.snow_depth else dried - rained
-        flux = (w.blown_flux(rates["Wind"], matter.blown) * time).where(wind) if matter.blown else graph.number(0.0)
-        gone = (melted if matter.snow_depth else fallen).where(melting)
-        gained, settling, drier = parts.keep("balance", fallen - melted, settling, drier)
-        density, rained, gone = parts.keep("fall", density.where(snow), rained, gone)
-
-        sums = self._sums(gained, settling, drier)
-        lowest, following = self._lowest(sums, warmth * snow + drying * (rain + warmth))
-        reserve, *_ = graph.parts(sums.outputs["Trailing"])
-        reserve_now, settled_now, water_now = graph.parts(sums.outputs["Total"])
-        since = settled_now - graph.parts(sums.outputs["Leading"])[1]
-
-        graph.next_row()
-        depth = self._depth((following[0] - lowest[0]) * w.WATER_DENSITY, density, settling, since).where(snow)
-        spread, filling = rained * w.RAIN_ROUNDING, graph.number(0.0)
+        gone = (melted if matter.snow_depth else fallen).where(self._melting)
+        spread, filling = rained * w.RAIN_ROUNDING, 0.0
         if matter.blown:
+            flux = w.blown_flux(rates["Wind"], matter.blown).where(wind)
             spread = spread + w.spread_rate(flux, matter.blown)
             filling = w.fill_rate(flux, matter.section, matter.blown)
-        cover, rounding, filled = self._to_now(*parts.keep("layers", depth, spread, filling))
-        thawed = ((reserve - lowest[0]) * (w.WATER_DENSITY / w.SNOW.bulk_density)).where(warmth)
-        wet = w.wetness(water_now - lowest[2]).where(drying, otherwise=1.0)
+        each = ((fallen - melted, settling, drier), (rained, gone, rates["Rain"].above(0.0)), (1.0, spread, filling))
+        return self._keep(*(graph.number(graph.scaled(self._pack(*three), time.socket)) for three in each))
+
+    def _sum(self, balance: Any, falling: Any, acting: Any) -> list[Any]:
+        """What has happened from the beginning of each row to now, as vectors that the rows keep: see `_amounts`."""
+        graph, matter = self.graph, self._matter
+        snow, warmth, rain, drying = (self.acts[name] for name in ("Snowfall", "Temperature", "Rain", "Drying"))
+        _, settling, _ = graph.parts(balance)
+        rained, *_ = graph.parts(falling)
+        time, spread, filling = graph.parts(acting)
+
+        sums, fallen = (graph.accumulated(one, "FLOAT_VECTOR") for one in (balance, falling))
+        lowest, following = self._lowest(sums, warmth * snow + drying * (rain + warmth))
+        reserve_now, _, water_now = graph.parts(sums.outputs["Total"])
+        reserve, *_ = graph.parts(sums.outputs["Trailing"])
+        _, since, _ = graph.parts(graph.vector("SUBTRACT", sums.outputs["Total"], sums.outputs["Leading"]))
+        lasting, *_ = graph.parts(graph.vector("SUBTRACT", following, lowest))
+        least, _, least_water = graph.parts(lowest)
+
+        graph.next_row()
+        depth = self._depth(lasting * w.WATER_DENSITY, settling, since).where(snow)
+        cover, rounding, filled = self._to_now(depth, spread, filling)
+        thawed = ((reserve - least) * (w.WATER_DENSITY / w.SNOW.bulk_density) * self.begun).where(warmth)
+        wet = w.wetness((water_now - least_water) * self.begun).where(drying, otherwise=1.0)
         if not matter.wet:
-            got, lost, _ = graph.parts(self._sums(rained, gone).outputs["Total"])
-            lying = 0.0 if matter.snow_depth else (reserve_now - lowest[0]).where(melting)
-            wet = (wet * w.wetted(got + lost - lying)).where(rain, melting)
+            got, lost, _ = graph.parts(fallen.outputs["Total"])
+            lying = 0.0 if matter.snow_depth else (reserve_now - least).where(self._melting)
+            wet = (wet * w.wetted(got + lost - lying)).where(rain, self._melting)
 
         graph.next_row()
         under = cover + thawed if matter.snow_depth else cover
-        parts.keep("look", cover, under * w.DRAPE + rounding, wet)
-        pale = none = graph.number(0.0)
-        if soaking := matter.soaking:
-            low, high, age = self._hollows(soaking, rained, rates["Rain"])
-            parts.keep("hollows", low, high, w.seeped(age, soaking).where(self.acts["Water Table"]))
-            pale = w.halo(age).where(self.acts["Halo"]) if matter.pales else none
-        parts.keep("loss", (filled * -1.0).exp() - 1.0 if matter.blown else none, thawed, pale)
+        look = (cover, under * w.DRAPE + rounding, wet)
+        loss = ((filled * -1.0).exp() - 1.0 if matter.blown else 0.0, thawed)
+        if not (soaking := matter.soaking):
+            return self._keep(*(graph.number(self._pack(*three)) for three in (look, loss)))
+        low, high, age = self._hollows(soaking, rained, fallen, time)
+        pale = w.halo(age).where(self.acts["Halo"]) if matter.pales else 0.0
+        hollows = (low, high, w.seeped(age, soaking).where(self.acts["Water Table"]))
+        return self._keep(*(graph.number(self._pack(*three)) for three in (look, (*loss, pale), hollows)))
 
-    def _depth(self, left: Number, density: Number, settling: Number, since: Number) -> Number:
-        """Depth of the snow of each part [kg/m²] that settles within it, and from its end on."""
+    def _named(self, of_rows: Callable[[Any], Any]) -> dict[str, Number]:
+        """The numbers of `KEPT`, from what is made of the vectors of these names."""
+        named: dict[str, Number] = {}
+        for name, vector in self._vectors.items():
+            named |= zip(KEPT[name], self.graph.parts(of_rows(vector)), strict=True)
+        return named
+
+    def _pack(self, *numbers: Number | float) -> Any:
+        """A vector of up to three numbers."""
+        return self.graph.combined(*(one.socket if isinstance(one, Number) else one for one in numbers))
+
+    def _keep(self, *vectors: Number) -> list[Any]:
+        """Vectors as the rows keep them, all worked out together."""
+        self.rows, kept = self.graph.captured(self.rows, *vectors, kind="VECTOR")
+        return [vector.socket for vector in kept]
+
+    def _depth(self, left: Number, settling: Number, since: Number) -> Number:
+        """Depth of the snow of each row [kg/m²] that settles within it, and from its end on."""
         first, second, third = (
-            left * weight / w.settled_density(since + settling * (1.0 - at), density) for at, weight in GAUSS
+            left * weight / w.settled_density(since + settling * (1.0 - at), self._density) for at, weight in GAUSS
         )
         return first + second + third
 
-    def _hollows(self, soaking: w.Soaking, rained: Number, rain: Number) -> list[Number]:
-        """Rain that has not soaked in at either share, and time, from each moment to now."""
-        graph = self.graph
-        sums = graph.accumulated((self._time * rain.above(0.0)).socket)
-        begin, end = (w.soaked(graph.number(sums.outputs[name]), soaking) for name in ("Trailing", "Leading"))
+    def _hollows(self, soaking: w.Soaking, rained: Number, falling: Any, time: Number) -> list[Number]:
+        """Rain that has not soaked in at either share, and time, from each row on to now."""
+        begin, end = (w.soaked(self.graph.parts(falling.outputs[name])[2], soaking) for name in ("Trailing", "Leading"))
         low, high = ((rained - (end - begin) * share).at_least(0.0) for share in self._soaking)
         acting = self.acts["Rain"]
-        return self._to_now(*self._parts.keep("soaking", low.where(acting), high.where(acting), self._time))
+        return self._to_now(low.where(acting), high.where(acting), time)
 
-    def _lowest(self, sums: Any, turns: Number) -> tuple[list[Number], list[Number]]:
-        """The least of each sum from a moment on, and from the next one on; 0 is `turns` if none ever turns back."""
-        graph, parts = self.graph, self._parts
-        now = graph.vector("MINIMUM", sums.outputs["Trailing"], sums.outputs["Total"])
-        at_an_end = parts.with_vector(LOWEST, now)
-        first = parts.with_vector(LOWEST, sums.outputs["Trailing"])
+    def _lowest(self, sums: Any, turns: Number) -> list[Any]:
+        """The least of each sum from a row on, and from the next one on; 0 is `turns` if none ever turns back."""
+        graph, now = self.graph, sums.outputs["Total"]
+        at_an_end = [graph.vector("MINIMUM", sums.outputs[name], now) for name in ("Trailing", "Leading")]
+        kept = graph.attribute(LOWEST, "FLOAT_VECTOR")
 
-        def doubled(lowest: Any, count: Number) -> tuple[Any, Number]:
-            """From the least of so many points from each on to that of twice as many."""
-            parts.geometry = lowest
-            return parts.with_vector(LOWEST, graph.vector("MINIMUM", *self._ahead(count))), count + count
+        def ahead(rows: Any, count: Number) -> Any:
+            return graph.at_index(rows, kept, (self._index + count).socket)
 
-        turning = graph.repeated((PARTS + 1).bit_length(), first, 1.0, doubled)
-        parts.geometry = graph.choose("GEOMETRY", turns.socket, at_an_end, turning)
-        here, there = self._ahead(1.0)
-        return graph.parts(here), graph.parts(there)
+        def doubled(rows: Any, count: Number) -> tuple[Any, Number]:
+            """From the least of so many rows from each on to that of twice as many."""
+            lower = graph.vector("MINIMUM", kept, ahead(rows, count))
+            return graph.store(rows, LOWEST, lower, True, "FLOAT_VECTOR"), count + count
 
-    def _ahead(self, count: Number | float) -> tuple[Any, Any]:
-        """What is kept as the lowest at each point, and so many further on."""
-        further = (self._index + count).socket
-        return self.graph.attribute(LOWEST, "FLOAT_VECTOR"), self._parts.at(LOWEST, further)
-
-    def _sums(self, *parts: Number) -> Any:
-        """A node with sums of three numbers; see `NodeGraph.accumulated`."""
-        return self.graph.accumulated(self.graph.combined(*(part.socket for part in parts)), "FLOAT_VECTOR")
+        first = graph.store(self.rows, LOWEST, at_an_end[0], True, "FLOAT_VECTOR")
+        turning = graph.repeated(ROWS.bit_length(), first, 1.0, doubled)
+        self.rows = graph.choose("GEOMETRY", turns.socket, self.rows, turning)
+        turned = [kept, ahead(turning, graph.number(1.0))]
+        return [graph.choose("VECTOR", turns.socket, *two) for two in zip(at_an_end, turned, strict=True)]
 
     def _to_now(self, *parts: Number) -> list[Number]:
-        """Sums of three numbers from each moment on."""
-        outputs = self._sums(*parts).outputs
-        return self.graph.parts(self.graph.vector("SUBTRACT", outputs["Total"], outputs["Trailing"]))
+        """Sums of three numbers from each row on, nothing of what has not begun."""
+        graph, sums = self.graph, self.graph.accumulated(self._pack(*parts), "FLOAT_VECTOR").outputs
+        since = graph.vector("SUBTRACT", sums["Total"], sums["Trailing"])
+        return graph.parts(graph.scaled(since, self.begun.socket))

@@ -23,6 +23,7 @@ from .weather_course_nodes import (
     keys_of,
     switch_of,
 )
+from .weather_nodes import nodes_of
 
 ON_PRINTS = {
     "Snowfall": CENTIMETRES_AN_HOUR,
@@ -43,7 +44,7 @@ def follow(display_mesh: bpy.types.Object) -> None:
     if tree is None or tree.library or LAST not in tree.keys():  # noqa: SIM118  (an ID is no mapping)
         return
     keyed = _keyed(modifier)
-    nodes = tree.nodes
+    nodes = nodes_of(tree)
     first = nodes[FIRST].outputs[0].default_value
     span = span_of(first, max([tree[LAST], *(curve.range()[1] for curve in keyed.values())]))
     changed = _put(nodes[STEP].outputs[0], span.step)
@@ -55,14 +56,14 @@ def follow(display_mesh: bpy.types.Object) -> None:
         if curve is not None:
             changed |= _write(nodes[keys_of(name)].mapping, _means(curve, span))
     if changed:
-        tree.update_tag()
+        nodes.id_data.update_tag()
 
 
 def moments_of(display_mesh: bpy.types.Object) -> Span:
     """The span of which the weather of an object tells the moments apart, keys or none."""
     modifier: Any = weather_modifier.modifier_of(display_mesh)
     tree = modifier.node_group
-    return span_of(tree.nodes[FIRST].outputs[0].default_value, tree[LAST])
+    return span_of(nodes_of(tree)[FIRST].outputs[0].default_value, tree[LAST])
 
 
 def rates(modifier: Any, span: Span) -> dict[str, Any]:

@@ -53,4 +53,7 @@ def remove(ground: bpy.types.Object) -> None:
 def remove_unused() -> None:
     """Remove the groups that no modifier has any more."""
     for group in [one for one in bpy.data.node_groups if nodes.is_weather(one) and not (one.users or one.library)]:
+        inner = nodes.within(group)
         bpy.data.node_groups.remove(group)
+        if inner and not inner.users:
+            bpy.data.node_groups.remove(inner)

@@ -28,6 +28,8 @@ from .weather_course_nodes import CourseNodes
 GROUP = "SoftGround Weather"
 MARK = "softground_weather"
 """Custom property of the group, whatever the user calls it."""
+WITHIN = "SoftGround Weather Nodes"
+"""The group that has the nodes. Of a modifier's own group, Blender notes the values of all sockets at each frame."""
 
 BLUR, TRODDEN = "softground_weather_blur", "softground_weather_trodden"
 PRESSED, MOMENT, COMPACTED = (
@@ -115,18 +117,32 @@ INPUTS = (
 def new() -> Any:
     """A new group with its inputs and nothing in it."""
     tree = new_group(GROUP, MARK)
+    _add_sockets(tree)
+    return tree
+
+
+def _add_sockets(tree: Any) -> None:
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     for name, value, least, most, description in INPUTS:
         socket = tree.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
         socket.default_value, socket.min_value, socket.max_value = value, least, most
         socket.description = description
-    return tree
 
 
 def is_weather(tree: bpy.types.NodeTree) -> bool:
     """Whether a node group is one that `new` made."""
     return MARK in tree.keys()  # noqa: SIM118  (an ID is no mapping)
+
+
+def within(tree: Any) -> Any:
+    """The group in a group of weather that has its nodes; None where that has them itself, as in earlier builds."""
+    return next((node.node_tree for node in tree.nodes if node.bl_idname == "GeometryNodeGroup"), None)
+
+
+def nodes_of(tree: Any) -> Any:
+    """The nodes of a group of weather."""
+    return (within(tree) or tree).nodes
 
 
 def build(
@@ -158,8 +174,22 @@ def build(
     again : bool
         Whether there are steps into earlier prints.
     """
+    inner = within(tree)
+    if inner is None:
+        inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
+        _add_sockets(inner)
     fill = partial(_fill, matter=matter, up=up, span=span, soaking=soaking, felt=felt, again=again)
-    node_graph.build(tree, fill)
+    node_graph.build(inner, fill)
+    node_graph.build(tree, partial(_hold, inner=inner))
+
+
+def _hold(graph: NodeGraph, inner: Any) -> None:
+    """Have a group do what the one within does."""
+    group = graph.node("NodeGroupInput")
+    held = graph.node("GeometryNodeGroup", node_tree=inner)
+    for name in ("Geometry", *(name for name, *_ in INPUTS)):
+        graph.link(group.outputs[name], held.inputs[name])
+    graph.finish(held.outputs["Geometry"])
 
 
 def _fill(
@@ -180,7 +210,7 @@ def _fill(
 
     graph.next_row()
     geometry = group.outputs["Geometry"]
-    changed = ground.stored(geometry, felt=felt)
+    changed = ground.pressed(geometry) if felt and matter.snow_depth else geometry
     changed = ground.moved(changed, said["Water Table"] * 0.01)
     if matter.wet:
         changed = ground.dried(changed, said["Halo"])
@@ -221,19 +251,13 @@ class _Vertices:
         self._kept = course.aged["filled"] + 1.0
         self._trodden = graph.attribute(TRODDEN, "FLOAT_VECTOR")
 
-    def stored(self, geometry: Any, *, felt: bool) -> Any:
-        """The geometry with what is told before it moves: how wet it looks without puddles; `felt` as in `build`."""
-        graph, acts, matter = self._graph, self._acts, self._matter
-        wetness = self._course.around["wet"]
-        if matter.wet:
-            wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
-        geometry = graph.store(geometry, WETNESS, wetness.socket, True)
-        if felt and matter.snow_depth:
-            begun = graph.number(self._moment_if_begun).at_most(1.0)
-            deep = graph.number(graph.attribute(COMPACTED)) * begun
-            deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
-            geometry = self._with(geometry, {COMPRESSION: deep}, acts["Snowfall"])
-        return geometry
+    def pressed(self, geometry: Any) -> Any:
+        """The geometry as deep as steps that felt weather have pressed new snow."""
+        graph = self._graph
+        begun = graph.number(self._moment_if_begun).at_most(1.0)
+        deep = graph.number(graph.attribute(COMPACTED)) * begun
+        deep = graph.number(graph.attribute(COMPRESSION)).at_least(deep)
+        return self._with(geometry, {COMPRESSION: deep}, self._acts["Snowfall"])
 
     def moved(self, geometry: Any, table: Number) -> Any:
         """The geometry as high as the weather has it, under new snow and water, looking no more trodden than it is.
@@ -259,25 +283,32 @@ class _Vertices:
         # Once and together, as each node works out all that it asks for anew.
         geometry, (height, fresh, *looks) = graph.captured(geometry, height, fresh, *worn.values())
         if worn:
-            geometry = self._with(geometry, dict(zip(worn, looks, strict=True)), acts["Wind"])
+            blown = graph.forgotten(geometry, *worn)  # what takes the place of another is copied
+            for name, look in zip(worn, looks, strict=True):
+                blown = graph.store(blown, name, look.socket, True)
+            geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, blown)
         geometry = self._with(geometry, {FRESH: fresh}, acts["Snowfall"])
+        wetness = self._course.around["wet"]
+        if matter.wet:
+            wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
+        dry = graph.store(geometry, WETNESS, wetness.socket, True)
         if not matter.soaking:
-            return graph.put_higher(geometry, self._up, height.socket)
+            return graph.put_higher(dry, self._up, height.socket)
         floods = acts["Rain"] + acts["Water Table"]
-        geometry = graph.choose("GEOMETRY", floods.socket, geometry, self._flooded(geometry, table, relief + height))
+        wet = self._flooded(geometry, table, relief + height, wetness)
+        geometry = graph.choose("GEOMETRY", floods.socket, dry, wet)
         standing = graph.number(graph.attribute(STANDING)).where(floods)
         geometry = graph.put_higher(geometry, self._up, (height + standing).socket)
         return graph.choose("GEOMETRY", floods.socket, geometry, graph.forgotten(geometry, STANDING))
 
-    def _flooded(self, geometry: Any, table: Number, relief: Number) -> Any:
+    def _flooded(self, geometry: Any, table: Number, relief: Number, wetness: Number) -> Any:
         """The geometry that knows of the water in the hollows of its relief, and is not under it yet."""
         graph, hollows = self._graph, self._graph.attribute(FILLED, "INT")
         wet = graph.store(geometry, STANDING, self._standing(table, relief).socket, hollows)
         standing = graph.number(graph.attribute(STANDING))
         deepest = graph.number(graph.attribute(WATER)).at_least(standing)  # the bake's own water stays
-        wet = graph.store(wet, WATER, deepest.socket, hollows)
-        wetness = graph.number(graph.attribute(WETNESS)).at_least(standing.above(0.0))
-        return graph.store(wet, WETNESS, wetness.socket, hollows)
+        wet = graph.store(wet, WATER, deepest.socket, True)
+        return graph.store(wet, WETNESS, wetness.at_least(standing.above(0.0)).socket, True)
 
     def dried(self, geometry: Any, halo: Number) -> Any:
         """The geometry with how dry ground looks that is wet to begin with."""
@@ -298,7 +329,7 @@ class _Vertices:
         graph, course = self._graph, self._course
         capacity, above, left = graph.parts(graph.attribute(POOL, "FLOAT_VECTOR"))
         rise = graph.attribute(RISE, "FLOAT_VECTOR")
-        low, high, seeped = graph.parts(self._course.moments.at("hollows", graph.attribute(FILLED, "INT")))
+        low, high, seeped = course.hollows(graph.attribute(FILLED, "INT"))
         excess = low + (high - low) * course.between(left)
         share = (excess / capacity).within_one()
         root = share.root()
@@ -330,12 +361,12 @@ class _Vertices:
 
     def _dot(self, stored: Any, of_moments: Any, moment: Any) -> Number:
         """A vector of the vertices by one that belongs to their moments."""
-        looked_up = self._graph.at_index(self._course.moments.geometry, of_moments, moment)
+        looked_up = self._graph.at_index(self._course.rows, of_moments, moment)
         return self._graph.number(self._graph.dot(stored, looked_up))
 
     def _number(self, value: Number, moment: Any) -> Number:
         """A number of the vertices' moments."""
-        moments = self._course.moments.geometry
+        moments = self._course.rows
         return self._graph.number(self._graph.at_index(moments, value.socket, moment, "FLOAT"))
 
     def _relief(self) -> Number:

@@ -208,11 +208,10 @@ def worn(compression: Any, rim: Any, change: Any) -> tuple[Any, Any]:
     >>> worn(np.array([4.0, 0.0]), np.array([0.0, 1.0]), np.array([5.0, -3.0]))
     (array([0., 2.]), array([1., 0.]))
     """
-    laid, taken = np.maximum(change, 0.0), np.maximum(np.multiply(change, -1.0), 0.0)
-    return (
-        np.maximum(compression - laid, 0.0) + np.maximum(taken - rim, 0.0),
-        np.maximum(rim - taken, 0.0) + np.maximum(laid - compression, 0.0),
-    )
+    laid = np.maximum(change, 0.0)
+    deep, high = compression - laid, rim + (change - laid)
+    left_deep, left_high = np.maximum(deep, 0.0), np.maximum(high, 0.0)
+    return left_deep + (left_high - high), left_high + (left_deep - deep)
 
 
 def soaked(wet: Any, soaking: Soaking) -> Any:

@@ -1,7 +1,7 @@
-"""What weather has done from any moment to now, at rates that change: sums over parts of the time.
+"""What weather has done from any moment to now, at rates that change: sums over the time between moments.
 
-Of each moment at which a part begins, all that an age is needed for is worked out: it then holds for all places. Rates
-are those of each part; within it every integral but that over the settling of its own layer is exact.
+Of each moment, all that an age is needed for is worked out: it then holds for all places. Rates are those of each part;
+between moments every integral but that over the settling of its own layer is exact.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import weather as w
-from .weather import NO_WATER, PARTS, Span
+from .weather import MOMENTS, NO_WATER, PARTS, Span
 
 Array = NDArray[np.float64]
 Rate = float | Sequence[float] | Array
@@ -115,9 +115,11 @@ def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -
     >>> course_of(nights, sand, frame=86 * 720, span=Span(0, 256 * 360, 1.0)).cover[0].round(2)
     0.0
     """
-    begin = np.linspace(span.first, span.last, PARTS + 1)
-    past = np.clip(frame - begin, 0.0, np.append(np.full(PARTS, span.step), np.inf))
-    rates = (np.broadcast_to(getattr(weather, name), past.shape) for name in KEYED)
+    begin = np.linspace(span.first, span.last, MOMENTS + 1)
+    past = np.clip(frame - begin, 0.0, np.append(np.full(MOMENTS, span.step * PARTS / MOMENTS), np.inf))
+    rates = (
+        np.broadcast_to(getattr(weather, name), PARTS + 1)[np.arange(MOMENTS + 1) * PARTS // MOMENTS] for name in KEYED
+    )
     snowfall, temperature, wind, rain, drying, scale = rates
     time = past * scale / span.frame_rate
     density = w.new_snow_density(temperature)
