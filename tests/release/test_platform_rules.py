@@ -101,6 +101,23 @@ def test_nothing_uses(name):
     assert found == []
 
 
+def test_only_the_batch_starts_processes():
+    """They are Blender itself (`program.worker_command`)."""
+    starting = {path for path, tree in TREES.items() if "subprocess" in imports(tree)}
+    assert starting == {"softground_addon/batch/runner.py"}
+
+
+def test_nothing_is_left_of_older_kinds_of_add_ons():
+    """`bl_info`, and `__name__` for the name of the package."""
+    found = {
+        (path, node.id)
+        for path, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Name) and node.id in ("bl_info", "__name__")
+    }
+    assert found == {("softground_addon/__main__.py", "__name__")}
+
+
 def test_who_knows_the_extensions_own_folder_writes_nothing():
     knowing = {
         path: tree
@@ -136,8 +153,19 @@ def test_text_has_the_same_line_ends_on_every_system():
     assert written <= {"files.write_text", "write_text"}
 
 
+TAGS = {
+    *("3D View", "Add Curve", "Add Mesh", "Animation", "Bake", "Camera", "Compositing", "Development", "Game Engine"),
+    *("Geometry Nodes", "Grease Pencil", "Import-Export", "Lighting", "Material", "Mesh", "Modeling", "Node", "Object"),
+    *("Paint", "Physics", "Pipeline", "Render", "Rigging", "Scene", "Sculpt", "Sequencer", "System", "Text Editor"),
+    *("Tracking", "User Interface", "UV"),
+}
+"""Of add-ons, in Blender's manual (Extensions, Tags)."""
+
+
 def test_the_manifest_says_what_the_platform_wants_to_know():
-    assert set(ABOUT["permissions"]) == {"files"}
+    names = {node.attr for tree in TREES.values() for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert set(ABOUT["permissions"]) == {"files"} | (names & {"clipboard"})
+    assert set(ABOUT["tags"]) <= TAGS
     for line in (ABOUT["tagline"], *ABOUT["permissions"].values()):
         assert len(line) <= 64
         assert line[-1].isalnum()
