@@ -98,6 +98,11 @@ def test_opensim_gets_the_forces_that_bear_the_body_y_up(scene, tmp_path):
     assert abs(left - right) > 0.05
     heights = columns[bodies["calcn_l"].findtext("point_identifier") + "y"]
     assert np.abs(heights).max() < 0.05
+    # The foot twists on the ground about the upward axis alone, no more than it is pressed.
+    twist = {axis: columns[bodies["calcn_l"].findtext("torque_identifier") + axis] for axis in "xyz"}
+    assert (twist["x"] == 0).all()
+    assert (twist["z"] == 0).all()
+    assert 0 < np.abs(twist["y"]).max() < 0.1 * vertical["calcn_l"].max()
     assert bpy.ops.softground.export(filepath=str(tmp_path / "walk"), format="OPENSIM_STO") == {"FINISHED"}
     assert opensim_table(tmp_path / "walk.sto").keys() == columns.keys()
 

@@ -132,13 +132,30 @@ def test_the_table_holds_the_same_forces(baked, tmp_path):
     assert all(0 < float(row["deviation_n"]) < 800 for row in rows if float(row["force_n"]) > 100)
 
 
+def test_the_table_tells_all_of_each_force(baked, tmp_path):
+    """Its direction, where it acts, and how it twists; nothing of a sole that is in the air."""
+    bpy.ops.softground.export_forces(filepath=str(tmp_path / "forces"))
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "forces.csv").read_text())))
+    bearing = [row for row in rows if float(row["force_n"]) > 100]
+    for row in bearing:
+        assert float(row["force_z_n"]) == pytest.approx(float(row["force_n"]), rel=0.1, abs=20)
+        assert np.hypot(float(row["force_x_n"]), float(row["force_y_n"])) < float(row["force_z_n"])
+        assert abs(float(row["free_moment_nm"])) < 0.1 * float(row["force_z_n"])
+    assert any(float(row["free_moment_nm"]) != 0 for row in bearing)
+    side = {sole: [float(r["centre_y_m"]) for r in bearing if r["sole"] == sole] for sole in ("foot.L", "foot.R")}
+    assert abs(np.mean(side["foot.L"]) - np.mean(side["foot.R"])) > 0.05
+    aloft = [row for row in rows if row["contact"] == "0" and float(row["force_z_n"]) == 0]
+    assert aloft
+    assert {row["centre_x_m"] for row in aloft} == {""}
+
+
 def test_the_table_outlives_who_left_the_prints(baked, tmp_path, capfd):
     bpy.data.objects.remove(bpy.data.objects["Walker"])
     bpy.ops.softground.export_forces(filepath=str(tmp_path / "forces"))
     rows = list(csv.DictReader(io.StringIO((tmp_path / "forces.csv").read_text())))
     assert len(rows) == 2 * FRAMES
-    assert {row["deviation_n"] for row in rows} == {""}
-    assert "Without standard deviations" in capfd.readouterr().out
+    assert {row[column] for row in rows for column in force_curves.ESTIMATED} == {""}
+    assert "Normal forces only" in capfd.readouterr().out
 
 
 def test_without_a_bake_both_say_what_is_missing(scene):

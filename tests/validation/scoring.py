@@ -46,6 +46,17 @@ class Score:
     frames_scored: int
 
 
+@dataclass(frozen=True)
+class PointScore:
+    """Errors of where the forces act and of how the feet twist; see `score_points`.
+
+    None where the plates do not tell: root mean square of the distance on the level [mm], and of the free moment [N·m].
+    """
+
+    rms_centre_mm: float | None = None
+    rms_free_moment_nm: float | None = None
+
+
 def plates_saw_everything(measured: Array, touching: Mask, *, weight: float, rate: float) -> Mask:
     """Frames at which the plates show all that bears the body.
 
@@ -121,6 +132,22 @@ def score(estimated: Array, measured: Array, scored: Mask, *, weight: float, rat
         mean_cycle_bw=_mean_over_cycles(total, measured[..., 2]) / weight,
         frames_scored=int(scored.sum()),
     )
+
+
+def score_points(
+    centres: Array, moments: Array, measured: tuple[Array | None, Array | None], scored: Mask
+) -> PointScore:
+    """Compare centres of pressure (F, 2, 3) [m] and free moments (F, 2) [N·m] with those measured, where they are."""
+
+    def rms(estimated: Array, true: Array | None) -> float | None:
+        if true is None:
+            return None
+        square = ((estimated - true)[scored] ** 2).reshape(scored.sum(), 2, -1).sum(axis=-1)
+        square = square[np.isfinite(square)]
+        return float(np.sqrt(square.mean())) if len(square) else None
+
+    centre = rms(centres[..., :2], None if measured[0] is None else measured[0][..., :2])
+    return PointScore(None if centre is None else 1e3 * centre, rms(moments, measured[1]))
 
 
 def crossings(force: Array) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.validation.scoring import plates_saw_everything, score
+from tests.validation.scoring import PointScore, plates_saw_everything, score, score_points
 
 WEIGHT, RATE = 700.0, 100.0
 
@@ -58,3 +58,14 @@ def test_all_errors_are_those_that_were_made():
     heavier = score(1.1 * measured, measured, frames((0, 200)), weight=WEIGHT, rate=RATE)
     assert heavier.share_rms_bw == pytest.approx(0.0, abs=1e-12)
     assert heavier.rms_bw_total == pytest.approx(0.1)
+
+
+def test_points_and_twists_are_scored_where_they_are_measured():
+    centres, moments = np.zeros((200, 2, 3)), np.zeros((200, 2))
+    off, twisted = centres + np.array((0.03, 0.04, 1.0)), moments + 2.0
+    off[50:60], twisted[50:] = np.nan, np.nan
+    told = score_points(centres, moments, (off, twisted), frames((0, 100)))
+    assert told.rms_centre_mm == pytest.approx(50.0)
+    assert told.rms_free_moment_nm == pytest.approx(2.0)
+    assert score_points(centres, moments, (None, None), frames((0, 100))) == PointScore()
+    assert score_points(centres, moments, (np.nan * off, None), frames((0, 100))) == PointScore()

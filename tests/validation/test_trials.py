@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from tests.core.capture.c3d_files import c3d_file
 from tests.core.capture.test_joint_centres import OPENSIM, joints
+from tests.validation import validate
 from tests.validation.trials import SIDES, motion_of_trial, read_c3d
 
 RATE, SAMPLES, MASS = 100.0, 10, 70.0
@@ -57,10 +60,31 @@ def test_each_plate_bears_the_foot_that_stands_on_it(trial):
     assert left[-1] > 490
 
 
+def test_each_foot_presses_where_its_plate_says_and_without_a_twist(trial):
+    """Plates that send no moments bear the foot in their middle."""
+    middles = np.array([(-0.1, 0.0), (0.1, 0.0)])
+    np.testing.assert_allclose(trial.centres[..., :2], np.tile(middles, (len(trial.centres), 1, 1)), atol=1e-6)
+    np.testing.assert_allclose(trial.free_moments, 0.0, atol=1e-6)
+
+
 def test_its_motion_is_that_of_the_markers(trial):
     motion = motion_of_trial(trial)
     np.testing.assert_allclose(motion.joints["knee_l"] * 1e3, marked()["LKJC"], atol=1e-2)
     assert {sole.sole.side for sole in motion.soles} == {"L", "R"}
+
+
+def test_a_folder_of_c3d_files_is_validated(trial, tmp_path, monkeypatch):
+    output = tmp_path / "build"
+    monkeypatch.setattr("sys.argv", ["validate", str(tmp_path), "--output", str(output)])
+    validate.main()
+    rows = json.loads((output / "validation.json").read_text())
+    row = next(row for row in rows if row["model"] == "WHOLE_BODY")
+    assert (row["trial"], row["subject"], row["kind"], row["path"]) == ("anna_walk", "anna", "walk", "joints")
+    assert {"rms_bw_foot", "share_rms_bw", "rms_bw_total", "heel_strike_ms", "frames_scored"} <= row.keys()
+    assert row["rms_bw_total"] < 0.01
+    assert row["rms_centre_mm"] < 60
+    assert row["rms_free_moment_nm"] < 1
+    assert (output / "anna_walk_joints.png").exists()
 
 
 def test_a_trial_without_a_mass_says_where_to_write_it(tmp_path):

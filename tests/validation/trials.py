@@ -46,6 +46,10 @@ class Trial:
         Plate force on the left and the right foot [N].
     bvh : Path
         The same motion as a skeleton.
+    centres : (F, 2, 3) float array, optional
+        Where each force acts [m], NaN where that is not measured.
+    free_moments : (F, 2) float array, optional
+        Moment about the upward axis there [N·m], NaN where that is not measured.
     """
 
     name: str
@@ -54,6 +58,8 @@ class Trial:
     points: dict[str, Array]
     forces: Array
     bvh: Path
+    centres: Array | None = None
+    free_moments: Array | None = None
 
     @property
     def kind(self) -> str:
@@ -92,9 +98,9 @@ def read_c3d(path: Path) -> Trial:
     """
     content = path.read_bytes()
     body = captured_body(c3d.read(content))
-    return Trial(
-        path.stem, _mass(path, content), body.rate, body.joints, _forces_on_feet(body), path.with_suffix(".bvh")
-    )
+    forces, centres, moments = _measured_on_feet(body)
+    bvh = path.with_suffix(".bvh")
+    return Trial(path.stem, _mass(path, content), body.rate, body.joints, forces, bvh, centres, moments)
 
 
 def _mass(path: Path, content: bytes) -> float:
@@ -109,27 +115,38 @@ def _mass(path: Path, content: bytes) -> float:
     return float(masses[0].flat[0])
 
 
-def _forces_on_feet(body: CapturedBody) -> Array:
-    """Force of the plates on the left and the right foot at the frames of the markers, (F, 2, 3) [N]."""
+def _measured_on_feet(body: CapturedBody) -> tuple[Array, Array, Array]:
+    """What the plates show of the left and the right foot at the frames of the markers.
+
+    Returns
+    -------
+    forces : (F, 2, 3) float array [N]
+    centres : (F, 2, 3) float array [m], NaN but where one plate bears the foot
+    free_moments : (F, 2) float array [N·m], likewise
+    """
     count = len(body.joints["heel_l"])
-    forces = np.zeros((count, len(SIDES), 3))
+    forces, plates = np.zeros((count, len(SIDES), 3)), np.zeros((count, len(SIDES)))
+    centres, moments = np.full((count, len(SIDES), 3), np.nan), np.full((count, len(SIDES)), np.nan)
     for plate in body.plates:
-        force, centre = _at_frames(plate, body.rate, count)
+        averaged = _at_frames(plate, body.rate, count)
+        force, centre, moment = averaged.force, averaged.centre_of_pressure(), averaged.free_moment()
         for first, last in zip(*runs(force[:, 2] > LOADED), strict=True):
             step = slice(first, last)
             foot = np.argmin([np.nanmean(_distance(body, side, centre[step], step)) for side in SIDES])
             forces[step, foot] += force[step]
-    return forces
+            plates[step, foot] += 1
+            centres[step, foot], moments[step, foot] = centre[step], moment[step]
+    centres[plates != 1], moments[plates != 1] = np.nan, np.nan
+    return forces, centres, moments
 
 
-def _at_frames(plate: Plate, rate: float, count: int) -> tuple[Array, Array]:
-    """Force [N] and centre of pressure [m] of a plate, its samples averaged over each frame, (F, 3) each."""
+def _at_frames(plate: Plate, rate: float, count: int) -> Plate:
+    """A plate whose samples are averaged over each frame."""
     samples = max(round(plate.rate / rate), 1)
     frames = [
         values[: count * samples].reshape(count, samples, 3).mean(axis=1) for values in (plate.force, plate.moment)
     ]
-    averaged = Plate(plate.corners, rate, *frames)
-    return averaged.force, averaged.centre_of_pressure()
+    return Plate(plate.corners, rate, *frames)
 
 
 def _distance(body: CapturedBody, side: str, place: Array, step: slice) -> Array:

@@ -11,6 +11,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,10 @@ from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.contacts import detect_contacts
 from softground_addon.core.loads.deviation import force_deviation
 from softground_addon.core.loads.estimate import ForceModel, estimate_loads
+from softground_addon.core.loads.free_moments import free_moments
 from softground_addon.core.motion.motion import CharacterMotion
 from tests.validation.plots import plot_trial
-from tests.validation.scoring import plates_saw_everything, score
+from tests.validation.scoring import PointScore, plates_saw_everything, score, score_points
 from tests.validation.through_blender import motion_of_bvh
 from tests.validation.trials import Trial, motion_of_trial, read_c3d, read_trial
 
@@ -52,11 +54,13 @@ COLUMNS = {
     "rms_bw_foot_anterior_posterior": "{:>7.3f}",
     "rms_bw_foot_medio_lateral": "{:>7.3f}",
     "mean_cycle_bw": "{:>7.3f}",
+    "rms_centre_mm": "{:>7.0f}",
+    "rms_free_moment_nm": "{:>7.1f}",
     "frames_scored": "{:>7d}",
 }
 HEADINGS = (
     *("trial", "path", "model", "foot", "left", "right", "total", "share", "peak"),
-    *("HS ms", "bias", "TO ms", "bias", "AP", "AP foot", "ML foot", "mean", "frames"),
+    *("HS ms", "bias", "TO ms", "bias", "AP", "AP foot", "ML foot", "mean", "CoP mm", "FM Nm", "frames"),
 )
 
 
@@ -85,12 +89,14 @@ def validate(trial: Trial, output: Path) -> Iterator[dict[str, object]]:
         if not scored.any():
             print(f"{trial.name}: the plates show none of it whole, nothing to score")
             continue
-        curves = dict(estimates(motion))
+        curves, shown = dict(estimates(motion)), whole_body(motion)
+        points = score_points(shown.centres, shown.free_moments, (trial.centres, trial.free_moments), scored)
         for model, forces in curves.items():
             result = score(forces, trial.forces, scored, weight=trial.mass * GRAVITY, rate=trial.rate)
             about = {"trial": trial.name, "subject": trial.subject, "kind": trial.kind, "path": path, "model": model}
-            yield about | dataclasses.asdict(result)
-        plot_trial(trial, path, curves, deviation_of(motion), scored, output / f"{trial.name}_{path}.png")
+            told = points if model == "WHOLE_BODY" else PointScore()
+            yield about | dataclasses.asdict(result) | dataclasses.asdict(told)
+        plot_trial(trial, path, curves, shown.deviation, scored, output / f"{trial.name}_{path}.png")
 
 
 def motions_of(trial: Trial) -> Iterator[tuple[str, CharacterMotion]]:
@@ -116,20 +122,44 @@ def estimates(motion: CharacterMotion) -> Iterator[tuple[str, Array]]:
         yield name, loads.forces.forces[::steps, order]
 
 
-def deviation_of(motion: CharacterMotion) -> Array:
-    """Standard deviation of the whole-body model's forces at the motion's frames, (F, 2) [N], left foot first."""
+@dataclass(frozen=True)
+class Shown:
+    """What the whole-body model tells beside the forces at the motion's frames, left foot first.
+
+    Attributes
+    ----------
+    deviation : (F, 2) float array
+        Standard deviation of the vertical force [N].
+    centres : (F, 2, 3) float array
+        Centres of pressure [m].
+    free_moments : (F, 2) float array
+        [N·m]
+    """
+
+    deviation: Array
+    centres: Array
+    free_moments: Array
+
+
+def whole_body(motion: CharacterMotion) -> Shown:
+    """What the whole-body model tells of a motion beside its forces."""
     material = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=CHARACTERISTIC_TIMES[0])
     loads = estimate_loads(motion, FlatTerrain(), force_model="WHOLE_BODY", material=material)
     steps = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
     order = [[sole.sole.side for sole in motion.soles].index(side) for side in "LR"]
-    return force_deviation(loads)[::steps, order]
+    told = (force_deviation(loads), loads.forces.centre_of_pressure, free_moments(loads))
+    return Shown(*(values[::steps, order] for values in told))
 
 
 def print_table(rows: list[dict[str, object]]) -> None:
-    """Errors in body weights (vertical; AP along the progress, ML across it), of timing in ms."""
+    """Errors in body weights (vertical; AP along the progress, ML across it), of timing in ms.
+
+    Those of the centre of pressure in mm and of the free moment in N·m stay empty where the plates do not tell.
+    """
     print("{:<18} {:<7} {:<17} ".format(*HEADINGS[:3]) + " ".join(f"{heading:>7}" for heading in HEADINGS[3:]))
     for row in rows:
-        print(" ".join(form.format(row[key]) for key, form in COLUMNS.items()))
+        cells = ((form, row[key]) for key, form in COLUMNS.items())
+        print(" ".join(form.format(value) if value is not None else f"{'':>7}" for form, value in cells))
 
 
 if __name__ == "__main__":

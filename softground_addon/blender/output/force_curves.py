@@ -17,6 +17,7 @@ from ...core.errors import SoftGroundError
 from ...core.files import files
 from ...core.loads.deviation import force_deviation
 from ...core.loads.estimate import CharacterLoads
+from ...core.loads.free_moments import free_moments
 from ...core.record.footprints import Footprint
 from .. import compat, settings
 from ..ground import baked_ground
@@ -51,37 +52,46 @@ def forces_over_time(footprints: Sequence[Footprint], frames: Array) -> dict[tup
     return dict(sorted(curves.items()))
 
 
-Deviations = Mapping[tuple[str, str], Array]
-"""Standard deviation of the force at each frame by character and sole [N]."""
+ESTIMATED = (
+    *("deviation_n", "force_x_n", "force_y_n", "force_z_n"),
+    *("centre_x_m", "centre_y_m", "centre_z_m", "free_moment_nm"),
+)
+"""Columns of what the estimate tells beside the normal force: its standard deviation, the force of the ground in the
+world's axes, where it acts, and the moment about the upward axis there."""
+
+Estimates = Mapping[tuple[str, str], Array]
+"""Values of those columns at each frame by character and sole, (N, 8); NaN where there is none."""
 
 
-def deviations_of(loads: Sequence[CharacterLoads], frames: Array) -> Deviations:
-    """Standard deviations at scene frames of those forces that have one."""
+def estimates_of(loads: Sequence[CharacterLoads], frames: Array) -> Estimates:
+    """What the estimate tells at scene frames. Only a body with joints has a deviation and free moments."""
     found: dict[tuple[str, str], Array] = {}
     for one in loads:
-        if one.motion.joints and one.motion.centre is None:
-            deviation = force_deviation(one)
-            for number, sole in enumerate(one.motion.soles):
-                values = np.interp(frames, one.motion.frames, deviation[:, number])
-                found[one.motion.name, sole.sole.name] = values
+        touching, known = one.contacts.touching, one.motion.joints and one.motion.centre is None
+        nothing = np.full(touching.shape, np.nan)
+        deviation, twist = (force_deviation(one), free_moments(one)) if known else (nothing, nothing)
+        centre = np.where(touching[..., None], one.forces.centre_of_pressure, np.nan)
+        columns = np.concatenate([deviation[..., None], one.forces.forces, centre, twist[..., None]], axis=-1)
+        for number, sole in enumerate(one.motion.soles):
+            values = [np.interp(frames, one.motion.frames, column) for column in columns[:, number].T]
+            found[one.motion.name, sole.sole.name] = np.stack(values, axis=1)
     return found
 
 
-def table(
-    footprints: Sequence[Footprint], frames: Array, frame_rate: float, deviations: Deviations | None = None
-) -> str:
-    """The forces as comma-separated values, one row per frame and sole; a deviation that is not known stays empty."""
+def table(footprints: Sequence[Footprint], frames: Array, frame_rate: float, estimates: Estimates | None = None) -> str:
+    """The forces as comma-separated values, one row per frame and sole; what is not known stays empty."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n", "deviation_n"])
+    rows.writerow(["frame", "time_s", "character", "sole", "contact", "force_n", *ESTIMATED])
     curves = forces_over_time(footprints, frames)
-    known = deviations or {}
+    unknown = np.full((len(frames), len(ESTIMATED)), np.nan)
     for place, frame in enumerate(frames):
         for (character, sole), (force, contact) in curves.items():
             time = round((frame - frames[0]) / frame_rate, 6)
-            deviation = round(float(known[character, sole][place]), 3) if (character, sole) in known else ""
             newtons = round(float(force[place]), 3)
-            rows.writerow([int(frame), time, character, sole, int(contact[place]), newtons, deviation])
+            told = (estimates or {}).get((character, sole), unknown)[place].tolist()
+            cells = [round(value, 4) if np.isfinite(value) else "" for value in told]
+            rows.writerow([int(frame), time, character, sole, int(contact[place]), newtons, *cells])
     return text.getvalue()
 
 
@@ -206,12 +216,12 @@ class SOFTGROUND_OT_export_forces(OnBake, bpy.types.Operator):
         footprints, frames = _baked(context)
         scene = settings.scene_of(context)
         try:
-            deviations = deviations_of(analysis.read(scene).loads, frames)
+            estimates = estimates_of(analysis.read(scene).loads, frames)
         except SoftGroundError as error:  # the record is there without those who left it
-            self.report({"WARNING"}, f"Without standard deviations, as the shot cannot be read: {error}")
-            deviations = {}
+            self.report({"WARNING"}, f"Normal forces only, as the shot cannot be read: {error}")
+            estimates = {}
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".csv"))
-        files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), deviations))
+        files.write_text(path, table(footprints, frames, settings.frame_rate_of(scene), estimates))
         self.report({"INFO"}, f"Wrote {path}")
         return {"FINISHED"}
 

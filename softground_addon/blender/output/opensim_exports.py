@@ -10,11 +10,16 @@ import numpy as np
 
 from ...core.files import files, opensim
 from ...core.loads.estimate import CharacterLoads
+from ...core.loads.free_moments import free_moments
 from ..reading import analysis
 
 KINDS = {
-    "OPENSIM_MOT": (".mot", "OpenSim Loads (MOT)", "Forces and centres of pressure, with the external loads as XML"),
-    "OPENSIM_STO": (".sto", "OpenSim Storage (STO)", "Forces and centres of pressure as a storage file"),
+    "OPENSIM_MOT": (
+        ".mot",
+        "OpenSim Loads (MOT)",
+        "Forces, centres of pressure and free moments, with the external loads as XML",
+    ),
+    "OPENSIM_STO": (".sto", "OpenSim Storage (STO)", "Forces, centres of pressure and free moments as a storage file"),
 }
 """Suffix, label and description of each kind of file."""
 
@@ -45,6 +50,8 @@ def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> l
     frames = character.motion.frames
     shown = (frames >= start) & (frames <= end)
     time = (frames[shown] - start) / character.motion.frame_rate
+    twists = character.motion.joints and character.motion.centre is None
+    moment = free_moments(character) if twists else np.zeros(character.contacts.touching.shape)
     feet = [
         opensim.FootForce(
             sole.sole.name,
@@ -55,6 +62,7 @@ def _write_one(character: CharacterLoads, path: Path, start: int, end: int) -> l
                 character.forces.centre_of_pressure[shown, number],
                 np.nan,
             ),
+            moment[shown, number],
         )
         for number, sole in enumerate(character.motion.soles)
     ]

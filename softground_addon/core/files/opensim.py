@@ -37,12 +37,15 @@ class FootForce:
         [N]
     point : (N, 3) float array
         Where it acts [m].
+    moment : (N,) float array
+        Free moment about the upward axis through that point [N·m].
     """
 
     name: str
     side: str
     force: Array
     point: Array
+    moment: Array
 
     @property
     def identifier(self) -> str:
@@ -50,14 +53,14 @@ class FootForce:
 
         Examples
         --------
-        >>> FootForce("foot.L", "L", np.zeros((1, 3)), np.zeros((1, 3))).identifier
+        >>> FootForce("foot.L", "L", np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1)).identifier
         'ground_foot_L'
         """
         return "ground_" + "".join(letter if letter.isalnum() else "_" for letter in self.name)
 
 
 def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
-    """A storage file: time, and force and point of each sole.
+    """A storage file: time, and force, point and free moment of each sole.
 
     Parameters
     ----------
@@ -69,7 +72,9 @@ def storage(name: str, time: Array, feet: Sequence[FootForce]) -> str:
     """
     labels, columns = ["time"], [time[:, None]]
     for foot in feet:
-        for kind, values in (("v", foot.force), ("p", np.where(np.isfinite(foot.point), foot.point, 0.0))):
+        point = np.where(np.isfinite(foot.point), foot.point, 0.0)
+        upward = foot.moment[:, None] * (0.0, 0.0, 1.0)
+        for kind, values in (("v", foot.force), ("p", point), ("m", upward)):
             labels += [f"{foot.identifier}_{kind}{axis}" for axis in "xyz"]
             columns.append(_y_up(values))
     table = np.concatenate(columns, axis=1)
@@ -91,6 +96,7 @@ def external_loads(name: str, storage_file: str, feet: Sequence[FootForce]) -> s
             ("point_expressed_in_body", "ground"),
             ("force_identifier", f"{foot.identifier}_v"),
             ("point_identifier", f"{foot.identifier}_p"),
+            ("torque_identifier", f"{foot.identifier}_m"),
         ):
             ElementTree.SubElement(force, tag).text = text
     ElementTree.SubElement(loads, "groups")

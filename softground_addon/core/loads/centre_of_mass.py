@@ -168,6 +168,27 @@ def mass_points(motion: CharacterMotion) -> MassPoints:
     return MassPoints(positions, fractions / fractions.sum(), np.array(parts), np.array(legs))
 
 
+def trunk_spin(motion: CharacterMotion) -> Array:
+    """Angular momentum of the trunk about its own length per body mass, (N, 1) [m²/s], upward.
+
+    Its point masses lie on a line; half of the mass at the hips and at the shoulders is on each side of it instead.
+    """
+    table = _FOUR_LEGGED if motion.four_legged else _HUMAN
+    joints = _Joints(motion)
+    spin = np.zeros((len(motion.frames), 1))
+    if len(spin) > 1:
+        for fraction, joint in ((table.trunk_centre, "hip"), ((1 - table.trunk_centre) / 2, "shoulder")):
+            (x, y), (u, v) = _half_across(joints, joint, motion.time_step)
+            spin[:, 0] += table.trunk * fraction * (x * v - y * u)
+    return spin
+
+
+def _half_across(joints: _Joints, joint: str, step: float) -> tuple[Array, Array]:
+    """From the middle between two joints to the left one on the level, and how fast that changes, (2, N) each."""
+    across = (joints[f"{joint}_l"] - joints[f"{joint}_r"])[:, :2].T / 2
+    return across, np.gradient(across, step, axis=1)
+
+
 def fitted_to_free_fall(
     points: MassPoints, accelerations: Array, gravity: float, *, independent: float = 1.0, whole: bool = True
 ) -> tuple[MassPoints, float, float]:
