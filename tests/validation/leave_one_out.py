@@ -39,7 +39,7 @@ FACTORS = (0.7, 0.85, 1.0, 1.2, 1.4)
 SOIL = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=0.1)
 MODULES = (body_dynamics, centre_of_mass, centre_of_pressure, contact_timing, contacts, load_sharing)
 CONSTANTS: dict[ModuleType, tuple[str, ...]] = {
-    body_dynamics: ("CUTOFF", "PASSES", "LAG", "SLOW_CUTOFF", "STEADY_ENDS"),
+    body_dynamics: ("CUTOFF", "FIRST_PASS", "LAST_PASS", "BOTH_PASSES", "LAG", "SLOW_CUTOFF", "STEADY_ENDS"),
     centre_of_mass: ("_FRACTION_DEVIATION", "_FALL_DEVIATION"),
     centre_of_pressure: ("PRESSED_DEPTH",),
     contacts: (

@@ -108,13 +108,13 @@ def test_forces_and_timing_are_within_the_bars(name, per_foot, total):
         ("opencap4_walking1", 0.048),
         ("opencap4_walking2", 0.047),
         ("opencap4_walkingTI1", 0.068),  # with the plates' own timing 0.060
-        ("run_rajagopal", 0.050),
+        ("run_rajagopal", 0.048),
         ("hamner04_run200", 0.102),
-        ("hamner04_run400", 0.083),
-        ("opencap4_DJ1", 0.093),
-        ("opencap4_DJ2", 0.100),
-        ("opencap4_DJAsym1", 0.150),  # half of its total's error alone is 0.096
-        ("opencap4_squats1", 0.020),
+        ("hamner04_run400", 0.075),
+        ("opencap4_DJ1", 0.089),
+        ("opencap4_DJ2", 0.098),
+        ("opencap4_DJAsym1", 0.144),  # half of its total's error alone is 0.096
+        ("opencap4_squats1", 0.018),
         ("opencap4_STS1", 0.032),
     ],
 )

@@ -22,9 +22,13 @@ CUTOFF = 16.0
 """Cut-off of the low-pass in pendulum frequencies sqrt(gravity/leg length)/(2·pi): 8 Hz for an adult, as is usual for
 gait (Winter 2009, "Biomechanics and Motor Control of Human Movement", chapter 3: 6 Hz and more). It holds where the
 motion itself does not tell better."""
-PASSES = 1.07
+FIRST_PASS = 0.9
 """Trunk, head and arms pass the low-pass twice, for the flesh on them follows the bones slowly; the legs, which bring
-the impacts, once. Two passes together cut lower than one: this raises the cut-off of each."""
+the impacts, once. Cut-off of the pass that is not for the legs, in that of the body, ..."""
+LAST_PASS = 1.12
+"""... and of the one for all."""
+BOTH_PASSES = 0.85
+"""Where the two together pass half of the amplitude, in the same unit."""
 LAG = 0.007
 """How long the flesh of trunk, head and arms comes after their joints in motions with flights, in times of the leg's
 pendulum: 2 ms."""
@@ -125,7 +129,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
         path = np.zeros((len(sampled), 6))
         path[sampled] = _calmed(points, turning, frame_step, cutoff)
         smooth, rate, acceleration = smooth_path(
-            path, motion.time_step, _of_each_pass(points, cutoff, frame_step), sampled=sampled, steady_ends=STEADY_ENDS
+            path, motion.time_step, _last_pass(points, cutoff, frame_step), sampled=sampled, steady_ends=STEADY_ENDS
         )
         force = acceleration[:, 3:] / motion.gravity + (0.0, 0.0, 1.0)
         return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
@@ -133,7 +137,8 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
     flying = flights(airborne, body, motion.time_step) if airborne is not None else np.zeros(0, dtype=bool)
     if flying.any():
-        cutoff = max(_falling_freely(motion, body, flying, stride=2 * CUTOFF_STEP)[2], usual)
+        fall = _rate_of_fall(motion, body, flying)
+        cutoff = max(_cutoff_in_flight(motion, body, flying, fall, roughly=True), usual)
         body = smoothed(cutoff) if cutoff > body.cutoff else body
     if cutoff_factor != 1:
         body = smoothed(body.cutoff * cutoff_factor)
@@ -161,19 +166,17 @@ def with_flight(
     if flying.any():
         points, level, cutoff, fall = _falling_freely(motion, body, flying)
         cutoff *= cutoff_factor
-    sampled, each = motion.on_frames, _of_each_pass(points, cutoff, motion.frame_step)
+    sampled, low_pass = motion.on_frames, _last_pass(points, cutoff, motion.frame_step)
     path = np.zeros((len(sampled), 3))
     lag = LAG * motion.pendulum_time if flying.any() else 0.0
-    path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff, lag)
-    if level is not points:
-        path[sampled, :2] = _calmed(level, level.centre[:, :0], motion.frame_step, cutoff, lag)[:, :2]
+    path[sampled] = _calmed(points, points.centre[:, :0], motion.frame_step, cutoff, lag=lag, level=level)
     acted = fall
     while True:
         # What pulls is fallen through until nothing pulls: Newton's method on a penalty for pulling alone.
         for _ in range(MOST_ROUNDS):
             falling = _inner(flying) | pulled
             centre, _, acceleration = smooth_path(
-                path, motion.time_step, each, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
+                path, motion.time_step, low_pass, sampled=sampled, falling=falling, fall=fall, steady_ends=STEADY_ENDS
             )
             force = acceleration / fall + (0.0, 0.0, 1.0)
             pulling = ~airborne & (force[:, 2] < 0)
@@ -194,25 +197,36 @@ def with_flight(
     return dataclasses.replace(body, centre=centre, force=force, points=points, cutoff=cutoff)
 
 
-def _calmed(points: MassPoints, others: Array, step: float, cutoff: float, lag: float = 0.0) -> Array:
+def _calmed(
+    points: MassPoints,
+    others: Array,
+    step: float,
+    cutoff: float,
+    *,
+    lag: float = 0.0,
+    level: MassPoints | None = None,
+) -> Array:
     """The columns `others` (F, C), and the centre of mass (F, 3) with its trunk low-passed once: (F, C + 3).
 
-    The trunk comes later by `lag` [s].
+    The trunk comes later by `lag` [s]. Along the ground the body is `level`, if that is another.
 
     Where nothing shows what the legs do, all is as it was.
     """
-    legs = points.legs_moment()
-    path = np.concatenate([others, points.centre - legs], axis=1)
+    centre, legs = points.centre, points.legs_moment()
+    if level is not None and level is not points:
+        centre, legs = centre.copy(), legs.copy()
+        centre[:, :2], legs[:, :2] = level.centre[:, :2], level.legs_moment()[:, :2]
+    path = np.concatenate([others, centre - legs], axis=1)
     if points.legs.any():
-        path, rate, _ = smooth_path(path, step, _of_each_pass(points, cutoff, step))
+        path, rate, _ = smooth_path(path, step, min(FIRST_PASS * cutoff, HIGHEST_CUTOFF / step))
         path[:, -3:] -= lag * rate[:, -3:]
     path[:, -3:] += legs
     return path
 
 
-def _of_each_pass(points: MassPoints, cutoff: float, frame_step: float) -> float:
-    """Cut-off of each of the passes that together cut at `cutoff` [Hz]: of one where nothing shows the legs."""
-    return min(PASSES * cutoff, HIGHEST_CUTOFF / frame_step) if points.legs.any() else cutoff
+def _last_pass(points: MassPoints, cutoff: float, frame_step: float) -> float:
+    """Cut-off of the pass of the whole body to cut at `cutoff` [Hz]: the only one where nothing shows the legs."""
+    return min(LAST_PASS * cutoff, HIGHEST_CUTOFF / frame_step) if points.legs.any() else cutoff
 
 
 def _usual_cutoff(motion: CharacterMotion) -> float:
@@ -220,32 +234,62 @@ def _usual_cutoff(motion: CharacterMotion) -> float:
     return min(CUTOFF / (2 * np.pi * motion.pendulum_time), HIGHEST_CUTOFF / motion.frame_step)
 
 
+def _cutoff_in_flight(
+    motion: CharacterMotion, body: BodyDynamics, flying: Mask, fall: float, *, roughly: bool = False
+) -> float:
+    """The cut-off [Hz] with which the body comes nearest to falling by `fall` [m/s²] in flight.
+
+    `roughly`, all parts pass once, and the steps of the search are twice as long.
+
+    One too low lets the forces of the stance before and after leak into the flight, one too high lets noise and the
+    shaking of soft tissue through: both show as a force where there is none.
+    """
+    step, usual, legs = motion.frame_step, _usual_cutoff(motion), body.points.legs_of_parts()
+    parts, flying = body.points.part_centres(), flying[motion.on_frames]
+    highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
+    passes = [(~legs, BOTH_PASSES), (legs, LAST_PASS)] if legs.any() and not roughly else [(slice(None), 1.0)]
+
+    @cache
+    def misfit(octaves: float) -> float:
+        cutoff = usual * 2.0**octaves
+        falling = np.zeros((flying.sum(), *parts.shape[1:]))
+        for some, factor in passes:
+            falling[:, some] = _accelerations(parts[:, some], step, factor * cutoff)[flying]
+        return fitted_to_free_fall(body.points, falling, fall, independent=_independent(motion), whole=False)[2]
+
+    start = np.log2(body.cutoff / usual)
+    stride = 2 * CUTOFF_STEP if roughly else CUTOFF_STEP
+    best = _downhill(misfit, start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
+    return float(usual * 2.0**best)
+
+
 def _falling_freely(
-    motion: CharacterMotion, body: BodyDynamics, flying: Mask, stride: float = CUTOFF_STEP
+    motion: CharacterMotion, body: BodyDynamics, flying: Mask
 ) -> tuple[MassPoints, MassPoints, float, float]:
     """The body and the cut-off [Hz] with which it comes nearest to free fall in flight, and how its joints fall [m/s²].
 
     There are two bodies. Up and down, flesh moves less than joints: where only a part of the body moves with them, they
     fall faster than it. Along the ground nothing tells that part, and what is second is the body all of which does.
-
-    A cut-off too low lets the forces of the stance before and after leak into the flight, one too high lets noise and
-    the shaking of soft tissue through: both show as a force where there is none.
     """
-    step, usual = motion.frame_step, _usual_cutoff(motion)
-    fall = _rate_of_fall(body, flying, motion.gravity, _leak(body, motion.time_step))
-    parts, flying = body.points.part_centres(), flying[motion.on_frames]
-    highest = np.log2(max(HIGHEST_CUTOFF / (step * usual), 1.0))
+    fall = _rate_of_fall(motion, body, flying)
+    cutoff = _cutoff_in_flight(motion, body, flying, fall)
+    # What leaks into the flight differs with the cut-off: fractions that are to tell masses are of parts treated alike.
+    falling = _accelerations(body.points.part_centres(), motion.frame_step, cutoff)[flying[motion.on_frames]]
+    independent = _independent(motion)
+    points, moving, _ = fitted_to_free_fall(body.points, falling, fall, independent=independent, whole=False)
+    level, _, _ = fitted_to_free_fall(body.points, falling, fall, independent=independent)
+    return points, level, cutoff, fall / moving
 
-    @cache
-    def fitted(octaves: float, whole: bool = False) -> tuple[MassPoints, float, float]:
-        _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), step, usual * 2.0**octaves)
-        falling = acceleration.reshape(parts.shape)[flying]
-        return fitted_to_free_fall(body.points, falling, fall, independent=min(2 * usual * step, 1.0), whole=whole)
 
-    start = np.log2(body.cutoff / usual)
-    best = _downhill(lambda octaves: fitted(octaves)[2], start, stride, (-CUTOFF_RANGE, min(highest, CUTOFF_RANGE)))
-    points, moving, _ = fitted(best)
-    return points, fitted(best, whole=True)[0], usual * 2.0**best, fall / moving
+def _accelerations(parts: Array, step: float, cutoff: float) -> Array:
+    """Those of some points (F, P, 3), low-passed [m/s²]."""
+    _, _, acceleration = smooth_path(parts.reshape(len(parts), -1), step, min(cutoff, HIGHEST_CUTOFF / step))
+    return acceleration.reshape(parts.shape)
+
+
+def _independent(motion: CharacterMotion) -> float:
+    """Share of the low-passed frames that tell something new."""
+    return min(2 * _usual_cutoff(motion) * motion.frame_step, 1.0)
 
 
 def _cutoff_by_noise(path: Array, step: float, usual: float) -> float:
@@ -306,12 +350,13 @@ def _leak(body: BodyDynamics, step: float) -> int:
     return max(1, round(0.25 / (body.cutoff * step)))
 
 
-def _rate_of_fall(body: BodyDynamics, flying: Mask, gravity: float, edge: int) -> float:
+def _rate_of_fall(motion: CharacterMotion, body: BodyDynamics, flying: Mask) -> float:
     """Acceleration of the body in flight [m/s²]: gravity, unless the animation's time or size is another.
 
     A jump made by hand, retimed or put on a larger rig hangs in the air or drops like a stone. Its forces are those
     of the same motion at the time scale at which it falls with gravity.
     """
+    edge, gravity = _leak(body, motion.time_step), motion.gravity
     window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge, mode="edge"), 2 * edge + 1)
     inner = 1 - body.force[window.all(axis=1), 2]
     if not len(inner):

@@ -127,6 +127,12 @@ class MassPoints:
         """What the legs contribute to `centre`, (N, 3) [m]."""
         return (self.fractions * self.legs) @ self.positions
 
+    def legs_of_parts(self) -> NDArray[np.bool_]:
+        """Which parts are legs, (parts,)."""
+        legs = np.zeros(self.parts.max() + 1, dtype=bool)
+        legs[self.parts] = self.legs
+        return legs
+
     def part_centres(self) -> Array:
         """Centre of mass of each part, (N, parts, 3) [m]."""
         membership = np.eye(self.parts.max() + 1)[self.parts] * self.fractions[:, None]

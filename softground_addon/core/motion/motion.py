@@ -317,12 +317,12 @@ class CharacterMotion:
         """Scene frames in which this body does what an adult does in a second."""
         return self.frame_rate * self.time_scale
 
-    @property
+    @cached_property
     def on_frames(self) -> NDArray[np.bool_]:
         """Which samples are at scene frames (F,): between them a resampled motion is interpolated."""
         return np.abs((self.frames - self.frames[0] + 0.5) % 1.0 - 0.5) < 1e-6
 
-    @property
+    @cached_property
     def frame_step(self) -> float:
         """Time between the samples at scene frames [s]."""
         return dataclasses.replace(self, frames=self.frames[self.on_frames]).time_step

@@ -111,11 +111,14 @@ def cubic(samples: Array, position: Array, places: Array | None = None) -> Array
     if len(samples) < 2:
         return np.repeat(samples, len(position), axis=0)
     places = np.arange(len(samples), dtype=float) if places is None else places
-    index = np.clip(np.searchsorted(places, position, side="right") - 1, 0, len(places) - 2)
-    width = _over(places[index + 1] - places[index], samples)
+    index = np.maximum(np.searchsorted(places, position, side="right") - 1, 0)
+    if (places[index] == position).all():
+        return np.asarray(samples[index])
+    after = np.minimum(index + 1, len(places) - 1)
+    width = _over(np.where(after > index, places[after] - places[index], 1.0), samples)
     u = _over(position - places[index], samples) / width
     slope = np.gradient(samples, places, axis=0)
-    a, b, da, db = samples[index], samples[index + 1], slope[index] * width, slope[index + 1] * width
+    a, b, da, db = samples[index], samples[after], slope[index] * width, slope[after] * width
     return np.asarray(a + u * (da + u * (3 * (b - a) - 2 * da - db + u * (2 * (a - b) + da + db))))
 
 

@@ -73,9 +73,11 @@ def smooth_path(
         for offset, coefficient in enumerate((1.0, -2.0, 1.0)):
             right[offset : offset + count - 2, -1] += coefficient * pull
     position = solve_banded(band, right)
-    velocity = np.gradient(position, step, axis=0)
-    acceleration = np.empty_like(position)
-    acceleration[1:-1] = np.diff(position, 2, axis=0) / step**2
+    change = np.diff(position, axis=0) / step
+    velocity, acceleration = np.empty_like(position), np.empty_like(position)
+    velocity[[0, -1]] = change[[0, -1]]
+    velocity[1:-1] = (change[1:] + change[:-1]) / 2
+    acceleration[1:-1] = np.diff(change, axis=0) / step
     acceleration[0] = 2 * acceleration[1] - acceleration[2]
     acceleration[-1] = 2 * acceleration[-2] - acceleration[-3]
     return position, velocity, acceleration
