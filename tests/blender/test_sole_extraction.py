@@ -1,11 +1,13 @@
 """Soles come from the character's own feet."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
+from softground_addon.blender.characters.motion_assembly import _pointing
 from softground_addon.blender.characters.rig_mapping import SoleSource, map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.jobs import run
@@ -298,3 +300,11 @@ def test_a_shoe_whose_bone_is_gone_prints_no_more(scene):
     scene.collection.objects.link(shoe)
     shoe.parent, shoe.parent_type, shoe.parent_bone = armature, "BONE", "gone"
     assert [sole.sole.area for sole in sample(armature).soles] == bare
+
+
+@pytest.mark.parametrize(("seen", "across"), [(True, 0.04), (False, 0.02)])
+def test_a_foot_without_a_mesh_points_between_the_ball_on_its_outer_side_and_its_great_toe(seen, across):
+    foot = SimpleNamespace(ankle=np.zeros(3), hinge=np.array((0.11, 0.04, -0.07)), tip=np.array((0.15, 0.0, -0.03)))
+    ahead = _pointing(foot, np.array((0.0, 0.0, 1.0)), np.array((0.0, 1.0, 0.0)), 0.9, seen=seen)
+    assert ahead[1] == pytest.approx(across)
+    assert ahead[0] > 0.1

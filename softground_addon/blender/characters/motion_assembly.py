@@ -17,6 +17,7 @@ from ...core.soles.foot_attitude import (
     UP,
     FlatFoot,
     FootSize,
+    ends_in_toes,
     flat_foot,
     foot_size,
     planted_instants,
@@ -239,8 +240,8 @@ def _flat_feet(
     images = _mirror_images(feet)
     flats = []
     for place, foot in enumerate(feet):
-        trust = _REST_IS_FLAT if foot.source.name in modelled else 0.0
-        flats.append(_stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, trust_rest_within=trust))
+        seen = foot.source.name in modelled
+        flats.append(_stand(place, feet, planted, images[place], rest, facing=facing, leg=leg, seen=seen))
     return flats
 
 
@@ -253,9 +254,11 @@ def _stand(
     *,
     facing: Array,
     leg: float,
-    trust_rest_within: float,
+    seen: bool,
 ) -> FlatFoot:
     """How a foot stands, from its own planted instants and, reflected, from those of its mirror image.
+
+    A foot that is `seen` on a mesh and nearly flat at rest is flat there.
 
     It stands level in the world or, where the whole rig is tilted, level in the rig: whichever is nearer to how it
     stands at rest.
@@ -272,7 +275,7 @@ def _stand(
             return np.swapaxes(tilts[stands], -1, -2) @ turns[index][stands, :3, :3]
 
         mirrored = [levelled(other) @ mirror for other, mirror in images.items()]
-        return standing_up(levelled(place), mirrored, trust_rest_within=trust_rest_within)
+        return standing_up(levelled(place), mirrored, trust_rest_within=_REST_IS_FLAT if seen else 0.0)
 
     foot_motions, toe_motions = [other.motion for other in feet], [other.toe_motion for other in feet]
     levels = (np.broadcast_to(np.eye(3), rest.tilts.shape), rest.tilts)
@@ -280,7 +283,7 @@ def _stand(
     return flat_foot(
         foot.ankle,
         foot.hinge,
-        _pointing(foot, foot_up, facing, leg),
+        _pointing(foot, foot_up, facing, leg, seen=seen),
         foot_up=foot_up,
         toe_up=standing(toe_motions, tilts),
         toe_turns=np.swapaxes(foot.toe_motion[own, :3, :3], -1, -2) @ foot.motion[own, :3, :3],
@@ -294,12 +297,18 @@ _STEEPEST = np.cos(np.radians(18.0))
 """A foot bone closer than this to the vertical does not tell where the toes are."""
 
 
-def _pointing(foot: _Foot, up: Array, facing: Array, leg: float) -> Array:
-    """Direction of the toes in the rest pose; where the character faces if the foot bone is too short or too steep."""
+def _pointing(foot: _Foot, up: Array, facing: Array, leg: float, *, seen: bool = True) -> Array:
+    """Direction of the toes in the rest pose; where the character faces if the foot bone is too short or too steep.
+
+    Captures have the ball on the outer side of the foot as often as in its middle, and the tip on the great toe: a foot
+    that is not `seen` on a mesh points between the two, if the toes end about where they should.
+    """
     along = foot.hinge - foot.ankle
     length = float(np.linalg.norm(along))
     if length < _STUB * leg or abs(float(along @ up)) > _STEEPEST * length:
         return facing
+    if not seen and ends_in_toes(foot.ankle, foot.hinge, foot.tip, up):
+        return (foot.hinge + foot.tip) / 2 - foot.ankle
     return along
 
 

@@ -36,6 +36,8 @@ SLOW_CUTOFF = 4.0
 """Cut-off that shows how a body leans while it stands, in the same unit (2 Hz)."""
 CUTOFF_RANGE = 2.0
 """How far the motion may move the cut-off from there, down or up [octaves]."""
+CUTOFF_DEVIATION = 0.35
+"""Standard deviation of the cut-off that suits a motion with flights about the usual one [octaves]."""
 CUTOFF_STEP = 0.25
 """Steps of the search for it [octaves]."""
 HIGHEST_CUTOFF = 0.34
@@ -51,6 +53,8 @@ RATES_OF_FALL = (0.05, 3.0)
 """Slowest and fastest fall that is taken for a flight, in gravities: slow motion by 4 falls at 1/16."""
 EVEN_FALL = 0.35
 """A body falls evenly, and so in slow motion, where its acceleration varies by less than this part of itself."""
+STANDING = 0.2
+"""A sole stands while the body moves on over it: one of its points moves by less than this part of the body's way."""
 MOST_ROUNDS = 12
 """Rounds in which a body comes to fall freely where it would be pulled down."""
 MOST_PULLED = 0.2
@@ -135,7 +139,7 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
         return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
 
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
-    flying = flights(airborne, body, motion.time_step) if airborne is not None else np.zeros(0, dtype=bool)
+    flying = flights(airborne, body, motion) if airborne is not None else np.zeros(0, dtype=bool)
     if flying.any():
         fall = _rate_of_fall(motion, body, flying)
         cutoff = max(_cutoff_in_flight(motion, body, flying, fall, roughly=True), usual)
@@ -158,7 +162,7 @@ def with_flight(
     cutting the force off instead would leave it more than its weight on average. Where it would fall for most of its
     stances, and strike like a hammer between, it bobs less.
     """
-    flying = flights(airborne, body, motion.time_step)
+    flying = flights(airborne, body, motion)
     pulled = ~airborne & (body.force[:, 2] < 0)
     if not (flying.any() or pulled.any()):
         return body
@@ -255,7 +259,8 @@ def _cutoff_in_flight(
         falling = np.zeros((flying.sum(), *parts.shape[1:]))
         for some, factor in passes:
             falling[:, some] = _accelerations(parts[:, some], step, factor * cutoff)[flying]
-        return fitted_to_free_fall(body.points, falling, fall, independent=_independent(motion), whole=False)[2]
+        _, _, misfit = fitted_to_free_fall(body.points, falling, fall, independent=_independent(motion), whole=False)
+        return misfit + (octaves / CUTOFF_DEVIATION) ** 2
 
     start = np.log2(body.cutoff / usual)
     stride = 2 * CUTOFF_STEP if roughly else CUTOFF_STEP
@@ -321,22 +326,35 @@ def _downhill(score: Callable[[float], float], start: float, stride: float, limi
     return best
 
 
-def flights(airborne: Mask, body: BodyDynamics, step: float) -> Mask:
-    """Those of the stretches without contact `airborne` (N,) in which the body falls, `step` [s] apart.
+def flights(airborne: Mask, body: BodyDynamics, motion: CharacterMotion) -> Mask:
+    """Those of the stretches without contact `airborne` (N,) in which the body falls.
 
     Either it asks for little force, or it falls slowly but evenly, as in slow motion. A body borne by feet that float
-    does neither.
+    does neither, but for one that walks: over a foot it falls as evenly, and that foot stays where it is.
     """
     flying = airborne.copy()
-    edge, fall = _leak(body, step), 1 - body.force[:, 2]
+    edge, fall = _leak(body, motion.time_step), 1 - body.force[:, 2]
     first, last = runs(airborne)
     free = _sums(fall, first, last) > (1 - FREE_FALL) * (last - first)
     long = last - first > 3 * edge
     begin, end = np.where(long, first + edge, first), np.where(long, last - edge, last)
     mean, square = (_sums(values, begin, end) / (end - begin) for values in (fall, fall**2))
     even = long & (mean > RATES_OF_FALL[0]) & (square - mean**2 < (EVEN_FALL * mean) ** 2)
+    slow = np.flatnonzero(even & ~free)
+    even[slow] = ~_walks_over(motion, first[slow], last[slow] - 1)
     flying[airborne] = np.repeat(free | even, last - first)
     return flying
+
+
+def _walks_over(motion: CharacterMotion, first: NDArray[np.intp], last: NDArray[np.intp]) -> Mask:
+    """Whether the body moves on from step `first` to `last` (I,) while a point of some sole hardly does, (I,)."""
+    if not len(first):
+        return np.zeros(0, dtype=bool)
+    hips = motion.hips
+    travelled = np.linalg.norm((hips[last] - hips[first])[:, :2], axis=1)
+    points = [sole.landmark_positions() for sole in motion.soles]
+    moved = np.stack([np.linalg.norm(path[last] - path[first], axis=-1).min(axis=1) for path in points], axis=1)
+    return np.asarray(moved.min(axis=1) < STANDING * travelled)
 
 
 def _sums(values: Array, first: NDArray[np.intp], last: NDArray[np.intp]) -> Array:

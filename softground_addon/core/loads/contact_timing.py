@@ -96,7 +96,7 @@ def refine_contacts(motion: CharacterMotion, contacts: Contacts, body: BodyDynam
         Of that motion, before anything is known about flight.
     """
     unit = motion.pendulum_time / motion.time_step
-    flying = flights(~contacts.touching.any(axis=1), body, motion.time_step)
+    flying = flights(~contacts.touching.any(axis=1), body, motion)
     touching = _supported(motion, contacts, np.where(flying, 0.0, body.force[:, 2]))
     for sole in range(touching.shape[1]):
         touching[:, sole] = close_short(touching[:, sole], round(SHORTEST_SUPPORT * unit))

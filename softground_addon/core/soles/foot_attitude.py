@@ -52,6 +52,11 @@ _TIP_TRUST = (0.8, 1.3)
 bones are often made up by importers."""
 
 
+_TIP_POINTS = (0.7, 1.3)
+"""The same within which the tip tells where the foot points: the last marker of a capture is on the toes, not before
+them."""
+
+
 def planted_instants(
     feet: Sequence[Array], *, frame_rate: float, leg_length: float, gravity: float = 9.81
 ) -> list[NDArray[np.bool_]]:
@@ -263,6 +268,26 @@ def foot_size(flat: FlatFoot, *, ankle_tip: Array, ball: Array | None, leg: floa
     depth = -float(tip[2] if joint is None else min(joint[2], tip[2]))
     low, high = _ANKLE_HEIGHTS
     return FootSize(length, depth if low * length <= depth <= high * length else ANKLE_HEIGHT * length)
+
+
+def ends_in_toes(ankle: Array, ball: Array, tip: Array, up: Array) -> bool:
+    """Whether the last bone of a foot ends about where the toes of a foot with that ankle and ball do.
+
+    Parameters
+    ----------
+    ankle, ball, tip : (3,) float arrays
+        In the rest pose [m].
+    up : (3,) float array
+        World up while standing, in the rest pose.
+    """
+    reach, bend = (point - ankle - ((point - ankle) @ up) * up for point in (tip, ball))
+    length = float(np.linalg.norm(reach))
+    if length == 0:
+        return False
+    from_tip = length / (1 - ANKLE_POSITION)
+    from_ball = float(bend @ reach) / length / (BALL_POSITION - ANKLE_POSITION)
+    low, high = _TIP_POINTS
+    return from_ball > 0 and low < from_tip / from_ball < high
 
 
 def _foot_length(ankle_to_ball: float | None, ankle_to_tip: float, leg: float) -> float:

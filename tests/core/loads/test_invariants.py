@@ -123,6 +123,22 @@ def test_slow_motion_weighs_what_the_body_weighs(name, slowed):
     assert_sound(loads)
 
 
+@pytest.mark.parametrize("float_height", [0.03, 0.06])
+@pytest.mark.parametrize("rate", [30.0, 60.0, 120.0])
+def test_a_walk_over_a_foot_that_floats_for_a_step_does_not_fly(rate, float_height):
+    """Over its foot a walking body falls slowly and evenly, as in a flight in slow motion."""
+    motion, forces = motion_and_forces(GAITS["walk"], rate=rate, seconds=4.0)
+    first, last = (ends[1] for ends in runs(forces[:, 0, 2] > 0))
+    reach = round(0.05 * rate)
+    left = motion.soles[0].transforms.copy()
+    left[first - reach : last + reach, :, 2, 3] += float_height
+    loads = loads_of(replace(motion, soles=(replace(motion.soles[0], transforms=left), motion.soles[1])))
+    step = (len(loads.motion.frames) - 1) // (len(motion.frames) - 1)
+    error = (loads.forces.total[::step] - forces.sum(axis=1))[:, 2] / spring_mass.WEIGHT
+    assert np.sqrt((error**2).mean()) < 0.05
+    assert_sound(loads)
+
+
 @pytest.mark.parametrize("slowed", [1.0, 1.5, 2.0, 3.0, 4.0])
 def test_flights_stay_flights_in_slow_motion_and_forces_what_they_were(slowed):
     motion, forces = at_pace("run", slowed)

@@ -5,6 +5,7 @@ import pytest
 
 from softground_addon.core.soles.foot_attitude import (
     FlatFoot,
+    ends_in_toes,
     flat_foot,
     foot_size,
     planted_instants,
@@ -162,3 +163,20 @@ def test_stubs_take_the_size_that_fits_the_leg():
     size = foot_size(flat_at(0.0), ankle_tip=np.array((0.001, 0, 0)), ball=None, leg=0.884)
     assert size.length == pytest.approx(0.2737, rel=0.01)
     assert 0.05 < size.ankle_height < 0.1
+
+
+@pytest.mark.parametrize(
+    ("tip", "told"),
+    [
+        ((0.2, 0.0, -0.05), True),  # straight ahead
+        ((0.15, -0.03, -0.02), True),  # on the great toe, with the ball on the outer side
+        ((0.15, 0.0, 0.3), True),  # heights do not matter
+        ((0.12, 0.0, -0.07), False),  # a stub
+        ((0.6, 0.0, -0.07), False),  # made up by an importer
+        ((-0.1, 0.0, -0.07), False),
+        ((0.0, 0.0, 0.2), False),
+    ],
+)
+def test_a_tip_tells_where_a_foot_points_if_toes_end_there(tip, told):
+    ankle, ball = np.zeros(3), np.array((0.11, 0.04, -0.07))
+    assert ends_in_toes(ankle, ball, np.array(tip), np.array((0.0, 0.0, 1.0))) == told
