@@ -39,8 +39,11 @@ FACTORS = (0.7, 0.85, 1.0, 1.2, 1.4)
 SOIL = GroundMaterial(youngs_modulus=1e6, poisson_ratio=0.3, characteristic_time=0.1)
 MODULES = (body_dynamics, centre_of_mass, centre_of_pressure, contact_timing, contacts, load_sharing)
 CONSTANTS: dict[ModuleType, tuple[str, ...]] = {
-    body_dynamics: ("CUTOFF", "FIRST_PASS", "LAST_PASS", "BOTH_PASSES", "LAG", "SLOW_CUTOFF", "STEADY_ENDS"),
-    centre_of_mass: ("_FRACTION_DEVIATION", "_FALL_DEVIATION"),
+    body_dynamics: (
+        *("CUTOFF", "CUTOFF_DEVIATION", "FIRST_PASS", "LAST_PASS", "BOTH_PASSES"),
+        *("LAG", "SLOW_CUTOFF", "STANDING", "STEADY_ENDS"),
+    ),
+    centre_of_mass: ("_FRACTION_DEVIATION", "_MOVING", "_MOVING_DEVIATION", "_FALL_DEVIATION"),
     centre_of_pressure: ("PRESSED_DEPTH",),
     contacts: (
         *("TOUCH_HEIGHT", "LEAVE_HEIGHT", "TOUCH_SPEED", "TOUCH_SHARE", "LANDED_HEIGHT", "REST_SPEED", "EDGE_SEARCH"),
