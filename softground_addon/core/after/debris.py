@@ -44,6 +44,9 @@ PUSH_DEPTH = 2e-3
 """Thickness of the ground that a sole drags off which pushes or slides harder than the ground can bear [m]."""
 PUSHING = 0.25
 """Time before a sole leaves in which it pushes off [s]."""
+PRESSED = 0.1
+"""Below this load the direction of an estimated force tells nothing, in body weights: both its parts are what the
+low-pass leaves."""
 PUSH_SPEED, PUSH_ANGLES = 0.7, (30.0, 50.0)
 """Speed of what it throws over its own, and between which angles [deg]."""
 SHEDDING = 0.2
@@ -284,11 +287,15 @@ def _rows(loads: CharacterLoads, sole: int, steps: NDArray[np.intp], weights: Ar
 
 
 def _slid(loads: CharacterLoads, phase: Phase, steps: NDArray[np.intp], matter: ThrownMatter) -> Array:
-    """How far a sole slides in each step as it pushes along the ground harder than that can bear, (K,) [m]."""
+    """How far a sole slides in each step as it pushes along the ground harder than that can bear, (K,) [m].
+
+    Where it hardly presses, the direction of its force tells nothing.
+    """
     normal, force = loads.contacts.normal[steps, phase.sole], loads.forces.forces[steps, phase.sole]
     pressing = np.einsum("ni,ni->n", force, normal)
     along = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
-    slips = (pressing > 0) & (along > np.tan(np.radians(matter.repose)) * pressing)
+    loaded = pressing > PRESSED * loads.motion.mass * loads.motion.gravity
+    slips = loaded & (along > np.tan(np.radians(matter.repose)) * pressing)
     return np.asarray(phases.slide_speed(loads, phase.sole)[steps] * slips * loads.motion.time_step)
 
 
