@@ -30,7 +30,7 @@ Reports = list[tuple[Literal["INFO", "WARNING"], str]]
 
 
 class SOFTGROUND_OT_add_character(Reading):
-    """Add the selected characters: feet, hips and limbs are recognized from the skin, the bone names or the rest
+    """Add the selected characters: feet, hips and limbs are recognised from the skin, the bone names or the rest
     pose. Selected objects without a rig are added as props that fall, roll or slide. Esc cancels"""
 
     bl_idname = "softground.add_character"
