@@ -169,6 +169,19 @@ def test_negative_frames_are_written_where_that_can_be_and_refused_where_not(sce
     assert [path.name for path in tmp_path.iterdir()] == ["ground.abc"]
 
 
+@pytest.mark.parametrize("kind", ["abc", "usdc", "obj"])
+def test_the_export_is_the_only_file_whatever_the_world_looks_like(scene, ground, tmp_path, kind):
+    """Blender's USD exporter makes the world a light, with an image of its colour in a folder beside the file."""
+    scene.world = bpy.data.worlds.new("Grey")
+    scene.world.use_nodes = True
+    path = tmp_path / f"ground.{kind}"
+    if kind == "obj":
+        exports.export_final(scene, ground, path)
+    else:
+        {"abc": exports.export_alembic, "usdc": exports.export_usd}[kind](scene, ground, path, *FRAMES)
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize("export", [exports.export_alembic, exports.export_usd])
 def test_exporters_leave_selection_and_frames_as_they_were(scene, ground, tmp_path, export):
     scene.frame_set(7, subframe=0.25)

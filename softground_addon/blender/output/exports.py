@@ -123,6 +123,7 @@ def export_usd(scene: bpy.types.Scene, ground: bpy.types.Object, path: Path, sta
             "export_animation": True,
             "export_shapekeys": False,  # else the finished ground is written, with nothing that moves
             "export_materials": False,
+            "convert_world_material": False,  # else the world comes along as a light, with an image beside the file
             "export_custom_properties": False,
         }
         _run(bpy.ops.wm.usd_export, partial, path, **options)
