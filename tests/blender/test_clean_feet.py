@@ -350,6 +350,10 @@ def test_legs_that_end_in_shins_are_found_by_the_bones_on_which_they_stand(scene
     assert legs_on_shins(armature, [numbers["hips"], *hands]) == {}
 
 
+def test_what_goes_on_below_is_no_shin_on_which_a_leg_ends(scene):
+    assert legs_on_shins(shots.walker(scene), ["shin.L", "shin.R"]) == {}
+
+
 def test_legs_that_end_in_shins_are_keyed_by_their_bones_and_not_by_ik_that_cannot_turn_them(scene):
     armature, numbers = without_feet(scene)
     legs = legs_on_shins(armature, [numbers["shin.L"], numbers["shin.R"]])

@@ -137,12 +137,12 @@ def legs_on_shins(armature: bpy.types.Object, soles: Sequence[str]) -> Joints:
     """Hips and knees of the hindmost legs that stand on the ends of their shins, as of figures made of blocks; empty if
     there are none.
 
-    Such a leg is two bones below where it parts from its mirror image; where arms are too, legs begin lower.
+    Such a leg is the last two bones below where it parts from its mirror image; where arms are too, legs begin lower.
     """
     skeleton = _read_skeleton(armature)
-    chains = [skeleton.chain(bone) for bone in range(len(skeleton.names))]
+    chains = [skeleton.chain(leaf) for leaf in skeleton.leaves]
     pairs = []
-    for one in (chains[skeleton.names.index(sole)] for sole in soles if sole in skeleton.names):
+    for one in (chain for chain in chains if skeleton.names[chain[-1]] in soles):
         for other in (chain for chain in chains if len(chain) == len(one)):
             fork = _shared_length(one, other)
             if len(one) - fork == 2 and _are_mirrored(skeleton, one[fork:], other[fork:]):
