@@ -22,7 +22,7 @@ CELL_SIZE: float | None = None
 PRESET = "Snow"
 SOFTER = "2.2e5"
 """Young's modulus for prints of a hand's breadth [Pa]."""
-FRAMES, SHOWN = 72, 53
+FRAMES, SHOWN = 72, 60
 PICTURE = (960, 540)
 
 MOMENTS, HOLD = 32, 900
@@ -49,7 +49,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     scene.frame_start, scene.frame_end = 1, FRAMES
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     scene.camera = stage.add_camera(scene, "Beside the Boots", lens=34.0)
-    stage.aim(scene.camera, (1.30, -1.34, 0.80), (-0.04, -0.84, 0.10))
+    stage.aim(scene.camera, (1.22, -1.50, 0.66), (-0.02, -1.00, 0.13))
     chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "400000"}
     chosen |= {"material.youngs_modulus": SOFTER, "sink_feet": "true", "ground_margin": "4.0"} | dict(options or {})
     bake = production.bake(scene, [Walker(walker, body.mass)], PRESET, cell_size, options=chosen)
@@ -72,7 +72,7 @@ def shoot(_built: BeforeAfter, folder: Path, samples: int) -> list[Path]:
     """The same frame without and with the layer, and the wipe between them."""
     scene = bpy.context.scene
     stage.add_sun(scene, radians(65), radians(17))
-    scene.view_settings.exposure = -0.5
+    scene.view_settings.exposure = -0.4
     scene.frame_set(SHOWN)
     pictures = []
     for name, strength in (("before", 0.0), ("after", 1.0)):

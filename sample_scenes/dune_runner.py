@@ -21,7 +21,7 @@ PRESET = "Dry Sand"
 SPEED = 4.2  # m/s
 FRAMES = 76
 START = 9.5  # m along y; the run is toward -y, and toward the camera
-STEP, AFTER = -3, 2.0  # the step that is seen, and frames from its strike to the picture
+STEP, AFTER = -3, 3.0  # the step that is seen, and frames from its strike to the picture
 PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.35, hills=9.0, seed=11)
 
@@ -56,9 +56,10 @@ def shoot(built: DuneRunner, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would lie in the sand, just after a strike, with the sun behind the runner."""
     scene = bpy.context.scene
     step = built.bakes[PRESET].footprints[STEP]
-    scene.frame_set(round(step.start_frame + AFTER))
-    stage.aim(scene.camera, step.position + np.array((0.62, -1.30, 0.17)), step.position + np.array((0.10, 0.4, 0.235)))
-    open_air.add_low_sun(scene, radians(-72), radians(12), (1.0, 0.76, 0.52), 6.5, 0.26)
+    moment = step.start_frame + AFTER
+    scene.frame_set(int(moment), subframe=moment % 1.0)
+    stage.aim(scene.camera, step.position + np.array((0.60, -1.22, 0.28)), step.position + np.array((0.08, 0.2, 0.165)))
+    open_air.add_low_sun(scene, radians(-72), radians(12), (1.0, 0.76, 0.52), 6.5, 0.36)
     scene.view_settings.exposure, scene.render.image_settings.quality = 0.35, 85
     path = folder / "dune_runner.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
