@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from ..pressing.sole_points import SolePoints, sole_points
 from ..pressing.solver import GroundSolver
 from ..record.contact_steps import PressingSole, Steps
 from ..record.edits import UNCHANGED, StepEdit, edits_by_number, feet, sole_of
-from ..record.footprints import QUANTUM, Footprint
+from ..record.footprints import QUANTUM, Changes, Footprint
 from ..record.mesh_sole import MeshSole
 from ..record.record import BakeRecord
 from .edited_contacts import edited_contact
@@ -95,6 +95,8 @@ class EditedSteps:
         self._scaled: dict[tuple[int, float], PressingSole] = {}
         self._layouts: dict[Change, _Layout] = {}
         """Of the group that was pressed last: they take memory."""
+        self._unpacked: dict[int, _Baked] = {}
+        """Prints around the steps that were pressed last, which a step that is dragged meets again and again."""
         self._known: dict[frozenset[Change], _Group] = {}
         self._met: dict[frozenset[frozenset[Change]], bool] = {}
         self._windows = np.array([footprint.window for footprint in footprints]).reshape(-1, 4)
@@ -219,16 +221,17 @@ class EditedSteps:
     def _changed_cells(self, number: int, after: Footprint | None) -> Keys:
         """Cells in which the print of a step differs visibly from that of the bake."""
         either = self._ground.material.repose_angle or self._ground.weathering
-        quantities = ("compression", "rim") if either else ("compression",)
         before, window = self._before(number), self._baked(number).window
         window = window.union(after.window) if after else window
-        differs = np.zeros((window.rows, window.columns), bool)
-        for quantity in quantities:
-            difference = np.zeros(differs.shape)
-            for one, sign in ((before, -1.0), (after, 1.0)):
-                if one is not None:
-                    difference[window.slices(one.window)] += sign * one.tile(getattr(one, quantity))
-            differs |= np.abs(difference) > VISIBLE
+        difference = np.zeros((2 if either else 1, window.rows, window.columns))
+        if before is not None:
+            unpacked = self._unpacked.get(number) or _Baked(before)
+            for of_quantity, quantity in zip(difference, ("compression", "rim"), strict=False):
+                of_quantity[window.slices(before.window)] -= getattr(unpacked, quantity)
+        if after is not None:
+            for of_quantity, changes in zip(difference, (after.compression, after.rim), strict=False):
+                of_quantity[window.slices(after.window)] += after.tile(changes)
+        differs = (np.abs(difference) > VISIBLE).any(axis=0)
         if self._ground.weathering and not _at_once(before, after):  # of other age, whatever its depth
             for one in (before, after):
                 if one is not None:
@@ -289,7 +292,9 @@ class EditedSteps:
         for column, row, columns, rows in windows:
             near |= (low < (column + columns, row + rows)).all(axis=1) & (low + size > (column, row)).all(axis=1)
         near &= self._frames[:, 0] <= end
-        return [_Baked(self._footprints[n]) for n in np.flatnonzero(near).tolist() if n not in members]
+        around = np.flatnonzero(near).tolist()
+        self._unpacked = {n: self._unpacked.get(n) or _Baked(self._footprints[n]) for n in around}
+        return [baked for n, baked in self._unpacked.items() if n not in members]
 
     def _layout(self, change: Change) -> _Layout:
         if change not in self._layouts:
@@ -399,12 +404,29 @@ def _grid(footprint: Footprint) -> _Grid:
 
 
 class _Baked:
-    """A print that stays as it was baked, frame by frame."""
+    """A print as it was baked, frame by frame; what is looked at of it is unpacked once."""
 
     def __init__(self, footprint: Footprint) -> None:
-        self._footprint, self._pressing = footprint, footprint.pressing
-        changes = (footprint.compression, footprint.rim)
-        self._changes = [(one.frames, one.first, one.cells, one.amounts) for one in changes]
+        self._footprint = footprint
+
+    @cached_property
+    def compression(self) -> Array:
+        """All that it compressed, (rows, columns) of its window [m]."""
+        return self._footprint.tile(self._footprint.compression)
+
+    @cached_property
+    def rim(self) -> Array:
+        """All that it raised, (rows, columns) of its window [m]."""
+        return self._footprint.tile(self._footprint.rim)
+
+    @cached_property
+    def _pressing(self) -> Changes:
+        return self._footprint.pressing
+
+    @cached_property
+    def _changes(self) -> list[tuple[Array, NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]]:
+        both = (self._footprint.compression, self._footprint.rim)
+        return [(one.frames, one.first, one.cells, one.amounts) for one in both]
 
     def until(self, frame: float) -> tuple[Window, Array] | None:
         """All that it changed up to a recorded frame."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,3 +164,9 @@ class Imprints:
     def end(self) -> int:
         """The step after the last."""
         return self.first + len(self.pressing) // self.parts
+
+    @cached_property
+    def placed(self) -> NDArray[np.bool_]:
+        """Steps at which there is room for the displaced volume, (N,)."""
+        room: NDArray[np.bool_] = self.rim.any(axis=(1, 2))
+        return room

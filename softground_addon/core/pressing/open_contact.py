@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ground.heightfield import SparseGrid
+from ..ground.heightfield import SparseGrid, Surface
 from ..record.contact_steps import ContactSteps
 from ..record.footprints import Footprint, FootprintRecorder
 from .contact_layout import ContactLayout
@@ -33,6 +33,8 @@ class OpenContact:
         What it compressed itself [m], kept where the ground hardens.
     met : Imprints or None
         Those of which it was last seen what weather had left there.
+    surface : Surface or None
+        The undisturbed ground around it, where it slides.
     level : float
         Height of the open ground as it began, over that without weather [m].
     compressed, raised, unplaced : float
@@ -50,6 +52,7 @@ class OpenContact:
         self.recorder: FootprintRecorder | None = None
         self.compression: SparseGrid | None = None
         self.met: Imprints | None = None
+        self.surface: Surface | None = None
         self.level = 0.0
         self.compressed = self.raised = self.unplaced = 0.0
         self._load = self._area = self._sinkage = 0.0

@@ -151,9 +151,9 @@ def _fitted(
     Moments are those of what the pressure is off the even one. An even pressure has none about the middle of the
     contact, but about that of a few of its points: where the force is hardly off the middle, they could not bear it.
     """
-    scale = np.sqrt(np.einsum("nii->ni", spread))
-    damping = np.full(len(field), 1e-3)
-    best, least = field, np.full(len(field), np.inf)
+    fitted, rows, scale = field.copy(), np.arange(len(field)), np.sqrt(np.einsum("nii->ni", spread))
+    damping, best, least = np.full(len(field), 1e-3), field, np.full(len(field), np.inf)
+    kept_system, kept_miss = spread, wanted
     for _ in range(MOST_ROUNDS):
         load = _pressure(field, x, y, highest)
         free = (load > 0) & (load < highest.astype(np.float32)[:, None])
@@ -163,22 +163,26 @@ def _fitted(
         miss += field * (0.0, blunt, blunt) + (1.0, 0.0, 0.0) - wanted
         error = np.abs(miss / scale).max(axis=1)
         # A step that led further off is taken back and tried again, shorter.
-        better = (error < least)[:, None]
-        best, least = np.where(better, field, best), np.minimum(error, least)
-        if (least <= CLOSE).all():
-            break
-        system = _moments(free * share, x, y) + np.diag([0.0, blunt, blunt])
-        if better.all():
-            kept_system, kept_miss = system, miss
-        else:
-            kept_system = np.where(better[..., None], system, kept_system)
-            kept_miss = np.where(better, miss, kept_miss)
-        damping = np.where(better[:, 0], np.maximum(damping / 10, 1e-3), damping * 10)
-        damped = kept_system + damping[:, None, None] * np.eye(3) * scale[:, :, None] ** 2
-        step = np.linalg.solve(damped, kept_miss[..., None])[..., 0]
+        better = error < least
+        best, least = np.where(better[:, None], field, best), np.minimum(error, least)
         # Those that are there stay, so that none depends on which others are fitted with it.
-        field = np.where((least > CLOSE)[:, None], best - step, best)
-    return best
+        fitted[rows] = best
+        off = least > CLOSE
+        if not off.any():
+            break
+        if not off.all():
+            rows, free, better = rows[off], free[off], better[off]
+            x, y, share = x[off], y[off], share[off]
+            wanted, highest, scale, damping = wanted[off], highest[off], scale[off], damping[off]
+            best, least, miss = best[off], least[off], miss[off]
+            kept_system, kept_miss = kept_system[off], kept_miss[off]
+        system = _moments(free * share, x, y) + np.diag([0.0, blunt, blunt])
+        kept_system = np.where(better[:, None, None], system, kept_system)
+        kept_miss = np.where(better[:, None], miss, kept_miss)
+        damping = np.where(better, np.maximum(damping / 10, 1e-3), damping * 10)
+        damped = kept_system + damping[:, None, None] * np.eye(3) * scale[:, :, None] ** 2
+        field = best - np.linalg.solve(damped, kept_miss[..., None])[..., 0]
+    return fitted
 
 
 def _pressure(field: Array, x: Single, y: Single, highest: Array) -> Single:

@@ -65,15 +65,22 @@ def rim_weights(
     return np.divide(weights, total, out=weights, where=total > 0)
 
 
-def _leaning(coverage: Fraction, toward: Array) -> Array:
-    """1 + b·cos(theta) of each cell, (N, rows, columns), seen from the middle of the contact."""
+def _leaning(coverage: Fraction, toward: Array) -> Fraction:
+    """1 + b·cos(theta) of each cell, (N, rows, columns), seen from the middle of the contact; 32 bits suffice."""
     _, rows, columns = coverage.shape
     total = np.maximum(coverage.sum(axis=(1, 2), dtype=np.float64), 1e-300)
     x = np.arange(columns) - (coverage.sum(axis=1) @ np.arange(columns) / total)[:, None]
     y = np.arange(rows) - (coverage.sum(axis=2) @ np.arange(rows) / total)[:, None]
-    along = toward[:, 0, None, None] * x[:, None, :] + toward[:, 1, None, None] * y[:, :, None]
-    distance = np.hypot(x[:, None, :], y[:, :, None])
-    leaning: Array = 1.0 + along / np.maximum(distance, 1e-9)
+    (x_squared, along_x), (y_squared, along_y) = (
+        ((offset**2).astype(np.float32), (toward[:, axis, None] * offset).astype(np.float32))
+        for axis, offset in enumerate((x, y))
+    )
+    distance = x_squared[:, None, :] + y_squared[:, :, None]
+    np.sqrt(distance, out=distance)
+    np.maximum(distance, np.float32(1e-9), out=distance)
+    leaning = along_x[:, None, :] + along_y[:, :, None]
+    leaning /= distance
+    leaning += np.float32(1.0)
     return leaning
 
 

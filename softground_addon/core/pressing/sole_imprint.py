@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..ground.heightfield import Surface
 from ..motion.motion import Sole, SolePatch
-from ..soles.patch_maps import Nodes, Single, covered_fraction
+from ..soles.patch_maps import Nodes, Single, covered_fraction, distance_beyond
 from .deformation import touching_fraction
 from .sole_points import FAR, LEAST_FACING, TOLERANCE, WALL, has_steps
 
@@ -142,7 +142,9 @@ def _underside(
         v -= shift[1] * height
     nodes = Nodes.under(patch, u, v)
     distance = nodes.interpolate(patch.signed_distance)
-    distance += nodes.beyond
+    edge = min(float(patch.signed_distance[ends].min()) for ends in (np.s_[[0, -1]], np.s_[:, [0, -1]]))
+    if edge < 0.5 * cell_size:  # else no cell beyond the maps is covered
+        distance += distance_beyond(patch, u, v)
     along_u, along_v, along_h = rotation[:, 2].T.astype(np.float32)[..., None]
     height = nodes.interpolate(patch.heights)
     height *= along_h

@@ -8,19 +8,22 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ground.heightfield import HeightField, SparseGrid, Surface, Window
+from ..ground.heightfield import HeightField, SparseGrid, Window
 from ..ground.material import GroundMaterial
 from ..ground.soft_ground import SoftGround
 from ..record.footprints import FootprintRecorder, quantised
 from .deformation import compress
 from .ground_cells import GroundCells, Imprints, Timing, UndisturbedCells
 from .open_contact import OpenContact
-from .repose import SWEEPS_PER_STEP, SWEEPS_TO_REST, slid, slide_reach
+from .repose import STEPS_PER_SLIDE, SWEEPS_PER_SLIDE, SWEEPS_TO_REST, slid, slide_reach
 from .rim import displaced_volume
 from .weathered_cells import WeatheredCells
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+ROOM = 16
+"""Cells around those that slide whose undisturbed surface is looked up along with theirs: more slide later."""
 
 
 class GroundSolver:
@@ -85,12 +88,13 @@ class GroundSolver:
         """Let slide what a contact that has ended left too steep; where the ground may have changed by that."""
         if not self.material.repose_angle or contact.recorder is None:
             return ()
-        window, surface = self._around(contact.recorder.window)
+        window = self._around(contact.recorder.window)
         state = self.state.read(window)
         before = quantised(state)
         lowered = self._lowered(window, contact)
         state[0] += lowered
-        state[1] = self._slid(state, surface, ~surface.bears, SWEEPS_TO_REST)
+        terrain, bears = self._undisturbed(contact, window)
+        state[1] = self._slid(state, window, terrain, ~bears, SWEEPS_TO_REST)
         state[0] -= lowered
         change = quantised(state) - before
         if not change.any():
@@ -107,9 +111,8 @@ class GroundSolver:
         if not len(steps):
             return []
         self._meet(contact, imprints, frame, timing)
-        material, window, surface = self.material, imprints.window, None
-        if material.repose_angle:
-            window, surface = self._around(imprints.window)
+        material = self.material
+        window = self._around(imprints.window) if material.repose_angle else imprints.window
         whole = self.state.read(window)
         before = quantised(whole)
         inside = window.slices(imprints.window)
@@ -119,7 +122,6 @@ class GroundSolver:
         compacted = self._compacted_before(contact, imprints.window, state) if material.hardening else None
         heights, displaced = np.zeros(len(steps)), np.zeros(len(steps))
         found = state[0].copy()
-        rim = imprints.rim[steps].reshape(len(steps), -1)
         for k, step in enumerate(steps):
             compression = compress(
                 state[0],
@@ -132,19 +134,19 @@ class GroundSolver:
             )
             newly = compression - state[0]
             heights[k] = newly.sum()
-            if imprints.factors is None:
-                displaced[k] = displaced_volume(heights[k], material)
-            else:
-                displaced[k] = displaced_volume(newly, material, imprints.factors.rim).sum()
-            state[0] = compression
-            if surface:
-                state[1] += (displaced[k] * rim[k]).reshape(state[1].shape)
-                fixed = ~surface.bears
+            if heights[k] > 0:
+                if imprints.factors is None:
+                    displaced[k] = displaced_volume(heights[k], material)
+                else:
+                    displaced[k] = displaced_volume(newly, material, imprints.factors.rim).sum()
+                state[0] = compression
+                state[1] += displaced[k] * imprints.rim[step]
+            number = imprints.first + step // imprints.parts - contact.layout.first
+            if material.repose_angle and number % STEPS_PER_SLIDE == 0:
+                terrain, bears = self._undisturbed(contact, window)
+                fixed = ~bears
                 fixed[inside] |= imprints.contact[step]
-                whole[1] = self._slid(whole, surface, fixed, SWEEPS_PER_STEP)
-        rise = displaced @ rim
-        if not surface:
-            state[1] += rise.reshape(state[1].shape)
+                whole[1] = self._slid(whole, window, terrain, fixed, SWEEPS_PER_SLIDE)
         if contact.compression is not None and compacted is not None:
             contact.compression.write(imprints.window, (state[0] - compacted)[None])
         if self.weathered:
@@ -154,15 +156,16 @@ class GroundSolver:
         contact.add_loads(imprints, first, last)
         cell_area = self.cell_size**2
         contact.compressed += float(heights.sum()) * cell_area
-        contact.raised += float(rise.sum()) * cell_area
-        contact.unplaced += float(displaced[~rim.any(axis=1)].sum()) * cell_area
+        placed = imprints.placed[steps]
+        contact.raised += float(displaced[placed].sum()) * cell_area
+        contact.unplaced += float(displaced[~placed].sum()) * cell_area
         if contact.recorder is None:
             contact.recorder = FootprintRecorder(self.cell_size, timing.frame_step)
         touched = np.zeros(whole.shape[1:], bool)
         touched[inside] = imprints.contact[steps].any(axis=0)
         self._record(contact.recorder, frame, window, quantised(whole) - before, touched)
         self.contact.append((window, touched))
-        return [window] if surface else []
+        return [window] if material.repose_angle else []
 
     def _meet(self, contact: OpenContact, imprints: Imprints, frame: float, timing: Timing) -> None:
         """Let a contact find under new imprints what weather has left by the frame before."""
@@ -199,22 +202,27 @@ class GroundSolver:
             contact.compression = SparseGrid(self.cell_size, channels=1)
         return np.maximum(state[0] - contact.compression.read(window)[0], 0.0)
 
-    def _around(self, window: Window) -> tuple[Window, Surface]:
+    def _around(self, window: Window) -> Window:
         """A window with the ground around it that may slide with it."""
         compression, rim = self.state.read(window)
-        reach = slide_reach(rim, compression, self.material.repose_angle, self.cell_size)
-        wider = window.expanded(reach)
-        return wider, self.cells.surface(wider)
+        return window.expanded(slide_reach(rim, compression, self.material.repose_angle, self.cell_size))
 
-    def _slid(self, state: Array, surface: Surface, fixed: NDArray[np.bool_], sweeps: int) -> Array:
+    def _undisturbed(self, contact: OpenContact, window: Window) -> tuple[Array, Mask]:
+        """Heights of the undisturbed ground, and what of it bears, over a window around a contact."""
+        if contact.surface is None or contact.surface.window.union(window) != contact.surface.window:
+            contact.surface = self.cells.surface(window.expanded(ROOM))
+        inside = contact.surface.window.slices(window)
+        return contact.surface.heights[inside], contact.surface.bears[inside]
+
+    def _slid(self, state: Array, window: Window, terrain: Array, fixed: Mask, sweeps: int) -> Array:
         """The rim of a window after what is too steep has slid down."""
         return slid(
             state[1],
             state[0],
-            surface.heights,
+            terrain,
             angle=self.material.repose_angle,
             cell_size=self.cell_size,
             fixed=fixed,
-            corner=(surface.window.row, surface.window.column),
+            corner=(window.row, window.column),
             sweeps=sweeps,
         )

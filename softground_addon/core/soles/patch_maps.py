@@ -23,26 +23,21 @@ class Nodes:
     u: Single
     v: Single
     columns: int
-    beyond: Single
-    """How far outside the maps [m]."""
 
     @classmethod
     def under(cls, patch: SolePatch, x: Single, y: Single) -> Nodes:
+        """Under places in the patch's frame [m]; of those beyond the maps, under the nearest place on them."""
         rows, columns = patch.heights.shape
-        u = (x - np.float32(patch.origin[0])) * np.float32(1 / patch.spacing)
-        v = (y - np.float32(patch.origin[1])) * np.float32(1 / patch.spacing)
-        inside_u = np.minimum(np.maximum(u, np.float32(0)), np.float32(columns - 1))
-        inside_v = np.minimum(np.maximum(v, np.float32(0)), np.float32(rows - 1))
-        u -= inside_u
-        v -= inside_v
-        beyond = (np.abs(u, out=u) + np.abs(v, out=v)) * np.float32(patch.spacing)
-        column = np.minimum(inside_u.astype(np.int32), columns - 2)
-        row = np.minimum(inside_v.astype(np.int32), rows - 2)
-        inside_u -= column.astype(np.float32)
-        inside_v -= row.astype(np.float32)
-        row *= columns
-        row += column
-        return cls(row.astype(np.intp), inside_u, inside_v, columns, beyond)
+        u, v = (
+            _before_last((along - np.float32(start)) * np.float32(1 / patch.spacing), count)
+            for along, start, count in zip((x, y), patch.origin, (columns, rows), strict=True)
+        )
+        column, index = np.floor(u), np.floor(v)
+        u -= column
+        v -= index
+        index *= np.float32(columns)  # whole numbers up to 2^24 are exact
+        index += column
+        return cls(index.astype(np.intp), u, v, columns)
 
     def interpolate(self, values: Array) -> Single:
         flat = values.ravel().astype(np.float32)
@@ -59,6 +54,22 @@ class Nodes:
         far *= self.u
         far += near
         return far
+
+
+def _before_last(along: Single, count: int) -> Single:
+    """Places along a row of nodes, brought between the first and the last where they are not, in place."""
+    np.maximum(along, np.float32(0), out=along)
+    return np.minimum(along, np.nextafter(np.float32(count - 1), np.float32(0)), out=along)
+
+
+def distance_beyond(patch: SolePatch, x: Single, y: Single) -> Single:
+    """How far places in a patch's frame lie beyond its maps [m]."""
+    last = patch.origin + (np.array(patch.heights.shape[::-1]) - 1) * patch.spacing
+    beyond = [
+        np.maximum(np.maximum(low - along, along - high), np.float32(0))
+        for along, low, high in zip((x, y), patch.origin.astype(np.float32), last.astype(np.float32), strict=True)
+    ]
+    return beyond[0] + beyond[1]
 
 
 def covered_fraction(distance: Any, size: float) -> Any:
