@@ -43,7 +43,7 @@ CONSTANTS: dict[ModuleType, tuple[str, ...]] = {
         *("CUTOFF", "CUTOFF_DEVIATION", "FIRST_PASS", "LAST_PASS", "BOTH_PASSES"),
         *("LAG", "SLOW_CUTOFF", "STANDING", "STEADY_ENDS"),
     ),
-    centre_of_mass: ("_FRACTION_DEVIATION", "_MOVING", "_MOVING_DEVIATION", "_FALL_DEVIATION"),
+    centre_of_mass: ("_FRACTION_DEVIATION", "_FALL_DEVIATION"),
     centre_of_pressure: ("PRESSED_DEPTH",),
     contacts: (
         *("TOUCH_HEIGHT", "LEAVE_HEIGHT", "TOUCH_SPEED", "TOUCH_SHARE", "LANDED_HEIGHT", "REST_SPEED", "EDGE_SEARCH"),

@@ -94,10 +94,6 @@ _LEG_JOINTS = ("hip", "knee", "ankle")
 _FRACTION_DEVIATION = 0.2
 """Standard deviation of a body part's mass fraction about de Leva's, relative: people differ, and markers and bones
 slide against the flesh that they stand for."""
-_MOVING, _MOVING_DEVIATION = 0.9, 0.05
-"""Share of the body that moves as its joints do, and its standard deviation between people and ways of capture: in the
-flights of runs, centres of mass from joints err by 14 % of gravity at best (Le Mouel 2025, "Improved accuracy of the
-whole body Center of Mass position through Kalman filtering", 10.24072/pcjournal.510)."""
 _FALL_DEVIATION = 0.03
 """Standard deviation of an independent measurement of the acceleration in free fall, in gravities."""
 
@@ -237,15 +233,10 @@ def fitted_to_free_fall(
     missed = (np.einsum("rp,p->r", rows, prior) + np.tile((0.0, 0.0, 1.0), len(accelerations))) / row_deviation
     pull = -np.einsum("rp,r->p", scaled, missed)
     # Least squares for the changes in deviations, the table being one more row for each of them.
-    rigidity = scaled.T @ scaled + np.eye(len(prior))
-    whole = whole or not points.legs.any()
-    if not whole:  # one more row for their sum
-        rigidity += np.outer(deviation, deviation) / _MOVING_DEVIATION**2
-        pull += (_MOVING - 1) * deviation / _MOVING_DEVIATION**2
-    stiffness, modes = np.linalg.eigh(rigidity)
+    stiffness, modes = np.linalg.eigh(scaled.T @ scaled + np.eye(len(prior)))
     flexibility = (modes / stiffness) @ modes.T
     change = flexibility @ pull
-    if whole:
+    if whole or not points.legs.any():
         # The force of a constraint keeps the sum of the fractions.
         along = flexibility @ deviation
         change -= along * (deviation @ change) / (deviation @ along)
