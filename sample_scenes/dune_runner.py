@@ -56,8 +56,7 @@ def shoot(built: DuneRunner, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would lie in the sand, just after a strike, with the sun behind the runner."""
     scene = bpy.context.scene
     step = built.bakes[PRESET].footprints[STEP]
-    moment = step.start_frame + AFTER
-    scene.frame_set(int(moment), subframe=moment % 1.0)
+    stage.go_to(scene, step.start_frame + AFTER)
     stage.aim(scene.camera, step.position + np.array((0.60, -1.22, 0.28)), step.position + np.array((0.08, 0.2, 0.165)))
     open_air.add_low_sun(scene, radians(-72), radians(12), (1.0, 0.76, 0.52), 6.5, 0.36)
     scene.view_settings.exposure, scene.render.image_settings.quality = 0.35, 85

@@ -17,6 +17,9 @@ _SHAPES, _WHORLS, _BRANCHES, _TWIGS, _SIDES = 4, 21, 9, 12, 14
 """How many trees are unlike, whorls of each, branches of a whorl, pairs of twigs on a branch, sides of a trunk."""
 _UP = np.array((0.0, 0.0, 1.0))
 
+WINTRY = (0.034, 0.056, 0.040)
+"""Colour of needles under snow."""
+
 
 def add_firs(
     spots: Array,

@@ -81,7 +81,7 @@ def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
     open_air.add_low_sun(scene, radians(24), radians(11), (1.0, 0.74, 0.52), 6.5, 0.10, _SKY)
     chance = np.random.default_rng(4)
     spots = np.column_stack([chance.normal(0.0, 60.0, 150), -chance.uniform(30.0, 120.0, 150)])
-    firs.add_firs(spots, chance.uniform(4.0, 12.0, len(spots)), HEIGHT, (0.034, 0.056, 0.040), snow=0.8)
+    firs.add_firs(spots, chance.uniform(4.0, 12.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.8)
     _add_stalks(scene.softground.ground, chance)
     figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
     coat = next(slot for slot in figure.material_slots if "coat" in slot.material.name.lower())
@@ -94,7 +94,7 @@ def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
 
 def _add_stalks(baked: bpy.types.Object, chance: np.random.Generator) -> None:
     """Dry grass that looks out of the snow."""
-    grass = litter.blades(open_air.tufts(chance), (0.20, 0.135, 0.07), (0.40, 0.30, 0.17))
+    grass = litter.blades(open_air.tufts(chance), *litter.STRAW)
     ground = baked_ground.display_mesh_of(baked)
     litter.strew(
         ground, litter.pieces_of("Stalks", grass), "stalks", smallest=0.10, largest=0.34, law=1.2, lean=0.2, bend=1.3

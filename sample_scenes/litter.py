@@ -189,6 +189,10 @@ def mesh_of(name: str, vertices: Array, faces: Any, look: bpy.types.Material, *,
     return mesh
 
 
+STRAW = (0.20, 0.135, 0.07), (0.40, 0.30, 0.17)
+"""Dark and light colour of dead grass."""
+
+
 def blades(tufts: Sequence[bpy.types.Mesh], dark: Colour, light: Colour) -> Sequence[bpy.types.Mesh]:
     """Tufts of grass, now of other colours and soiled where a foot has pressed them."""
     look = material("blades", dark, light, 0.6, through=0.3)

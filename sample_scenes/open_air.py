@@ -116,6 +116,8 @@ _SUN_OF_SKY = radians(1.5)
 """So low that the sky takes the colours of dusk."""
 _OZONE = 3.0
 """Of the sky, in that of a clear day: what turns dusk blue overhead."""
+PALE_DUSK = (radians(4.5), 2.4)
+"""Sun and ozone of a sky that is pale at the horizon, where a lower sun makes it mustard."""
 
 
 def add_low_sun(

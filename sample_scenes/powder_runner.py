@@ -30,7 +30,6 @@ PAIR = (960, 540)
 FIRS = 170
 BOUNCES = 8
 """Of light, from one piece of snow to the next."""
-_SKY = (radians(4.5), 2.4)  # see `snow_at_dusk`
 HEIGHT = open_air.rolling(swell=0.2, hills=14.0, seed=11)
 
 
@@ -67,14 +66,13 @@ def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     bake = built.bakes[PRESET]
     step = bake.footprints[STEP]
-    moment = step.start_frame + AFTER
-    scene.frame_set(int(moment), subframe=moment % 1.0)
+    stage.go_to(scene, step.start_frame + AFTER)
     stage.aim(scene.camera, step.position + np.array((0.60, -1.10, 0.10)), step.position + np.array((0.08, 0.05, 0.17)))
-    open_air.add_low_sun(scene, radians(-58), radians(8), (1.0, 0.74, 0.52), 8.0, 0.13, _SKY)
+    open_air.add_low_sun(scene, radians(-58), radians(8), (1.0, 0.74, 0.52), 8.0, 0.13, open_air.PALE_DUSK)
     chance = np.random.default_rng(5)
     spots = np.column_stack([chance.normal(-10.0, 40.0, FIRS), chance.uniform(28.0, 120.0, FIRS)])
     spots = spots[np.abs(spots[:, 0]) > 5.0]
-    firs.add_firs(spots, chance.uniform(5.0, 12.0, len(spots)), HEIGHT, (0.034, 0.056, 0.040), snow=0.7)
+    firs.add_firs(spots, chance.uniform(5.0, 12.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.7)
     scene.cycles.max_bounces = scene.cycles.transmission_bounces = BOUNCES
     scene.view_settings.exposure = 0.25
     hero = folder / "powder_runner.jpg"

@@ -9,12 +9,12 @@ import bpy
 
 from sample_scenes import four_grounds, production, stage
 from sample_scenes.four_grounds import FourGrounds
+from sample_scenes.ground_sheets import GROUNDS
 from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
 
-PRESETS = ("Snow", "Dry Sand", "Wet Sand", "Mud", "Soil")
 PICTURE = (320, 240)
 
 
@@ -33,7 +33,7 @@ class Relief:
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> Relief:
     """One walk on ten grounds."""
     chosen = [{"relief": relief} | dict(options or {}) for relief in ("OFF", "CLOSE_UP")]
-    built = [four_grounds.build(scene, cell_size, one, PRESETS, row) for row, one in enumerate(chosen)]
+    built = [four_grounds.build(scene, cell_size, one, GROUNDS, row) for row, one in enumerate(chosen)]
     return Relief(dict(zip(("Plain", "Close-Up"), built, strict=True)))
 
 
@@ -42,7 +42,7 @@ def claims(built: Relief) -> list[Claim]:
     pressed = [[bake.report["totals"]["compressed_m3"] for bake in row.bakes.values()] for row in built.rows.values()]
     return [
         Claim(f"Volume pressed in {preset.lower()} with relief over that without", more / plain, 0.998, 1.002)
-        for preset, plain, more in zip(PRESETS, *pressed, strict=True)
+        for preset, plain, more in zip(GROUNDS, *pressed, strict=True)
     ]
 
 
@@ -55,7 +55,7 @@ def shoot(built: Relief, folder: Path, samples: int) -> list[Path]:
         for row, grounds in (("plain", plain), ("close_up", close_up))
         for picture in four_grounds.close_ups(grounds, folder / f"relief_{row}", PICTURE, samples)
     ]
-    return [*pictures, stage.contact_sheet(pictures, len(PRESETS), folder / "relief.jpg")]
+    return [*pictures, stage.contact_sheet(pictures, len(GROUNDS), folder / "relief.jpg")]
 
 
 if __name__ == "__main__":

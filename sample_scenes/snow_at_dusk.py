@@ -20,7 +20,6 @@ FRAMES = 300
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
 FLAKES = 6000
-_SKY = (radians(4.5), 2.4)  # pale at the horizon, where a lower sun makes it mustard
 HEIGHT = open_air.rolling(swell=0.16, hills=26.0, seed=3)
 
 
@@ -53,13 +52,13 @@ def shoot(_built: SnowAtDusk, folder: Path, samples: int) -> list[Path]:
     """From where a photographer would kneel beside the first steps."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(28), radians(6.5), (1.0, 0.60, 0.39), 6.5, 0.13, _SKY)
+    open_air.add_low_sun(scene, radians(28), radians(6.5), (1.0, 0.60, 0.39), 6.5, 0.13, open_air.PALE_DUSK)
     chance = np.random.default_rng(5)
     spots = np.column_stack([chance.normal(0.0, 75.0, 190), -chance.uniform(48.0, 150.0, 190)])
     spots = spots[np.abs(spots[:, 0] + 2.0) > 7.0]
     unseen = np.column_stack([chance.uniform(-60.0, -16.0, 9), chance.uniform(-26.0, -2.0, 9)])
     spots = np.concatenate([spots, unseen])  # which throw shadows into the picture
-    firs.add_firs(spots, chance.uniform(4.0, 11.0, len(spots)), HEIGHT, (0.034, 0.056, 0.040), snow=0.7)
+    firs.add_firs(spots, chance.uniform(4.0, 11.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.7)
     open_air.add_snowfall(scene.camera, FLAKES, PICTURE[0] / PICTURE[1])
     scene.view_settings.exposure = 0.9
     path = folder / "snow_at_dusk.jpg"

@@ -259,6 +259,11 @@ def bounds(things: Iterable[bpy.types.Object]) -> tuple[Array, Array]:
     return corners.min(axis=0), corners.max(axis=0)
 
 
+def go_to(scene: bpy.types.Scene, moment: float) -> None:
+    """Show a moment, which may lie between two frames."""
+    scene.frame_set(int(moment), subframe=moment % 1.0)
+
+
 def render(scene: bpy.types.Scene, camera: bpy.types.Object, path: Path, size: tuple[int, int], samples: int) -> None:
     """Write a picture."""
     scene.camera = camera

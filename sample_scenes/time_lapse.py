@@ -89,7 +89,7 @@ def _add_straw(middle: float) -> None:
     chance = np.random.default_rng(4)
     aside = chance.uniform(0.26, 1.6, STRAW) * chance.choice((-1.0, 1.0), STRAW)
     spots = np.column_stack([middle + aside, chance.uniform(-4.2, -0.4, STRAW)])
-    blades = litter.blades(open_air.tufts(chance), (0.20, 0.135, 0.07), (0.40, 0.30, 0.17))
+    blades = litter.blades(open_air.tufts(chance), *litter.STRAW)
     open_air.add_grass(spots, chance.uniform(0.07, 0.27, STRAW), lambda x, _y: np.full_like(x, ROOTS), shapes=blades)
 
 
