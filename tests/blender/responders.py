@@ -8,7 +8,6 @@ import numpy as np
 from sample_scenes.body import BONES
 from softground_addon.blender import jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.characters.rig_mapping import RigMapping
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.jobs import run
@@ -18,6 +17,7 @@ from softground_addon.core.record.ground_history import GroundHistory
 from softground_addon.core.response.foot_placement import lowest_clearance, posed_points
 from softground_addon.core.response.grounding import leg_soles
 from softground_addon.core.response.legs import Leg
+from softground_addon.core.rig.mapping import RigMapping
 from tests.blender import rigs
 
 _MIXAMO = {

@@ -12,7 +12,6 @@ from softground_addon.blender import jobs, settings
 from softground_addon.blender.animation_layer import nla_layer
 from softground_addon.blender.baking.clean_feet import clean_feet
 from softground_addon.blender.characters.rest_pose import legs_of_feet, legs_on_shins
-from softground_addon.blender.characters.rig_mapping import RigMapping
 from softground_addon.blender.command_line import cli
 from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
@@ -23,6 +22,7 @@ from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.intervals import runs
 from softground_addon.core.response.clean_feet import foot_faults
 from softground_addon.core.response.response import at_scene_frames
+from softground_addon.core.rig.mapping import RigMapping
 from softground_addon.core.settings import Acts
 from tests.blender import fingerprints, responders, shots
 from tests.blender.grounds import plane

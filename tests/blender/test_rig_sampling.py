@@ -7,10 +7,12 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.characters.rig_mapping import RigMapping, SoleSource, map_rig
+from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.jobs import run
 from softground_addon.core.errors import InputError
+from softground_addon.core.rig.mapping import RigMapping
+from softground_addon.core.settings import SoleSource
 
 from . import fingerprints, rigs, shots
 from .bvh import Bvh, file_to_world

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.characters.motion_assembly import _pointing
-from softground_addon.blender.characters.rig_mapping import SoleSource, map_rig
+from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 from softground_addon.blender.jobs import run
+from softground_addon.core.rig.motion_assembly import _pointing
+from softground_addon.core.settings import SoleSource
 
 from . import rigs
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
 from ...core.response.root_motion import lacking_velocity
+from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ObjectName
 from .. import settings
 from ..animation_layer.layer_curves import LayerCurve
@@ -24,7 +25,6 @@ from ..animation_layer.nla_layer import (
     remove_layer,
 )
 from ..characters.character_setup import characters_of
-from ..characters.rig_mapping import RigMapping
 from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import estimate_shot, read_shot, settings_of
 from ..response.rig_controls import travelling_bone

@@ -12,6 +12,7 @@ from ...core.errors import InputError
 from ...core.motion.motion import shortest_length
 from ...core.motion.props import mass_properties
 from ...core.numerics.components import components
+from ...core.rig.mapping import RigMapping
 from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
@@ -19,7 +20,7 @@ from .frame_ranges import ancestors, animated_frames
 from .import_fixes import put_under, scale_to_metres, size_of
 from .prop_extraction import surface_of
 from .recognition import SHARE, Recognised, recognise
-from .rig_mapping import CHOOSE_CONTACTS, RigMapping, require_armature
+from .rig_mapping import CHOOSE_CONTACTS, require_armature
 from .rig_sampling import is_simulated, recorded_motion, sample_character
 
 _SIDE_TO_ENUM = {code: side for side, code in SIDE_TO_CODE.items()}

@@ -8,17 +8,9 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.motion.motion import Array, SoleMotion
-from ...core.motion.props import mass_properties
-from ...core.numerics.rigid import displacement, nearest_rotation
-from ...core.soles.soles import prop_sole
+from ...core.settings import SoleSource
+from ...core.soles.prop_motion import prop_motion
 from .. import mesh_arrays
-from .rig_mapping import SoleSource
-
-_SAME_SIZE = 0.01
-"""Relative change of an object's size over a shot that is still none."""
-
-_FLAT = 1e-9
-"""An object whose scale along one axis is smaller than this part of the largest is squashed flat."""
 
 
 def check_props(scene: bpy.types.Scene, owner: str, sources: tuple[SoleSource, ...]) -> None:
@@ -78,10 +70,8 @@ def surface_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Array, ND
     return vertices.astype(float), triangles
 
 
-def prop_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
-    """An object that prints with its own mesh, and its volume [m³].
-
-    Its scale may differ along its axes, mirror or shear it, as long as it stays as it is.
+def read_prop(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> tuple[SoleMotion, float]:
+    """An object of the scene that prints with its own mesh, and its volume [m³]: its `prop_motion`.
 
     Parameters
     ----------
@@ -97,24 +87,5 @@ def prop_motion(scene: bpy.types.Scene, source: SoleSource, matrices: Array) -> 
         If its mesh has no faces, or its scale is 0 or changes.
     """
     obj = next(obj for obj in scene.objects if obj.name_full == source.object)
-    turn = nearest_rotation(matrices[:1, :3, :3])[0]
-    stretch = turn.T @ matrices[0, :3, :3]
-    sizes = np.linalg.svd(stretch, compute_uv=False)
-    if not sizes.min() > _FLAT * max(sizes.max(), 1e-300):
-        raise InputError(
-            f"'{obj.name}' has a scale of zero: set its scale, or apply it (Object > Apply > Scale), also on its "
-            "parents."
-        )
-    rotation = nearest_rotation(matrices[:, :3, :3] @ np.linalg.inv(stretch))
-    change = np.abs(matrices[:, :3, :3] - rotation @ stretch).max(axis=(1, 2)) / sizes.max()
-    if change.max() > _SAME_SIZE:
-        raise InputError(
-            f"'{obj.name}' changes its size or shape, but prints as a rigid body: take the keys off its scale, or "
-            "let a child that keeps its size print."
-        )
     vertices, triangles = surface_of(scene, obj)
-    vertices = vertices @ stretch.T
-    mass = mass_properties(vertices, triangles)
-    transforms = displacement(rotation, -mass.centre, matrices[:, :3, 3])
-    sole = prop_sole(vertices - mass.centre, triangles, name=source.name, side=source.side)
-    return SoleMotion(sole, transforms[:, None]), mass.volume
+    return prop_motion(vertices, triangles, matrices, owner=obj.name, name=source.name, side=source.side)

@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.numerics.rigid import unit
 from ...core.numerics.slices import Slices
+from ...core.rig.bones import RigBones
+from ...core.rig.mapping import RigMapping, bones_of
+from ...core.rig.recording import Recording
+from ...core.rig.rig_skin import FollowedSkin, RigSkin, followed_skin
+from ...core.rig.skin_mass import skin_mass
+from ...core.rig.skin_stances import UNDERSIDE
+from ...core.rig.sole_extraction import bone_families
+from ...core.settings import SoleSource
 from ...core.skin.contacts import SkinContacts, find_contacts
 from .. import jobs
 from ..settings import found, name_of, units_of
-from .recording import Recording
-from .rig_mapping import RigMapping, SoleSource, map_rig, require_armature
-from .rig_sampling import bones_of, is_animated, record
-from .skin_mass import skin_mass
-from .skin_sampling import FollowedSkin, RigSkin, followed_skin, read_skin
-from .skin_stances import UNDERSIDE
-from .sole_extraction import bone_families
+from .rig_mapping import map_rig, require_armature, rest_bones
+from .rig_sampling import is_animated, record
+from .skin_sampling import read_skin
 
 MOST_FRAMES = 500
 """Frames from the beginning of the animation that are looked at."""
@@ -95,12 +99,13 @@ def recognise(
         samples = range(first, min(last, first + MOST_FRAMES) + 1)
     reading = record(scene, armature, samples, [*skin.bones, *bones_of(mapping)], units)
     recording = yield from jobs.counted(reading, "sample", len(samples), share=SHARE)
-    weighing = skin_mass.slices(skin, found(rig), recording.of(np.array([0])))
+    bones = rest_bones(found(rig))
+    weighing = skin_mass.slices(skin, bones, recording.of(np.array([0])))
     mass = yield from jobs.meanwhile(read, weighing)
     if not moves:
         return Recognised(replace(mapping, mass=mass), skin)
-    seen = yield from jobs.meanwhile(read, _shown_by_skin(found(rig), skin, recording))
-    return Recognised(replace(_joined(found(rig), mapping, seen), mass=mass), skin, recording)
+    seen = yield from jobs.meanwhile(read, _shown_by_skin(bones, skin, recording))
+    return Recognised(replace(_joined(bones, mapping, seen), mass=mass), skin, recording)
 
 
 def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
@@ -111,14 +116,14 @@ def _mapped(armature: bpy.types.Object, *, posed: bool = False) -> RigMapping:
         return RigMapping(method="skin")
 
 
-def _joined(armature: bpy.types.Object, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
+def _joined(bones: RigBones, mapping: RigMapping, seen: tuple[SoleSource, ...]) -> RigMapping:
     """What the names say with the skin's parts, and what only the skin shows: beside feet, hands and other limbs.
 
     Legs that the rest pose alone tells are none if the character bears on other parts, and never on these.
     """
     soles, left = [], list(seen)
     for source in mapping.soles:
-        family, _ = bone_families(armature, source)
+        family, _ = bone_families(bones, source)
         same = [contact for contact in left if family & {*contact.parts}]
         left = [contact for contact in left if contact not in same]
         parts = tuple(dict.fromkeys(bone for contact in same for bone in contact.parts))
@@ -129,9 +134,9 @@ def _joined(armature: bpy.types.Object, mapping: RigMapping, seen: tuple[SoleSou
     return replace(mapping, soles=(*soles, *others))
 
 
-def _shown_by_skin(armature: bpy.types.Object, skin: RigSkin, recording: Recording) -> Slices[tuple[SoleSource, ...]]:
+def _shown_by_skin(bones: RigBones, skin: RigSkin, recording: Recording) -> Slices[tuple[SoleSource, ...]]:
     """The contacts that the skin shows."""
-    followed = yield from followed_skin.slices(skin, armature, recording, recording.units.frame_rate, linked=True)
+    followed = yield from followed_skin.slices(skin, bones, recording, recording.units.frame_rate, linked=True)
     if followed is None:
         return ()
     contacts = yield from find_contacts.slices(followed.motion)

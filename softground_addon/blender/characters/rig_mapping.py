@@ -7,41 +7,17 @@ names leave out is completed from the rest pose.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 from mathutils import Vector
 
 from ...core.errors import InputError
+from ...core.rig.bones import RestBone, RigBones
+from ...core.rig.mapping import BoneEnd, RigMapping
 from ...core.settings import SoleSource
 from .bone_names import LIMBS, TRUNK, BoneName, best, read_names
 from .rest_pose import map_by_rest_pose
-
-BoneEnd = tuple[str, str]
-"""A bone's name, and "head" or "tail"."""
-
-
-@dataclass(frozen=True)
-class RigMapping:
-    """What the parts of a rig are.
-
-    Attributes
-    ----------
-    joints : mapping of str to BoneEnd
-        Canonical joint (`core.motion.motion.JOINTS`) to the end of a bone.
-    soles : tuple of SoleSource
-        What prints, feet first.
-    method : str
-        How they were found: by "names" or "rest pose", or as the "settings" have them.
-    mass : float
-        That its skin suggests [kg], 0 where none does.
-    """
-
-    joints: Mapping[str, BoneEnd] = field(default_factory=dict)
-    soles: tuple[SoleSource, ...] = ()
-    method: str = "names"
-    mass: float = 0.0
-
 
 CHOOSE_CONTACTS = (
     "select the bones that touch the ground in Pose Mode, or vertices of the mesh in Edit Mode, and press Add Contact "
@@ -165,6 +141,20 @@ def require_armature(armature: bpy.types.Object | None) -> None:
         )
     if not armature.data.bones:
         raise InputError(f"Armature '{armature.name}' has no bones: choose the armature that moves the character.")
+
+
+def rest_bones(armature: bpy.types.Object) -> RigBones:
+    """The bones of an armature at rest."""
+    return {
+        bone.name: RestBone(
+            parent=bone.parent.name if bone.parent else "",
+            matrix=np.array(bone.matrix_local, dtype=float),
+            head=np.array(bone.head_local, dtype=float),
+            tail=np.array(bone.tail_local, dtype=float),
+            length=bone.length,
+        )
+        for bone in armature.data.bones
+    }
 
 
 def _map_by_names(bones: Iterable[bpy.types.Bone]) -> RigMapping | None:

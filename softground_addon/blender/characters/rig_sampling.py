@@ -16,6 +16,11 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.motion.motion import CharacterMotion
+from ...core.rig.mapping import RigMapping, bones_of
+from ...core.rig.motion_assembly import assemble_motion
+from ...core.rig.recording import Recording
+from ...core.rig.rig_skin import RigSkin
+from ...core.rig.skin_stances import LONGEST, skin_stances
 from ...core.settings import SceneUnits
 from ..animation_layer.nla_layer import without_layer
 from ..compat import remove_scene
@@ -23,12 +28,9 @@ from ..jobs import meanwhile
 from ..settings import found, name_of, units_of
 from .control_poses import PoseRecorder
 from .keyed_poses import is_moved_by_keys_alone, keyed_pose, keyed_world, with_parents
-from .motion_assembly import assemble_motion
-from .prop_extraction import check_props, prop_motion
-from .recording import Recording
-from .rig_mapping import CHOOSE_CONTACTS, RigMapping, SoleSource, require_armature
-from .skin_sampling import RigSkin, meshes_on, read_skin
-from .skin_stances import LONGEST, skin_stances
+from .prop_extraction import check_props, read_prop
+from .rig_mapping import CHOOSE_CONTACTS, require_armature, rest_bones
+from .skin_sampling import meshes_on, read_skin
 
 Sampling = Generator[int, None, CharacterMotion]
 """Yields the number of frames read so far, returns the motion."""
@@ -134,18 +136,18 @@ def recorded_motion(
         As for `sample_character`; and so is what it yields, returns and raises.
     """
     _check_recording(armature.name, recording)
+    name, bones = armature.name, rest_bones(armature)
     carried = {
-        source.name: prop_motion(scene, source, recording.props[source.object])[0]
+        source.name: read_prop(scene, source, recording.props[source.object])[0]
         for source in mapping.soles
         if source.object
     }
     count, stances = len(recording.frames), None
     if skin and count <= LONGEST:
-        rig, step = name_of(armature), float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
-        looking = skin_stances(skin, armature, mapping, recording, recording.units.frame_rate / step, mass=skin_mass)
+        step = float(recording.frames[1] - recording.frames[0]) if count > 1 else 1.0
+        looking = skin_stances(skin, bones, mapping, recording, recording.units.frame_rate / step, mass=skin_mass)
         stances = yield from meanwhile(count, looking)
-        armature = found(rig)
-    assembling = assemble_motion(armature, mapping, recording, skin, mass=mass, carried=carried, stances=stances)
+    assembling = assemble_motion(name, bones, mapping, recording, skin, mass=mass, carried=carried, stances=stances)
     return (yield from assembling)
 
 
@@ -200,7 +202,7 @@ def sample_prop(
     props = list(dict.fromkeys(source.object for source in sources))
     recording = yield from _evaluate(scene, "", frames, [], units, props)
     _check_finite(name, recording)
-    parts = [prop_motion(scene, source, recording.props[source.object]) for source in sources]
+    parts = [read_prop(scene, source, recording.props[source.object]) for source in sources]
     volumes = np.array([volume for _, volume in parts])
     shares = volumes / volumes.sum() if volumes.min() > 0 else np.full(len(parts), 1 / len(parts))
     motions = tuple(motion for motion, _ in parts)
@@ -214,15 +216,6 @@ def sample_prop(
         gravity=units.gravity_m_s2,
         centre=np.einsum("p,pfi->fi", shares, [motion.transforms[:, 0, :3, 3] for motion in motions]),
     )
-
-
-def bones_of(mapping: RigMapping) -> list[str]:
-    """The bones of a mapping's soles and joints."""
-    return [*(bone for sole in mapping.soles for bone in _bones(sole)), *(bone for bone, _ in mapping.joints.values())]
-
-
-def _bones(source: SoleSource) -> list[str]:
-    return [bone for bone in (source.bone, source.toe_bone) if bone]
 
 
 def _read_keys(

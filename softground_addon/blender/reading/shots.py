@@ -20,12 +20,12 @@ from ...core.ground.variation import PaintedSurface
 from ...core.loads.cell_limits import check_frames
 from ...core.loads.estimate import CharacterLoads, estimate_loads
 from ...core.motion.motion import CharacterMotion
+from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings
 from .. import settings, tread_images
 from ..characters.control_poses import PoseRecorder
 from ..characters.import_fixes import size_of
 from ..characters.prop_extraction import check_props
-from ..characters.rig_mapping import RigMapping
 from ..characters.rig_sampling import check_rig, sample_character, sample_prop
 from ..ground import ground_checks, ground_mesh, painted_ground, weather
 from ..ground.ground_mesh import GroundSurface

@@ -14,10 +14,10 @@ from ...core.numerics.key_reduction import kept_samples
 from ...core.numerics.orientation import euler_angles, quaternions, rotation_matrices
 from ...core.numerics.rigid import carried, rotation, unit
 from ...core.response.grounding import Response
+from ...core.rig.mapping import RigMapping
 from ...core.settings import ObjectName
 from ..animation_layer.layer_curves import LayerCurve
 from ..characters.control_poses import BonePoses, RigPoses
-from ..characters.rig_mapping import RigMapping
 from ..settings import found
 from .rig_controls import BODY, Control, find_controls
 

@@ -29,10 +29,10 @@ from ...core.response.response import (
     respond,
     stood_on,
 )
+from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings, CharacterSettings, ResponseOptions
 from .. import settings
 from ..animation_layer import nla_layer
-from ..characters.rig_mapping import RigMapping
 from ..jobs import Job, Progress, counted, meanwhile
 from .character_keys import ReadRig, controls_of, response_curves
 

@@ -13,8 +13,9 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
+from ...core.rig.mapping import RigMapping
 from ..animation_layer.nla_layer import animated_paths
-from ..characters.rig_mapping import CHOOSE_CONTACTS, RigMapping
+from ..characters.rig_mapping import CHOOSE_CONTACTS
 
 _FOLLOWED = 0.5
 """Influence from which on a constraint counts."""

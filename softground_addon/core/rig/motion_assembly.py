@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.motion.motion import Array, CharacterMotion, SoleMotion
-from ...core.motion.props import capsule
-from ...core.numerics.interpolation import in_stretches
-from ...core.numerics.rigid import displacement, nearest_rotation, unit
-from ...core.soles.foot_attitude import (
+from ..motion.motion import Array, CharacterMotion, SoleMotion
+from ..motion.props import capsule
+from ..numerics.interpolation import in_stretches
+from ..numerics.rigid import displacement, nearest_rotation, unit
+from ..settings import SoleSource
+from ..soles.foot_attitude import (
     UP,
     FlatFoot,
     FootSize,
@@ -24,11 +24,12 @@ from ...core.soles.foot_attitude import (
     reflection,
     standing_up,
 )
-from ...core.soles.soles import PlacedSole, prop_sole
+from ..soles.soles import PlacedSole, prop_sole
+from .bones import RigBones
+from .mapping import RigMapping
 from .recording import Recording
 from .rig_at_rest import RestPose
-from .rig_mapping import RigMapping, SoleSource
-from .skin_sampling import RigSkin
+from .rig_skin import RigSkin
 from .skin_stances import SkinStances
 from .sole_extraction import bone_families, foot_sole, limb_family, skin_meshes
 
@@ -43,7 +44,8 @@ _SAME_SIZE = 0.2
 
 
 def assemble_motion(
-    armature: bpy.types.Object,
+    name: str,
+    bones: RigBones,
     mapping: RigMapping,
     recording: Recording,
     skin: RigSkin | None,
@@ -58,7 +60,9 @@ def assemble_motion(
 
     Parameters
     ----------
-    armature : bpy.types.Object
+    name : str
+        The character's.
+    bones : RigBones
     mapping : RigMapping
     recording : Recording
     skin : RigSkin or None
@@ -74,7 +78,7 @@ def assemble_motion(
     InputError
         If a mesh that should print has no underside.
     """
-    rest = RestPose.of(armature, mapping, recording.armature)
+    rest = RestPose.of(bones, mapping, recording.armature)
     frame_rate, gravity = recording.units.frame_rate, recording.units.gravity_m_s2
     leg = rest.leg_length(mapping)
     if not rest.is_upright:
@@ -88,7 +92,7 @@ def assemble_motion(
         [foot.path for foot in feet], frame_rate=frame_rate / step, leg_length=leg, gravity=gravity
     )
     yield len(recording.frames)
-    unseen = {source.name: bone_families(armature, source) for source in sources if source.name not in standing}
+    unseen = {source.name: bone_families(bones, source) for source in sources if source.name not in standing}
     meshes = skin_meshes(skin, unseen, rest.world)
     meshes |= stances.meshes if stances else {}
     yield len(recording.frames)
@@ -106,18 +110,18 @@ def assemble_motion(
     motions.update(_limb_motions(mapping, recording, rest, skin))
     motions.update(carried)
     if stances:
-        for name, bears in stances.bears.items():
-            motions[name] = _at_its_skin(replace(motions[name], bears=bears), stances.low.get(name))
+        for sole, bears in stances.bears.items():
+            motions[sole] = _at_its_skin(replace(motions[sole], bears=bears), stances.low.get(sole))
 
     return CharacterMotion(
-        name=rest.armature.name,
+        name=name,
         mass=mass,
         leg_length=leg + (float(np.mean([size.ankle_height for size in sizes])) if sizes else 0.0),
         frames=recording.frames,
         frame_rate=frame_rate,
         soles=tuple(motions[source.name] for source in mapping.soles),
         joints={
-            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else rest.armature.data.bones[bone].length)
+            joint: along_bone(recording.bone(bone), 0.0 if end == "head" else bones[bone].length)
             for joint, (bone, end) in mapping.joints.items()
         },
         gravity=gravity,
@@ -139,7 +143,7 @@ def _limb_motions(
 ) -> dict[str, SoleMotion]:
     """Limbs that print by whatever side faces down: the skin that moves with the bone, or a bar around it."""
     limbs = [source for source in mapping.soles if source.limb and not source.object]
-    families = {source.name: (limb_family(rest.armature, source, mapping), frozenset[str]()) for source in limbs}
+    families = {source.name: (limb_family(rest.bones, source, mapping), frozenset[str]()) for source in limbs}
     meshes = skin_meshes(skin, families, rest.world)
     motions = {}
     for source in limbs:
@@ -200,7 +204,7 @@ class _Foot:
     @classmethod
     def of(cls, source: SoleSource, recording: Recording, rest: RestPose, standing: int | None = None) -> _Foot:
         """A foot and its bones, from the rest pose or from the sample at which its skin is seen standing."""
-        bones = rest.armature.data.bones
+        bones = rest.bones
         last = source.toe_bone or source.bone
         matrices = recording.bone(source.bone)
         last_matrices = recording.bone(last) if source.toe_bone else matrices

@@ -4,31 +4,31 @@ from __future__ import annotations
 
 from math import floor, log10
 
-import bpy
 import numpy as np
 
-from ...core.numerics.slices import Slices, sliced
-from ...core.skin.volume import body_volume, welded
+from ..numerics.slices import Slices, sliced
+from ..skin.volume import body_volume, welded
+from .bones import RigBones
 from .recording import Recording
-from .skin_sampling import RigSkin, carried, skinned
+from .rig_skin import RigSkin, carried, skinned
 
 DENSITY = 1000.0
 """Of bodies [kg/m³]: people float, barely."""
 
 
 @sliced
-def skin_mass(skin: RigSkin, armature: bpy.types.Object, pose: Recording) -> Slices[float]:
+def skin_mass(skin: RigSkin, bones: RigBones, pose: Recording) -> Slices[float]:
     """Mass of a body of the volume of its skin [kg], to two digits, 0 where the skin encloses nothing.
 
     Parameters
     ----------
     skin : RigSkin
-    armature : bpy.types.Object
+    bones : RigBones
     pose : Recording
         Of all `skin.bones`, at one frame.
     """
-    body = ~carried(skin, armature)[skin.triangles].any(axis=1)
-    points = (yield from skinned.slices(skin, armature, pose, np.arange(len(skin.vertices))))[0].astype(float)
+    body = ~carried(skin, bones)[skin.triangles].any(axis=1)
+    points = (yield from skinned.slices(skin, bones, pose, np.arange(len(skin.vertices))))[0].astype(float)
     place = welded(skin.vertices)
     yield
     if not np.isfinite(points).all():

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.motion.motion import LowSkin
-from ...core.numerics.slices import Slices
-from ...core.skin.contacts import find_contacts
-from ..settings import found, name_of
+from ..motion.motion import LowSkin
+from ..numerics.slices import Slices
+from ..settings import SoleSource
+from ..skin.contacts import find_contacts
+from .bones import RigBones
+from .mapping import RigMapping
 from .recording import Recording
-from .rig_mapping import RigMapping, SoleSource
-from .skin_sampling import FollowedSkin, RigSkin, followed_skin, skinned
+from .rig_skin import FollowedSkin, RigSkin, followed_skin, skinned
 from .sole_extraction import FootMesh, bone_families, limb_family
 
 UNDERSIDE = 0.02
@@ -58,7 +58,7 @@ class SkinStances:
 
 def skin_stances(
     skin: RigSkin,
-    armature: bpy.types.Object,
+    bones: RigBones,
     mapping: RigMapping,
     recording: Recording,
     rate: float,
@@ -70,7 +70,7 @@ def skin_stances(
     Parameters
     ----------
     skin : RigSkin
-    armature : bpy.types.Object
+    bones : RigBones
     mapping : RigMapping
         Its soles on bones are looked at.
     recording : Recording
@@ -80,14 +80,12 @@ def skin_stances(
     mass : float
         That its volume suggests [kg], 0 where unknown.
     """
-    rig = name_of(armature)
-    followed = yield from followed_skin.slices(skin, armature, recording, rate)
+    followed = yield from followed_skin.slices(skin, bones, recording, rate)
     if followed is None:
         return None
     yield
-    armature = found(rig)
     sources = [source for source in mapping.soles if source.bone and not source.object]
-    own = {source.name: _bones_of(armature, source, mapping) for source in sources}
+    own = {source.name: _bones_of(bones, source, mapping) for source in sources}
     numbers: dict[str, int] = {}
     for number, source in enumerate(sources):
         numbers = dict.fromkeys(own[source.name], number) | numbers
@@ -99,7 +97,6 @@ def skin_stances(
     place[present] = np.arange(len(present))
     contacts = yield from find_contacts.slices(followed.motion, place[group])
     yield
-    armature = found(rig)
     never = np.zeros(len(recording.frames), dtype=bool)
     bears = {source.name: never for source in sources}
     bears |= {sources[number].name: contacts.bears[:, contact] for contact, number in enumerate(present)}
@@ -111,7 +108,7 @@ def skin_stances(
     band = contacts.level + SOLE_BAND * followed.motion.height
     meshes = {}
     for source in feet:
-        mesh = _mesh(skin, armature, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
+        mesh = _mesh(skin, bones, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
         if mesh is not None:
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
@@ -125,11 +122,11 @@ def skin_stances(
     return SkinStances(contacts.level, bears, {name: standing[name] for name in meshes}, meshes, low, skin_there)
 
 
-def _bones_of(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
+def _bones_of(bones: RigBones, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
     """The bones whose skin is a contact's."""
     if source.parts:
         return frozenset(source.parts)
-    return limb_family(armature, source, mapping) if source.limb else bone_families(armature, source)[0]
+    return limb_family(bones, source, mapping) if source.limb else bone_families(bones, source)[0]
 
 
 def _standing(followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[np.bool_], level: float) -> int:
@@ -141,20 +138,20 @@ def _standing(followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[n
 
 def _mesh(
     skin: RigSkin,
-    armature: bpy.types.Object,
+    bones: RigBones,
     source: SoleSource,
     names: frozenset[str],
     standing: Recording,
     highest: float,
 ) -> FootMesh | None:
     """The skin of a foot as it stands, where its faces reach down to a height; None without any face."""
-    _, toes = bone_families(armature, source)
+    _, toes = bone_families(bones, source)
     own = np.array([name in names for name in skin.bones] + [False])[skin.part]
     candidates = np.flatnonzero(own[skin.triangles].all(axis=1))
     used, triangles = np.unique(skin.triangles[candidates], return_inverse=True)
     if not len(used):
         return None
-    vertices = skinned(skin, armature, standing, used)[0].astype(float)
+    vertices = skinned(skin, bones, standing, used)[0].astype(float)
     triangles = triangles.reshape(-1, 3)
     low = vertices[triangles, 2].min(axis=1) < highest
     if not low.any():

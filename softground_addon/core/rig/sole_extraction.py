@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.motion.motion import Array
-from ...core.soles.foot_attitude import FlatFoot, FootSize
-from ...core.soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
-from .rig_mapping import RigMapping, SoleSource
-from .skin_sampling import RigSkin
+from ..motion.motion import Array
+from ..settings import SoleSource
+from ..soles.foot_attitude import FlatFoot, FootSize
+from ..soles.soles import ANKLE_POSITION, PlacedSole, anatomical_sole, sole_from_underside
+from .bones import RigBones, family
+from .mapping import RigMapping
+from .rig_skin import RigSkin
 
 _OWNED = 0.5
 """A vertex belongs to the foot when the foot's bones hold more than this share of its weight."""
@@ -113,9 +114,11 @@ def skin_meshes(
     rest_world : (4, 4) float array
         Armature space to world in the rest pose [m].
     """
+    if skin is None:
+        return {}
     meshes = {}
-    for name, (family, toes) in families.items() if skin else ():
-        weight = skin.weight_of(family)
+    for name, (own, toes) in families.items():
+        weight = skin.weight_of(own)
         used, triangles = np.unique(skin.triangles[(weight > _OWNED)[skin.triangles].all(axis=1)], return_inverse=True)
         if triangles.size >= 3 * _FEWEST_TRIANGLES:
             toe_weight = np.clip(skin.weight_of(toes)[used] / weight[used], 0.0, 1.0)
@@ -123,24 +126,14 @@ def skin_meshes(
     return meshes
 
 
-def limb_family(armature: bpy.types.Object, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
+def limb_family(bones: RigBones, source: SoleSource, mapping: RigMapping) -> frozenset[str]:
     """Names of the bones that move with a limb, up to the next joints and soles."""
     joints = {bone for bone, end in mapping.joints.values() if end == "head"}
     soles = {bone for other in mapping.soles for bone in (other.bone, other.toe_bone) if bone}
-    family, waiting = set(), [armature.data.bones[source.bone]]
-    while waiting:
-        bone = waiting.pop()
-        family.add(bone.name)
-        waiting += [child for child in bone.children if child.name not in joints | soles]
-    return frozenset(family)
+    return family(bones, source.bone, joints | soles)
 
 
-def bone_families(armature: bpy.types.Object, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
+def bone_families(bones: RigBones, source: SoleSource) -> tuple[frozenset[str], frozenset[str]]:
     """Names of the bones that move with the foot and, of these, with the toes."""
-    bones = armature.data.bones
-    toes: frozenset[str] = frozenset()
-    if source.toe_bone in bones:
-        toe = bones[source.toe_bone]
-        toes = frozenset((toe.name, *(bone.name for bone in toe.children_recursive)))
-    foot = bones[source.bone]
-    return frozenset((foot.name, *(bone.name for bone in foot.children_recursive))) | toes, toes
+    toes = family(bones, source.toe_bone) if source.toe_bone in bones else frozenset[str]()
+    return family(bones, source.bone) | toes, toes

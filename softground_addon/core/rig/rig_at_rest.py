@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 
-from ...core.motion.motion import Array
-from ...core.numerics.rigid import rotation, turn_between, unit
-from ...core.settings import ObjectName
-from ...core.soles.foot_attitude import UP
-from ..settings import found, name_of
-from .rig_mapping import RigMapping
+from ..motion.motion import Array
+from ..numerics.rigid import rotation, turn_between, unit
+from ..soles.foot_attitude import UP
+from .bones import RigBones
+from .mapping import RigMapping
 
 _ACROSS, _ALONG = 0.6, 0.7
 """Largest cosine between the legs and a four-legged trunk, smallest between hind and front legs."""
@@ -30,30 +28,25 @@ class RestPose:
 
     Attributes
     ----------
-    rig : ObjectName
-        The armature.
+    bones : RigBones
     world : (4, 4) float array
         Armature space to world [m].
     tilts : (F, 3, 3) float array
         Rotations from upright to how the armature's own upward axis lies in each frame.
     """
 
-    rig: ObjectName
+    bones: RigBones
     world: Array
     tilts: Array
 
     @classmethod
-    def of(cls, armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> RestPose:
+    def of(cls, bones: RigBones, mapping: RigMapping, placed: Array) -> RestPose:
         """From the armature's matrices over time, (F, 4, 4) [m]."""
-        ups = unit(placed[:, :3, :3] @ _own_up(armature, mapping, placed[0]))
+        ups = unit(placed[:, :3, :3] @ _own_up(bones, mapping, placed[0]))
         tilts = rotation(turn_between(np.broadcast_to(UP, ups.shape), ups))
         world = placed[0].copy()
         world[:3, :3] = tilts[0].T @ world[:3, :3]
-        return cls(name_of(armature), world, tilts)
-
-    @property
-    def armature(self) -> bpy.types.Object:
-        return found(self.rig)
+        return cls(bones, world, tilts)
 
     @property
     def is_mirrored(self) -> bool:
@@ -65,12 +58,10 @@ class RestPose:
         return bool(self.tilts[:, 2, 2].min() > _UPRIGHT)
 
     def matrix(self, bone: str) -> Array:
-        return self.world @ np.array(self.armature.data.bones[bone].matrix_local)
+        return self.world @ self.bones[bone].matrix
 
     def end(self, bone: str, end: str) -> Array:
-        point = self.armature.data.bones[bone]
-        local = np.array(point.head_local if end == "head" else point.tail_local)
-        return self.world[:3, :3] @ local + self.world[:3, 3]
+        return self.world[:3, :3] @ self.bones[bone].end(end) + self.world[:3, 3]
 
     def leg_length(self, mapping: RigMapping) -> float:
         """Thigh and shank together, or about half the rig's height where they are not mapped."""
@@ -82,7 +73,7 @@ class RestPose:
                 lengths.append(float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()))
         if lengths and min(lengths) > 0:
             return float(np.mean(lengths))
-        ends = np.array([self.end(bone.name, end) for bone in self.armature.data.bones for end in ("head", "tail")])
+        ends = np.array([self.end(bone, end) for bone in self.bones for end in ("head", "tail")])
         return max(float(np.ptp(ends, axis=0).max()) / 2, 1e-6)
 
     def is_four_legged(self, mapping: RigMapping) -> bool:
@@ -111,7 +102,7 @@ class RestPose:
         return np.zeros(3)
 
 
-def _own_up(armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> Array:
+def _own_up(bones: RigBones, mapping: RigMapping, placed: Array) -> Array:
     """The axis of the armature along which its legs reach up at rest; where none shows, the one that points up most.
 
     An armature that stands upright itself does so whatever its rest pose: those of captured motions may lie.
@@ -119,15 +110,12 @@ def _own_up(armature: bpy.types.Object, mapping: RigMapping, placed: Array) -> A
     if unit(placed[:3, 2]) @ UP > _UPRIGHT:
         return UP
     axes = np.concatenate([np.eye(3), -np.eye(3)])
-    bones = armature.data.bones
     legs = np.zeros(3)
     for side in "lr":
         joints = [f"ankle_{side}", f"hip_{side}"]
         if all(joint in mapping.joints for joint in joints):
-            ankle, hip = (
-                getattr(bones[bone], f"{end}_local") for bone, end in (mapping.joints[joint] for joint in joints)
-            )
-            legs += np.array(hip - ankle)
+            ankle, hip = (bones[bone].end(end) for bone, end in (mapping.joints[joint] for joint in joints))
+            legs += hip - ankle
     along = axes @ unit(legs)
     if along.max() < _ALONG_LEGS:
         along = axes @ placed[2, :3]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.motion.motion import Array
-from ...core.settings import SceneUnits
+from ..motion.motion import Array
+from ..settings import SceneUnits
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,212 @@
+"""The skin of a rig over time: its meshes as their bones move them, by weights and matrices alone.
+
+No mesh is evaluated: linear blend skinning of a few thousand vertices is exact for what the Armature modifier does and
+takes milliseconds, while Blender evaluates every mesh of a scene at every frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motion.motion import Array
+from ..numerics.slices import Slices, sliced
+from ..skin.skin_motion import SkinMotion
+from ..skin.twins import twins
+from .bones import RigBones, above
+from .recording import Recording
+
+Indices = NDArray[np.intp]
+
+_WELD = 1e-5
+"""Vertices nearer than this over the size of the mesh are one."""
+
+
+@dataclass(frozen=True)
+class RigSkin:
+    """The meshes of a rig in its rest pose, and what moves them.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        In the armature's space [Blender units].
+    triangles : (T, 3) int array
+    bones : tuple of str
+        Names of the bones that move some vertex; the armature itself is the last part, without a name here.
+    weights : tuple of (vertices, weights) for each bone
+        Which vertices (N,) a bone moves, and how much (N,).
+    part : (V,) int array
+        The bone that moves each vertex most, as an index; that of the armature where none does.
+    hung : (V,) bool array
+        Of objects that hang on a bone instead of being deformed.
+    """
+
+    vertices: Array
+    triangles: Indices
+    bones: tuple[str, ...]
+    weights: tuple[tuple[Indices, Array], ...]
+    part: Indices
+    hung: NDArray[np.bool_]
+
+    def weight_of(self, bones: Collection[str]) -> Array:
+        """How much of each vertex some bones move, (V,)."""
+        total = np.zeros(len(self.vertices))
+        for name, (vertex, weight) in zip(self.bones, self.weights, strict=True):
+            if name in bones:
+                total[vertex] += weight
+        return total
+
+
+@sliced
+def skinned(
+    skin: RigSkin, bones: RigBones, recording: Recording, chosen: Indices, *, axes: slice = slice(3)
+) -> Slices[NDArray[np.float32]]:
+    """World positions of the chosen vertices over time, (F, N, 3) [m], or some of their `axes`.
+
+    Parameters
+    ----------
+    skin : RigSkin
+    bones : RigBones
+    recording : Recording
+        Of all `skin.bones`.
+    chosen : (N,) int array
+    """
+    place = np.full(len(skin.vertices), -1, dtype=np.intp)
+    place[chosen] = np.arange(len(chosen))
+    rest = np.column_stack([skin.vertices, np.ones(len(skin.vertices))])
+    backs = [np.linalg.inv(bones[name].matrix) for name in skin.bones]
+    frames, rows = len(recording.frames), len(range(3)[axes])
+    result = np.zeros((frames, rows, len(chosen)), dtype=np.float32)  # one product for all frames is the fastest
+    held = np.zeros(len(chosen), dtype=bool)
+    for name, back, (moved_by, weights) in zip(skin.bones, backs, skin.weights, strict=True):
+        here = place[moved_by] >= 0
+        if not here.any():
+            continue
+        vertex, weight = moved_by[here], weights[here]
+        moved = (recording.bone(name) @ back)[:, :3][:, axes].reshape(-1, 4).astype(np.float32)
+        weighted = (weight[:, None] * rest[vertex]).T.astype(np.float32)
+        result[..., place[vertex]] += (moved @ weighted).reshape(frames, rows, -1)
+        held[place[vertex]] = True
+        yield
+    if not held.all():
+        unheld = recording.armature[:, :3][:, axes].reshape(-1, 4)
+        result[..., ~held] = (unheld @ rest[chosen[~held]].T).reshape(frames, rows, -1)
+    return np.swapaxes(result, 1, 2)
+
+
+_PROBES = 8
+"""Poses in which the vertices near the ground are looked for."""
+
+_NEAR = 0.15
+"""Vertices that never come this near to the lowest are left out, in body heights."""
+
+_MOST_POINTS = 1500
+"""Vertices that are followed at most."""
+
+_MOST_PLACES = 6_000_000
+"""The same times the samples, so that long shots fit into memory."""
+
+
+@dataclass(frozen=True)
+class FollowedSkin:
+    """The skin near the ground over time.
+
+    Attributes
+    ----------
+    motion : SkinMotion
+    bones : tuple of str
+        Bone of each part of the motion; empty where only the armature moves it.
+    """
+
+    motion: SkinMotion
+    bones: tuple[str, ...]
+
+
+@sliced
+def followed_skin(
+    skin: RigSkin, bones: RigBones, recording: Recording, rate: float, *, linked: bool = False
+) -> Slices[FollowedSkin | None]:
+    """Some vertices over time, by which the contacts of a rig are found, or None where it is flat or nowhere.
+
+    Parameters
+    ----------
+    skin : RigSkin
+    bones : RigBones
+    recording : Recording
+        Of all `skin.bones`.
+    rate : float
+        Samples per second [Hz].
+    linked : bool
+        Whether to tell which parts hang together, and which are mirror images.
+    """
+    body = np.flatnonzero(~carried(skin, bones))
+    probes = recording.of(np.unique(np.linspace(0, len(recording.frames) - 1, _PROBES).astype(int)))
+    height = (yield from skinned.slices(skin, bones, probes, body, axes=slice(2, 3)))[..., 0]
+    size = float(np.median(np.ptp(height, axis=1)))
+    if not 0 < size < np.inf:
+        return None
+    clearance = (height - height.min(axis=1, keepdims=True)).min(axis=0)
+    chosen = body[clearance < _NEAR * size]
+    chosen = chosen[np.argsort(skin.part[chosen], kind="stable")]
+    most = min(_MOST_POINTS, max(_MOST_PLACES // len(recording.frames), 1))
+    chosen = chosen[_thinned(np.unique(skin.part[chosen], return_counts=True)[1], most)]
+    used, part = np.unique(skin.part[chosen], return_inverse=True)
+    yield
+    places = yield from skinned.slices(skin, bones, recording, chosen)
+    if not np.isfinite(places).all():
+        return None
+    yield
+    links = twin = None
+    if linked:
+        links = _links(skin, bones)[np.ix_(used, used)]
+        yield
+        place = np.full(len(skin.bones) + 1, -1)
+        place[used] = np.arange(len(used))
+        twin = place[twins(skin.vertices[body], skin.part[body], len(place))[used]]
+    motion = SkinMotion(places, part, links, rate, size, twin)
+    return FollowedSkin(motion, tuple((*skin.bones, "")[number] for number in used))
+
+
+def _thinned(counts: Indices, most: int) -> NDArray[np.bool_]:
+    """Which points to follow of parts with so many each (P,): of large parts fewer, evenly, until `most` are left."""
+    ordered = np.sort(counts)
+    caps = (most - np.cumsum(ordered) + ordered) / np.arange(len(counts), 0, -1)
+    cap = caps[(caps <= ordered).argmax()] if counts.sum() > most else ordered[-1]
+    count = np.repeat(counts, counts)
+    rank = np.arange(len(count)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = np.minimum(max(cap, 1) / count, 1.0)
+    return np.asarray(np.floor((rank + 1) * share + 1e-9) > np.floor(rank * share + 1e-9))
+
+
+def carried(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
+    """Vertices of what a character carries: hung on bones that hang from bones with a skin.
+
+    A robot of rigid pieces has no such skin above them; there they are its body.
+    """
+    clothed = {skin.bones[number] for number in np.unique(skin.part[~skin.hung]) if number < len(skin.bones)}
+    carries = [any(parent in clothed for parent in above(bones, name)) for name in skin.bones]
+    return skin.hung & np.array([*carries, False])[skin.part]
+
+
+def _links(skin: RigSkin, bones: RigBones) -> NDArray[np.bool_]:
+    """Which parts hang together, by welded skin or as parent and child, (P, P) with the armature's own last."""
+    count = len(skin.bones) + 1
+    links = np.zeros((count, count), dtype=bool)
+    corners = skin.part[skin.triangles]
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        links[corners[:, one], corners[:, other]] = True
+    # Imported meshes are cut open along their edges: vertices in one place are one.
+    size = max(float(np.ptp(skin.vertices, axis=0).max()), 1e-12)
+    _, place = np.unique(np.round(skin.vertices / (_WELD * size)), axis=0, return_inverse=True)
+    order = np.lexsort((skin.part, place.ravel()))
+    same = np.diff(place.ravel()[order]) == 0
+    links[skin.part[order[1:]][same], skin.part[order[:-1]][same]] = True
+    number = {name: index for index, name in enumerate(skin.bones)}
+    for name, index in number.items():
+        parent = next((bone for bone in above(bones, name) if bone in number), None)
+        if parent:
+            links[index, number[parent]] = True
+    return np.asarray(links | links.T)
