@@ -65,13 +65,20 @@ def run(job: Job[Result], show: Callable[[Progress], None] | None = None) -> Res
 
 
 def counted(
-    work: Generator[int, None, Result], stage: str, count: int, *, part: int = 0, parts: int = 1, share: float = 1.0
+    work: Generator[int | None, None, Result],
+    stage: str,
+    count: int,
+    *,
+    part: int = 0,
+    parts: int = 1,
+    share: float = 1.0,
 ) -> Job[Result]:
     """A job of work that yields how many of `count` items are done.
 
     Parameters
     ----------
-    work : generator of int
+    work : generator of int or None
+        None where as many are done as before.
     stage : str
         One of `STAGES`.
     count : int
@@ -80,10 +87,11 @@ def counted(
     share : float
         What all of them together are of the stage, from its beginning.
     """
-    watched = _Watched(work)
+    watched, so_far = _Watched(work), 0
     with closing(work):
         for done in watched:
-            yield Progress(stage, share * (part + done / count) / parts)
+            so_far = so_far if done is None else done
+            yield Progress(stage, share * (part + so_far / count) / parts)
     return watched.result
 
 

@@ -9,6 +9,7 @@ import pytest
 from softground_addon.blender import compat, node_graph
 from softground_addon.blender.after import debris_object
 from softground_addon.core.after.debris import Debris
+from softground_addon.core.settings import SceneUnits
 from tests.benchmarks.test_playback_speed import heavy_walker
 
 pytestmark = pytest.mark.benchmark
@@ -36,8 +37,8 @@ def thrown(count):
 def put(scene, count):
     parent = bpy.data.objects.new("Ground", None)
     scene.collection.objects.link(parent)
-    about = {"frame_rate": 24.0, "time_stretch": 1.0, "gravity": 9.81, "unit_scale": 1.0}
-    return debris_object.put(parent, thrown(count), surface="snow", **about)
+    units = SceneUnits(frame_rate=24.0, time_stretch=1.0, gravity_m_s2=9.81, unit_scale_m=1.0)
+    return debris_object.put(parent, thrown(count), surface="snow", units=units)
 
 
 def an_instance_each(obj):

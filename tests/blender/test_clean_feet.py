@@ -17,6 +17,7 @@ from softground_addon.blender.compat import action_curves
 from softground_addon.blender.reading.shots import estimate_shot, read_shot, settings_of
 from softground_addon.blender.response import response_job
 from softground_addon.blender.response.character_keys import controls_of
+from softground_addon.core.composers.responses import standing_on
 from softground_addon.core.errors import InputError
 from softground_addon.core.motion.motion import SoleMotion
 from softground_addon.core.numerics.intervals import runs
@@ -37,7 +38,7 @@ def read(scene):
     """The shot, and when its first character's soles touch."""
     wanted = replace(settings_of(scene, grounded=True), output="RESPONSE")
     shot = jobs.run(read_shot(scene, wanted))
-    standing = jobs.run(response_job.standing_on(shot.motions, shot.terrain, wanted.response))
+    standing = standing_on(shot.motions, shot.terrain, wanted.response)
     loads = jobs.run(estimate_shot(wanted, replace(shot, motions=standing)))[0]
     return shot, at_scene_frames(loads.contacts.touching, loads.motion.frames, shot.motions[0])
 

@@ -4,10 +4,11 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.response import response_job
-from softground_addon.core.composers import ground_plan
+from softground_addon.core.composers import ground_plan, pressed_shot
+from softground_addon.core.composers.responses import LEAN_PASSES, NOTICEABLE_LEAN
 from softground_addon.core.loads import estimate
 from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.numerics.slices import sliced
 from tests.blender import responders, shots
 from tests.blender.grounds import plane
 
@@ -19,24 +20,26 @@ def test_the_lean_that_is_keyed_is_the_lean_that_pressed_the_ground(scene, monke
     scene.softground.tilt.strength = 1.0
     scene.softground.material.youngs_modulus = 6e4
     leans, answers = [], []
-    leaning, responses_of = response_job.leaning, response_job.responses_of
+    leaning, responses_of = pressed_shot.leaning, pressed_shot.responses_of
 
+    @sliced
     def watched(*arguments):
-        leans.append((yield from leaning(*arguments)))
+        leans.append((yield from leaning.slices(*arguments)))
         return leans[-1]
 
+    @sliced
     def kept(*arguments):
-        answers.extend((yield from responses_of(*arguments)))
+        answers.extend((yield from responses_of.slices(*arguments)))
         return answers
 
-    monkeypatch.setattr(response_job, "leaning", watched)
-    monkeypatch.setattr(response_job, "responses_of", kept)
+    monkeypatch.setattr(pressed_shot, "leaning", watched)
+    monkeypatch.setattr(pressed_shot, "responses_of", kept)
     responders.bake(scene)
     first, last = leans[0].leans[0], answers[0].response.lean
-    assert np.abs(first).max() > response_job.NOTICEABLE_LEAN, "the body sways over its own prints"
-    assert 2 <= len(leans) < response_job.LEAN_PASSES, "a few passes are enough"
+    assert np.abs(first).max() > NOTICEABLE_LEAN, "the body sways over its own prints"
+    assert 2 <= len(leans) < LEAN_PASSES, "a few passes are enough"
     pressed_by = leans[-2].leans[0]
-    assert np.abs(last - pressed_by).max() < response_job.NOTICEABLE_LEAN
+    assert np.abs(last - pressed_by).max() < NOTICEABLE_LEAN
 
 
 @pytest.mark.parametrize(("given", "times"), [(True, 1), (False, 2)])
@@ -68,10 +71,11 @@ def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, mon
     scene.softground.tilt.strength = 1.0
     scene.softground.material.youngs_modulus = 6e4
     passes, found = [], []
-    leaning, free_loads = response_job.leaning, estimate.free_loads
+    leaning, free_loads = pressed_shot.leaning, estimate.free_loads
 
+    @sliced
     def watched(loads, motions, *others):
-        passes.append((yield from leaning(loads, motions, *others)))
+        passes.append((yield from leaning.slices(loads, motions, *others)))
         assert passes[-1].motions[1] is motions[1]
         return passes[-1]
 
@@ -79,7 +83,7 @@ def test_what_cannot_lean_stays_as_it_is_and_its_loads_are_found_once(scene, mon
         found.append(motion.name)
         return free_loads(motion, *others, **options)
 
-    monkeypatch.setattr(response_job, "leaning", watched)
+    monkeypatch.setattr(pressed_shot, "leaning", watched)
     monkeypatch.setattr(estimate, "free_loads", counted)
     responders.bake(scene)
     assert len(passes) > 1

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.after import flight
 from ...core.after.debris import Debris
+from ...core.settings import SceneUnits
 from .. import compat
 from ..node_graph import inputs_of, modifier_with
 from ..settings import exists
@@ -50,10 +51,7 @@ def put(
     debris: Debris | None,
     *,
     surface: str,
-    frame_rate: float,
-    time_stretch: float,
-    gravity: float,
-    unit_scale: float,
+    units: SceneUnits,
 ) -> bpy.types.Object | None:
     """Let a ground have debris in place of what it may have; None takes that away.
 
@@ -63,15 +61,9 @@ def put(
     debris : Debris or None
     surface : str
         See `core.ground.presets.SURFACES`.
-    frame_rate : float
-        Scene frames per second [Hz].
-    time_stretch : float
-        Frames of the animation, which nodes count, per frame of the scene.
-    gravity : float
-        [m/s²]
-    unit_scale : float
-        Metres per Blender unit.
+    units : SceneUnits
     """
+    unit_scale, gravity, time_stretch = units.unit_scale_m, units.gravity_m_s2, units.time_stretch
     older = of(ground)
     kept = _settings_of(older) if older else {}
     remove(ground)
@@ -89,7 +81,7 @@ def put(
     ground[THROWN] = obj
     shapes = debris_shapes.collection_of(surface)
     group = nodes.build(
-        frame_rate=frame_rate * time_stretch,
+        frame_rate=units.frame_rate * time_stretch,
         gravity=gravity,
         unit_scale=unit_scale,
         shapes=shapes,

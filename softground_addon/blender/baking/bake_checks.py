@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import BakeError, InputError
+from ...core.errors import InputError
 from ...core.findings import Finding
-from ...core.ground.material import GroundMaterial
-from ...core.motion.motion import CharacterMotion, shortest_length
 from ...core.numerics.cell_keys import AROUND, ROW, Keys, among, cells_of, keys_at, keys_of
 from ...core.numerics.slices import Slices, sliced
-from ...core.record.footprints import QUANTUM, Footprint
 from ..ground import ground_mesh
 
 Array = NDArray[np.float64]
@@ -33,9 +29,6 @@ holds 9."""
 
 MOST_MISSED = 0.02
 """Share of the prints' area that may lie far from any vertex before the ground is refined along the trail."""
-
-RIM_TOLERANCE = 1e-6
-"""Largest relative error of the rim's volume that passes (MODEL.md, section 4)."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +80,6 @@ def coverage(vertices: Array, index: Indices | slice, printed: Keys, cell_size: 
     near = np.where(blocks[place] == around, crowd[place], 0).sum(axis=1)
     missed = float(share[near < FEW].sum()) / max(1, len(cells))
     return Coverage(spacing, missed, bool(crowd.max() >= FEW))
-
-
-def shortest_sole(motions: Sequence[CharacterMotion]) -> float:
-    """Length of the shortest sole of all characters [m]."""
-    return shortest_length(sole.sole.length for motion in motions for sole in motion.soles)
 
 
 def wants_detail(ground: bpy.types.Object, cover: Coverage, detail: str, cell_size: float, sole_length: float) -> bool:
@@ -148,32 +136,3 @@ def copy_findings(ground: bpy.types.Object) -> list[Finding]:
             "show it in the viewport too (the modifier's screen icon), and bake again.",
         )
     ]
-
-
-def check_volumes(footprints: Sequence[Footprint], material: GroundMaterial, factors: Array | None = None) -> None:
-    """Raise BakeError if a footprint breaks an invariant of MODEL.md, section 4.
-
-    Parameters
-    ----------
-    footprints : sequence of Footprint
-    material : GroundMaterial
-    factors : (V, 3) float array, optional
-        What is painted on the ground: there, the rim's share lies between the least and the largest painted.
-    """
-    depth, rim = np.ones((2, 2)) if factors is None else (np.append(column, 1.0) for column in factors[:, 1:].T)
-    least, most = np.clip(2.0 * material.poisson_ratio * np.array([rim.min(), rim.max()]), 0.0, 1.0)
-    for footprint in footprints:
-        raised = footprint.rim_m3 + footprint.unplaced_rim_m3
-        rounding = QUANTUM * footprint.cell_size**2 * (len(footprint.rim.cells) + len(footprint.compression.cells))
-        low, high = least * footprint.compressed_m3, most * footprint.compressed_m3
-        if not low * (1 - RIM_TOLERANCE) - rounding <= raised <= high * (1 + RIM_TOLERANCE) + rounding:
-            raise BakeError(
-                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} raised {raised:.6g} m³ where "
-                f"{high:.6g} m³ were displaced; nothing was written. Please report this as a bug."
-            )
-        fallen = np.max(footprint.tile(footprint.pressing) - footprint.tile(footprint.compression), initial=0.0)
-        if footprint.max_depth_m > (material.layer_depth * depth.max() + fallen) * (1 + 1e-9):
-            raise BakeError(
-                f"The print of {footprint.sole} at frame {footprint.start_frame:.0f} is deeper than the layer; nothing "
-                "was written. Please report this as a bug."
-            )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,34 +17,37 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.debris import Debris
 from ...core.after.events import as_edited, events
-from ...core.composers.edited_steps import with_edits
+from ...core.after.thrown_debris import thrown
 from ...core.composers.ground_plan import GroundPlan
+from ...core.composers.pressed_shot import PressedShot, edit_findings, offsets_mm, press_shot
 from ...core.composers.relief_plan import with_shoe_treads
+from ...core.composers.responses import gap_table, response_findings, suggested_speeds, worst_gaps
 from ...core.composers.self_check import self_check
-from ...core.composers.simulation import simulate
 from ...core.files import report
 from ...core.findings import Finding
-from ...core.loads.cell_limits import check_cell_size
-from ...core.loads.estimate import CharacterLoads
+from ...core.ground.soft_ground import SoftGround
 from ...core.meshing.refinement import refine
 from ...core.meshing.region import Region
+from ...core.motion.motion import shortest_sole
 from ...core.record import record
 from ...core.record.edits import StepEdit, mesh_soles
 from ...core.record.footprints import Footprint
 from ...core.record.pressed_ground import PressedGround, Trail
 from ...core.settings import Acts, BakeSettings
 from .. import settings
+from ..after import debris_object
 from ..ground import baked_ground, created_ground, ground_mesh, trail_detail, weather
 from ..ground.baked_ground import EVENTS
 from ..ground.materials import drafted
 from ..ground.modified_prints import are_undone, undone_prints
-from ..jobs import Job, Progress, meanwhile
+from ..jobs import Job, Progress, counted, meanwhile
 from ..reading import staleness
-from ..reading.shots import Shot, estimate_shot, ground_of, read_shot, settings_of
+from ..reading.shots import Shot, ground_of, read_shot, settings_of
 from ..response import response_job
-from . import bake_report, debris_job, step_soles
-from .bake_checks import check_volumes, copy_findings, coverage, coverage_findings, shortest_sole, wants_detail
+from . import bake_report, step_soles
+from .bake_checks import copy_findings, coverage, coverage_findings, wants_detail
 from .publish import at_the_end, publish, sign
 
 Array = NDArray[np.float64]
@@ -98,66 +101,72 @@ def bake(
     started = time.perf_counter()
     moving = bake_report.ground_findings(settings.found(wanted.ground) if wanted.ground else None, wanted.frames[0])
     shot = yield from read_shot(scene, wanted)
-    wanted = with_shoe_treads(wanted, shot.motions)
-    movers = staleness.of_movers(scene, wanted)
-    surface = shot.surface
+    surface, factors = shot.surface, shot.surface.factors if shot.surface else None
+    hidden = bake_report.hidden_skins(scene, wanted, shot.motions)
+    edits = step_soles.edits_with_soles(scene, wanted, edits)
+    movers = staleness.of_movers(scene, wanted) | staleness.of_soles(scene, mesh_soles(edits))
+    ground = ground_of(wanted, shot)
     shot_hash = yield from meanwhile(
         Progress("sample", 1.0), report.hash_inputs.slices(shot.motions, surface.vertices if surface else None)
     )
     sampled = time.perf_counter()
 
-    edits = step_soles.edits_with_soles(scene, wanted, edits)
-    movers |= staleness.of_soles(scene, mesh_soles(edits))
-    loads, left, forces, responses = yield from _press(wanted, shot, edits)
-    left, debris = debris_job.thrown(wanted, shot.terrain, loads, left)
+    wanted = with_shoe_treads(wanted, shot.motions)
+    frames = wanted.frames[1] - wanted.frames[0] + 1
+    pressing = press_shot(wanted, shot.motions, ground, edits, factors)
+    pressed = yield from counted(pressing, "simulate", frames)
+    left, debris = _thrown(wanted, ground, pressed)
     footprints = left.footprints  # with all of their rims
     simulated = time.perf_counter()
 
-    gaps = response_job.gap_table(responses)
-    if gaps is None:
-        gaps = yield from response_job.gaps_left(loads, shot.motions, shot.terrain, left.edited)
-    layers = (yield from response_job.layers_of(wanted, shot.rigs, responses)) if write else []
+    measuring = gap_table.slices(pressed.responses, pressed.loads, shot.motions, shot.terrain, left.edited)
+    gaps = yield from meanwhile(Progress("simulate", 1.0), measuring)
     inputs = wanted.inputs()
-    if surface and surface.factors is not None:
-        inputs["painted_crc32"] = f"{zlib.crc32(surface.factors.tobytes()):08x}"
+    if factors is not None:
+        inputs["painted_crc32"] = f"{zlib.crc32(factors.tobytes()):08x}"
     input_hash = report.hash_inputs(wanted.inputs(Acts.WRITING), inputs.get("painted_crc32", ""), shot_hash)
-    ground_name = wanted.ground.name if wanted.ground else "the ground"
-    checking = self_check.slices(loads, footprints, shot.terrain, wanted.cell_size_m, ground_name)
+    checking = self_check.slices(
+        pressed.loads,
+        footprints,
+        shot.terrain,
+        wanted.cell_size_m,
+        wanted.ground.name if wanted.ground else "the ground",
+    )
     findings = [
         *(yield from meanwhile(Progress("simulate", 1.0), checking)),
         *moving,
-        *bake_report.edit_findings(left),
-        *bake_report.hidden_skins(scene, wanted, shot.motions),
+        *edit_findings(left),
+        *hidden,
     ]
-    of_responses = response_job.findings(responses)
-    happened = events(loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
+    of_responses = response_findings(pressed.responses)
+    happened = events(pressed.loads, footprints, surface=wanted.surface, first_frame=wanted.frames[0])
     build_report = partial(
         report.build,
         inputs=inputs,
         input_hash=input_hash,
         steps=left.steps,
         edits=left.edits,
-        offsets_mm=bake_report.offsets_mm(loads),
-        forces=forces,
+        offsets_mm=offsets_mm(pressed.loads),
+        forces=pressed.forces,
         gaps_mm=gaps,
-        worst_gaps=response_job.worst_gaps(responses),
-        suggested_speed=response_job.suggested_speeds(shot.motions, footprints),
+        worst_gaps=worst_gaps(pressed.responses),
+        suggested_speed=suggested_speeds(shot.motions, footprints),
         events=as_edited(happened, left.steps),
     )
     sole_length = shortest_sole(shot.motions)
+    layers = (yield from response_job.layers_of(wanted, shot.rigs, pressed.responses)) if write else []
     # They are as long as the animation, and from here on only the ground counts.
     shot = replace(shot, motions=(), rigs=())
-    del loads, responses
+    del pressed, pressing, measuring, checking
     written: Written | None = None
     if write and wanted.output != "RESPONSE":
         about = {"inputs": inputs, "input_hash": input_hash, EVENTS: happened}
         written = yield from write_prints(scene, wanted, shot, left.with_about(about), sole_length)
         findings += written.findings
-        debris_job.put(written.ground, debris, wanted)
+        debris_object.put(written.ground, debris, surface=wanted.surface, units=wanted)
     if write and wanted.output != "PRINTS":
         response_job.put_layers(scene, wanted, layers)
     finished = time.perf_counter()
-    frames = wanted.frames[1] - wanted.frames[0] + 1
     result = build_report(
         timings={
             "sample": sampled - started,
@@ -174,6 +183,20 @@ def bake(
         sign(written.display_mesh, written.ground, stamped, movers, **told)
     yield Progress("write", 1.0)
     return BakeResult(result, tuple(step.left or step.baked for step in left.steps if not step.is_copy))
+
+
+def _thrown(wanted: BakeSettings, ground: SoftGround, pressed: PressedShot) -> tuple[record.BakeRecord, Debris | None]:
+    """What the steps of a shot leave, with what they throw booked; that is None where debris is off."""
+    if not wanted.debris:
+        return pressed.left, None
+    return thrown(
+        pressed.left,
+        pressed.loads,
+        ground,
+        surface=wanted.surface,
+        cell_size=wanted.cell_size_m,
+        gravity=wanted.gravity_m_s2,
+    )
 
 
 @dataclass(frozen=True)
@@ -302,63 +325,3 @@ def _given(
     )
     ground, draft = settings.found(name), settings.found(drafted_name)
     return baked_ground.on_detail(ground, draft, index, vertices), [*findings, *copy_findings(ground)]
-
-
-def _press(
-    wanted: BakeSettings, shot: Shot, edits: Mapping[str, StepEdit]
-) -> Job[
-    tuple[list[CharacterLoads], record.BakeRecord, dict[str, object] | None, list[response_job.CharacterResponse]]
-]:
-    """Loads, footprints and, on request, forces of a shot, and how its characters answer to the edited steps.
-
-    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
-    lean that the pressed ground gives is the lean that pressed it.
-    """
-    asked = wanted.response
-    if asked:
-        response_job.check_characters(wanted.characters)
-    standing = yield from response_job.standing_on(shot.motions, shot.terrain, asked)
-    loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
-    footprints, forces = yield from _simulate(wanted, shot, loads)
-    leaning = None
-    for _ in range(response_job.LEAN_PASSES):
-        before = leaning
-        left = _edited(wanted, shot, footprints, edits)
-        leaning = yield from response_job.leaning(loads, standing, shot.terrain, left.edited, asked)
-        if not response_job.leans_anew(leaning, before):
-            break
-        known = list(zip(before.motions if before else standing, loads, strict=True))
-        loads = yield from estimate_shot(wanted, replace(shot, motions=leaning.motions), known)
-        footprints, forces = yield from _simulate(wanted, shot, loads)
-    check_volumes(footprints, wanted.material, shot.surface.factors if shot.surface else None)
-    left = _edited(wanted, shot, footprints, edits)
-    responses = yield from response_job.responses_of(loads, shot.motions, shot.terrain, left, asked)
-    return loads, left, forces, responses
-
-
-def _edited(
-    wanted: BakeSettings, shot: Shot, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
-) -> record.BakeRecord:
-    left = record.BakeRecord(footprints, {})
-    return with_edits(left, edits, ground_of(wanted, shot), wanted.cell_size_m) if edits else left
-
-
-def _simulate(
-    wanted: BakeSettings, shot: Shot, loads: Sequence[CharacterLoads]
-) -> Job[tuple[list[Footprint], dict[str, object] | None]]:
-    """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
-    footprints: list[Footprint] = []
-    check_cell_size(loads, wanted.cell_size_m, wanted.longest_bake_s)
-    frames: list[float] = []
-    forces: list[tuple[Array, ...]] = []
-    count = max(len(motion.frames) for motion in shot.motions)
-    for result in simulate(loads, ground_of(wanted, shot), wanted.cell_size_m):
-        footprints += result.footprints
-        frames.append(result.frame)
-        if wanted.keep_forces:
-            forces.append(result.forces)
-        yield Progress("simulate", len(frames) / count)
-    footprints.sort(
-        key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
-    )
-    return footprints, bake_report.force_table(loads, frames, forces) if wanted.keep_forces else None

@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
+from ...core.composers.responses import floating_mm
 from ...core.findings import Finding
-from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
-from ...core.record.edits import without_sole, without_step
 from ...core.record.footprints import Footprint
-from ...core.record.record import BakeRecord
 from ...core.record.typical_depth import typical_of
 from ...core.settings import BakeSettings
 from .. import settings
@@ -22,9 +18,6 @@ from ..characters.skin_sampling import hidden_on
 from ..ground import ground_mesh, still_ground, weather
 from ..jobs import STAGES
 from ..reading import staleness
-from ..response import response_job
-
-Array = NDArray[np.float64]
 
 FLOATING = "floating_mm"
 """Entry of a bake's summary: how far feet float above their prints [mm]."""
@@ -73,37 +66,13 @@ def hidden_skins(scene: bpy.types.Scene, wanted: BakeSettings, motions: Sequence
     return findings
 
 
-def edit_findings(left: BakeRecord) -> list[Finding]:
-    """Which of the artist's edits have lost their step."""
-    steps = [
-        Finding(
-            "edit_without_step",
-            "warning",
-            f"Step '{name}', which you edited, no longer exists: its foot does not touch the ground at that frame.",
-            "The edit is kept for when the step comes back; Reset All Steps drops it.",
-        )
-        for name in without_step(left.footprints, left.edits)
-    ]
-    soles = [
-        Finding(
-            "edit_without_sole",
-            "warning",
-            f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the "
-            f"sole '{left.edits[name].sole}' of its edit.",
-            "The edit is kept for when that foot or mesh is there; choose another sole, or reset the step.",
-        )
-        for name in without_sole(left.footprints, left.edits)
-    ]
-    return steps + soles
-
-
 def summary(result: dict[str, Any]) -> dict[str, float]:
     """What the panel shows of a bake."""
     totals, timings = result["totals"], result["timings"]
     seconds = sum(timings[stage] for stage in STAGES)
     shown = {key: totals[key] for key in (*ground_mesh.SHOWN, TYPICAL)}
     last = max((step["frame_end"] for step in result["steps"]), default=0.0)
-    return shown | {"seconds": seconds, FLOATING: response_job.floating_mm(result["gaps_mm"]), LAST_FRAME: last}
+    return shown | {"seconds": seconds, FLOATING: floating_mm(result["gaps_mm"]), LAST_FRAME: last}
 
 
 def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
@@ -116,31 +85,6 @@ def summary_of_prints(footprints: Sequence[Footprint]) -> dict[str, float]:
     }
 
 
-def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
-    """Constant float (positive) or sink of the source animation, by character and sole [mm]."""
-    return {
-        character.motion.name: {
-            sole.sole.name: round(float(offset) * 1e3, 3)
-            for sole, offset in zip(character.motion.soles, character.contacts.offset, strict=True)
-        }
-        for character in loads
-    }
-
-
 def stale_reasons(scene: bpy.types.Scene) -> tuple[str, ...]:
     """What has changed since the bake on the scene's ground, for the user to read; nothing if it is up to date."""
     return staleness.reasons(scene, weather.felt(settings.snapshot(scene)))
-
-
-def force_table(
-    loads: Sequence[CharacterLoads], frames: list[float], forces: list[tuple[Array, ...]]
-) -> dict[str, object]:
-    """The force on each sole at each frame [N], by character and sole."""
-    characters: dict[str, dict[str, list[list[float]]]] = {}
-    for number, character in enumerate(loads):
-        of_character = np.array([at_frame[number] for at_frame in forces])
-        names = [sole.sole.name for sole in character.motion.soles]
-        characters[character.motion.name] = {
-            name: np.round(of_character[:, sole], 3).tolist() for sole, name in enumerate(names)
-        }
-    return {"frames": frames, "characters": characters}

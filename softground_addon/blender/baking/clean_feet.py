@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.composers.responses import CharacterResponse, standing_on
 from ...core.errors import InputError
 from ...core.loads.estimate import CharacterLoads
 from ...core.loads.sliding import treadmill_speed
@@ -27,7 +28,6 @@ from ..jobs import Job, Progress, meanwhile
 from ..reading.shots import Shot, estimate_shot, read_shot, settings_of
 from ..response import response_job
 from ..response.character_keys import ReadRig
-from ..response.response_job import CharacterResponse
 
 EXACT = 0.1
 """Keys are left out where straight lines stay within this part of the tolerance of other layers."""
@@ -83,7 +83,8 @@ def clean_feet(scene: bpy.types.Scene) -> Job[CleanFeet]:
     wanted = replace(wanted, response=replace(wanted.response, tilt=None), characters=characters)
     response_job.check_characters(wanted.characters)
     shot = yield from read_shot(scene, wanted)
-    standing = yield from response_job.standing_on(shot.motions, shot.terrain, wanted.response)
+    stood = standing_on.slices(shot.motions, shot.terrain, wanted.response)
+    standing = yield from meanwhile(Progress("sample", 1.0), stood)
     loads = yield from estimate_shot(wanted, replace(shot, motions=standing))
     cleaned, feet, missed = yield from _cleaned(wanted, shot, loads)
     layers = yield from response_job.layers_of(wanted, shot.rigs, cleaned, accuracy=EXACT)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.after.felt_weather import felt_in
+from ...core.after.thrown_debris import thrown_again
 from ...core.composers.edited_steps import EditedSteps
 from ...core.errors import InputError
 from ...core.ground.material import Pressure
@@ -25,7 +26,7 @@ from ..after import debris_object
 from ..ground import baked_ground, ground_mesh, painted_ground
 from ..reading import staleness
 from ..reading.shots import Shot, ground_of
-from . import bake_job, bake_report, debris_job
+from . import bake_job, bake_report
 
 AROUND = 2.0
 """How far around the prints the ground is looked at, for those that are moved [m]."""
@@ -66,7 +67,7 @@ def editable(scene: bpy.types.Scene) -> EditableBake:
         If there is none, or its record does not say what it was made with.
     """
     ground = scene.softground.ground
-    left = record.load(bytes(baked_ground.stored_record(ground)))
+    left = baked_ground.record_of(ground)
     made_with = _made_with(scene, left)
     names = painted_ground.names_of(ground, made_with.painted)
     surface = ground_mesh.undisturbed_surface(ground, made_with.unit_scale_m, names)
@@ -95,10 +96,16 @@ def edit(scene: bpy.types.Scene, bake: EditableBake, edits: Mapping[str, StepEdi
     surface, is_deleted = str(left.about["inputs"]["surface"]), bool(left.thrown) and debris_object.of(ground) is None
     debris = None
     if left.throws:
-        left, debris = debris_job.thrown_again(bake.made_with, surface, bake.shot.terrain, left)
+        left, debris = thrown_again(
+            left,
+            ground_of(bake.made_with, bake.shot),
+            surface=surface,
+            cell_size=bake.made_with.cell_size_m,
+            gravity=bake.made_with.gravity_m_s2,
+        )
     written = jobs.run(bake_job.write_prints(scene, bake.made_with, bake.shot, left, sole_length))
     if left.throws and not is_deleted:
-        debris_job.put(ground, debris, bake.made_with, surface)
+        debris_object.put(ground, debris, surface=surface, units=bake.made_with)
     renewed = summary | bake_report.summary_of_prints(left.edited)
     ground_mesh.mesh_of(written.display_mesh)[ground_mesh.SUMMARY] = renewed
     ground_mesh.note_warnings(written.display_mesh, warnings)

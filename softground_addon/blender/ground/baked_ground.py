@@ -232,6 +232,18 @@ def stored_record(ground: bpy.types.Object) -> memoryview:
         ) from None
 
 
+def record_of(ground: bpy.types.Object) -> record.BakeRecord:
+    """The record of a ground's bake.
+
+    Raises
+    ------
+    InputError
+        If there is no bake, or its record is damaged or no longer fits the mesh.
+    """
+    stored = bytes(stored_record(ground))
+    return record.load(stored)
+
+
 def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     """The record of a ground's bake: its footprints as the artist left them, and what is known about them.
 
@@ -240,8 +252,8 @@ def load(ground: bpy.types.Object) -> tuple[list[Footprint], dict[str, Any]]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    stored = record.load(bytes(stored_record(ground)))
-    return stored.edited, dict(stored.about)
+    left = record_of(ground)
+    return left.edited, dict(left.about)
 
 
 def events_of(ground: bpy.types.Object) -> list[Event]:
@@ -252,11 +264,11 @@ def events_of(ground: bpy.types.Object) -> list[Event]:
     InputError
         If there is no bake, or it was made before there were events.
     """
-    stored = record.load(bytes(stored_record(ground)))
-    table = stored.about.get(EVENTS)
+    left = record_of(ground)
+    table = left.about.get(EVENTS)
     if not isinstance(table, list):
         raise InputError(f"The bake on ground '{ground.name}' was made without events: bake again.")
-    return as_edited(table, stored.steps)
+    return as_edited(table, left.steps)
 
 
 def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
@@ -267,13 +279,13 @@ def steps_of(ground: bpy.types.Object) -> list[record.EditableStep]:
     InputError
         If there is no bake, or its record is damaged or no longer fits the mesh.
     """
-    return [step for step in record.load(bytes(stored_record(ground))).steps if step.left]
+    return [step for step in record_of(ground).steps if step.left]
 
 
 def edits_of(ground: bpy.types.Object) -> Mapping[str, StepEdit]:
     """What the artist changed of the steps of a ground's bake, by their ids; nothing where no bake can be read."""
     try:
-        return record.load(bytes(stored_record(ground))).edits
+        return record_of(ground).edits
     except InputError:
         return {}
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import bpy
 
+from ...core.composers.responses import NOTICEABLE_GAP_MM
 from .. import settings
 from ..animation_layer import nla_layer
 from ..baking import bake_report
 from ..ground import baked_ground, ground_mesh
 from ..operator_base import OnBake
-from ..response import response_job
 
 
 def draw(layout: Any, options: Any, summary: Any, character: Any) -> None:
@@ -52,7 +52,7 @@ def _warnings(layout: Any, warnings: Sequence[str]) -> None:
 def _floating_feet(layout: Any, options: Any, summary: Any) -> None:
     """How far the feet are above the prints that they made, and a button that lets them down."""
     floating = summary.get(bake_report.FLOATING, 0.0)
-    if floating < response_job.NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
+    if floating < NOTICEABLE_GAP_MM or options.grounding.use or options.sink_feet:
         return
     box = layout.box().column(align=True)
     box.label(text=f"Feet float up to {floating:.0f} mm", icon="INFO", translate=False)

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
+from ...core.composers.responses import NOTICEABLE_GAP_MM
 from ...core.response.tilt import AUTHORS_TORQUES, PAPER_TORQUES, TiltGains, body_gains
 from .. import settings
 from ..animation_layer import nla_layer
@@ -148,7 +149,7 @@ def _layer_notes(layout: Any, notes: dict[str, str]) -> None:
     row.label(text=f"Suggested Speed {speed}", icon="TIME", translate=False)
     row.operator("softground.slow_down", text="Apply")
     for frame, gap_mm, sole in response_job.worst_gaps_in(notes)[:_SHOWN]:
-        if abs(gap_mm) >= response_job.NOTICEABLE_GAP_MM:
+        if abs(gap_mm) >= NOTICEABLE_GAP_MM:
             shown = f"Frame {frame:g}: {gap_mm:.1f} mm under {sole}"
             box.operator("softground.show_frame", text=shown, icon="TIME", translate=False).frame = frame
 

@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.after.thrown_debris import thrown
 from ...core.composers.ground_plan import plan_ground
 from ...core.composers.playhead import Playhead
 from ...core.composers.relief_plan import with_shoe_treads
@@ -23,13 +24,15 @@ from ...core.errors import InputError
 from ...core.ground.heightfield import Window
 from ...core.loads.cell_limits import check_cell_size
 from ...core.meshing.refinement import refine
+from ...core.motion.motion import shortest_sole
 from ...core.numerics.cell_keys import cells_at, keys_at
 from ...core.record import record
 from ...core.record.pressed_ground import PressedGround
 from ...core.settings import Acts, BakeSettings
 from .. import jobs, settings
-from ..baking import bake_report, debris_job
-from ..baking.bake_checks import coverage, shortest_sole, wants_detail
+from ..after import debris_object
+from ..baking import bake_report
+from ..baking.bake_checks import coverage, wants_detail
 from ..baking.publish import at_the_end, publish, sign
 from ..ground import baked_ground, ground_mesh, trail_detail
 from ..ground.created_ground import create_ground, reach_of
@@ -268,10 +271,19 @@ class LiveMode:
         shown = PressedGround.at(footprints, **at_the_end(made_with))
         place = baked_ground.on_itself(ground, np.flatnonzero(shown.covers(*vertices[:, :2].T)), vertices)
         left = record.BakeRecord(footprints, {"inputs": made_with.inputs(), "input_hash": ""})
-        left, debris = debris_job.thrown(made_with, self._analysis.shot.terrain, self._playhead.loads_by_now(), left)
+        debris = None
+        if made_with.debris:
+            left, debris = thrown(
+                left,
+                self._playhead.loads_by_now(),
+                ground_of(made_with, self._analysis.shot),
+                surface=made_with.surface,
+                cell_size=made_with.cell_size_m,
+                gravity=made_with.gravity_m_s2,
+            )
         published = jobs.run(publish(left, place, made_with))
         owner = settings.found(self._owner)
-        debris_job.put(owner, debris, made_with)
+        debris_object.put(owner, debris, surface=made_with.surface, units=made_with)
         sign(
             published.display_mesh,
             owner,

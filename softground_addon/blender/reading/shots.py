@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -12,13 +11,14 @@ from numpy.typing import NDArray
 from ...core.after.felt_weather import weathering_of
 from ...core.composers.ground_plan import GroundPlan, extent, plan_ground
 from ...core.composers.relief_plan import IMAGE
+from ...core.composers.shot_loads import loads_of_shot
 from ...core.errors import InputError
 from ...core.ground.heightfield import Terrain
 from ...core.ground.soft_ground import SoftGround
 from ...core.ground.terrain import MeshTerrain
 from ...core.ground.variation import PaintedSurface
 from ...core.loads.cell_limits import check_frames
-from ...core.loads.estimate import CharacterLoads, estimate_loads
+from ...core.loads.estimate import CharacterLoads
 from ...core.motion.motion import CharacterMotion
 from ...core.rig.mapping import RigMapping
 from ...core.settings import BakeSettings
@@ -136,65 +136,10 @@ def ground_of(wanted: BakeSettings, shot: Shot) -> SoftGround:
     return SoftGround(shot.terrain, wanted.material, wanted.pressure, shot.variation, weathering)
 
 
-def estimate_shot(
-    wanted: BakeSettings, shot: Shot, known: Iterable[tuple[CharacterMotion, CharacterLoads]] = ()
-) -> Job[list[CharacterLoads]]:
-    """The loads of all characters of a shot, with the masses and force models that are wanted.
-
-    Parameters
-    ----------
-    wanted : BakeSettings
-    shot : Shot
-    known : iterable of (CharacterMotion, CharacterLoads)
-        The loads of motions that were looked at before: where one of them is met again they are taken over.
-
-    Raises
-    ------
-    InputError
-        If nobody touches the ground.
-    """
-    loads, known_by = [], {id(motion): found for motion, found in known}
-    for motion, character in zip(shot.motions, wanted.characters, strict=True):
-        if id(motion) in known_by:
-            loads.append(known_by[id(motion)])
-            continue
-        moved = replace(motion, mass=character.mass_kg)
-        work = estimate_loads.slices(moved, shot.terrain, force_model=character.force_model, material=wanted.material)
-        loads.append((yield from meanwhile(Progress("sample", 1.0), work)))
-    yield Progress("sample", 1.0)
-    check_contacts(loads, shot.terrain, wanted.ground.name if wanted.ground else None)
-    return loads
-
-
-def check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
-    """Raise InputError if nothing touches the ground of that name, or it lies overhead or in layers under a foot."""
-    place = np.concatenate(
-        [
-            sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
-            for character in loads
-            for number, sole in enumerate(character.motion.soles)
-        ]
-    )
-    name = f"'{ground}'" if ground else "the ground"
-    if not len(place):
-        characters = ", ".join(f"'{character.motion.name}'" for character in loads)
-        raise InputError(
-            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
-            "feet in Advanced > Contacts."
-        )
-    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
-        raise InputError(
-            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
-            "separate the layer that is walked on into an object of its own."
-        )
-    for character in loads:
-        contacts, leg = character.contacts, character.motion.leg_length
-        below = -(contacts.clearance + contacts.offset)[contacts.touching]
-        if len(below) and (depth := float(np.median(below))) > leg:
-            raise InputError(
-                f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
-                "If it is a room, turn its faces inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
-            )
+def estimate_shot(wanted: BakeSettings, shot: Shot) -> Job[list[CharacterLoads]]:
+    """The loads of all characters of a shot (`loads_of_shot`)."""
+    work = loads_of_shot.slices(wanted, shot.motions, shot.terrain)
+    return (yield from meanwhile(Progress("sample", 1.0), work))
 
 
 def fit_ground(scene: bpy.types.Scene, wanted: BakeSettings) -> Job[GroundPlan]:

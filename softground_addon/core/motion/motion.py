@@ -7,7 +7,7 @@ This is the border between Blender and the physics. Everything that the core kno
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil
@@ -386,3 +386,8 @@ def orthonormal(transforms: Array) -> Array:
     rigid[..., :3, :3] = rotation @ (1.5 * np.eye(3) - 0.5 * gram)
     rigid[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
     return rigid
+
+
+def shortest_sole(motions: Sequence[CharacterMotion]) -> float:
+    """Length of the shortest sole of all characters [m]."""
+    return shortest_length(sole.sole.length for motion in motions for sole in motion.soles)

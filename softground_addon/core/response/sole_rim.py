@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.motion import Sole, SoleMotion, SolePatch
-from ..soles.undersides import sample_map
+from ..numerics.bilinear import sample_map
 from .foot_placement import Pieces, posed_points
 
 Array = NDArray[np.float64]

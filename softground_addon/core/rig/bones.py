@@ -44,7 +44,19 @@ def above(bones: RigBones, name: str) -> Iterator[str]:
 
 
 def family(bones: RigBones, name: str, ends: Set[str] = frozenset()) -> frozenset[str]:
-    """Names of a bone and of all that hang on it, up to the `ends`, which are left out."""
+    """Names of a bone and of all that hang on it, up to the `ends`, which are left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> point, matrix = np.zeros(3), np.eye(4)
+    >>> parents = {"leg": "", "foot": "leg", "toe": "foot", "heel": "foot"}
+    >>> bones = {name: RestBone(parent, matrix, point, point, 1.0) for name, parent in parents.items()}
+    >>> sorted(family(bones, "foot")), sorted(family(bones, "leg", {"toe"}))
+    (['foot', 'heel', 'toe'], ['foot', 'heel', 'leg'])
+    >>> list(above(bones, "toe"))
+    ['foot', 'leg']
+    """
     found = set()
     for other in bones:
         chain = [other, *above(bones, other)]

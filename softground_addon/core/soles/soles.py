@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..motion.motion import Array, Sole, SolePatch
 from ..motion.props import Prop, supports
+from ..numerics.bilinear import sample_map
 from ..numerics.interpolation import cubic
 from .outlines import area, as_one_polygon, convex_hull, signed_distance, trace_loops
-from .undersides import continue_outside, lowest_surface, sample_map, underside_map
+from .undersides import continue_outside, lowest_surface, underside_map
 
 FOOT_BREADTH = 0.373
 """Breadth over length of a foot: 10.06 cm / 26.97 cm, means of 1774 men (Gordon et al. 1989, NATICK/TR-89/044)."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..numerics import bilinear
 from ..numerics.triangles import SLACK, cross
 
 Array = NDArray[np.float64]
@@ -168,31 +167,3 @@ def _spread_nearest(heights: Array, known: NDArray[np.bool_]) -> Array:
         nearest = ((part[:, None] - source) ** 2).sum(axis=-1).argmin(axis=1)
         filled[tuple(part.T)] = heights[tuple(source[nearest].T)]
     return filled
-
-
-def sample_map(values: Array, points: Array, origin: Array, spacing: float) -> Array:
-    """Values of a map at points, bilinear between nodes and constant beyond the border.
-
-    Parameters
-    ----------
-    values : (rows, columns) float array
-    points : (..., 2) float array
-        Positions [m].
-    origin : (2,) float array
-        Position of node (0, 0) [m].
-    spacing : float
-        Distance between nodes [m].
-
-    Returns
-    -------
-    (...) float array
-    """
-    rows, columns = values.shape
-    position = np.clip((np.asarray(points) - origin) / spacing, 0, (columns - 1, rows - 1))
-    corner = np.minimum(position.astype(int), (max(columns - 2, 0), max(rows - 2, 0)))
-    u, v = np.moveaxis(position - corner, -1, 0)
-    column, row = np.moveaxis(corner, -1, 0)
-    right, above = np.minimum(column + 1, columns - 1), np.minimum(row + 1, rows - 1)
-    return bilinear.between(
-        (values[row, column], values[row, right], values[above, column], values[above, right]), u, v
-    )

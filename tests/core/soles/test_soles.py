@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from softground_addon.core.errors import InputError
+from softground_addon.core.numerics.bilinear import sample_map
 from softground_addon.core.soles.outlines import area, as_one_polygon, signed_distance, trace_loops
 from softground_addon.core.soles.soles import FOOT_BREADTH, anatomical_sole, sole_from_underside
-from softground_addon.core.soles.undersides import sample_map
 
 
 def prism(outline, bottom=0.0, top=0.1):

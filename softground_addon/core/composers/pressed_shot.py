@@ -1,0 +1,177 @@
+"""A bake between what is read and what is written: the prints that a shot leaves, and how its characters respond."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..findings import Finding
+from ..ground.soft_ground import SoftGround
+from ..loads.cell_limits import check_cell_size
+from ..loads.estimate import CharacterLoads
+from ..motion.motion import CharacterMotion
+from ..record.edits import StepEdit, without_sole, without_step
+from ..record.footprints import Footprint
+from ..record.record import BakeRecord
+from ..settings import BakeSettings
+from .edited_steps import with_edits
+from .responses import LEAN_PASSES, CharacterResponse, leaning, leans_anew, responses_of, standing_on
+from .self_check import check_volumes
+from .shot_loads import loads_of_shot
+from .simulation import simulate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PressedShot:
+    """What a shot leaves.
+
+    Attributes
+    ----------
+    loads : list of CharacterLoads
+    left : BakeRecord
+        Its steps, as they are and as they are edited.
+    forces : dict or None
+        The force on each sole at each frame [N], for the report; None where it is not asked for.
+    responses : list of CharacterResponse
+    """
+
+    loads: list[CharacterLoads]
+    left: BakeRecord
+    forces: dict[str, object] | None
+    responses: list[CharacterResponse]
+
+
+def press_shot(
+    wanted: BakeSettings,
+    motions: Sequence[CharacterMotion],
+    ground: SoftGround,
+    edits: Mapping[str, StepEdit],
+    factors: Array | None = None,
+) -> Generator[int | None, None, PressedShot]:
+    """Loads, footprints and, on request, forces of a shot, and how its characters respond to the edited steps.
+
+    Where bodies lean, the forces are found anew for the leaning bodies, and the ground is pressed by them, until the
+    lean that the pressed ground gives is the lean that pressed it.
+
+    Parameters
+    ----------
+    wanted : BakeSettings
+    motions : sequence of CharacterMotion
+    ground : SoftGround
+    edits : mapping of step id to StepEdit
+    factors : (V, 3) float array, optional
+        What is painted on the ground.
+
+    Yields
+    ------
+    int or None
+        Number of frames pressed so far, None for as many as before.
+
+    Raises
+    ------
+    InputError
+        If nobody touches the ground, or the cells are too small for the shot.
+    BakeError
+        If a footprint breaks an invariant.
+    """
+    terrain, asked = ground.terrain, wanted.response
+    standing = yield from standing_on.slices(motions, terrain, asked)
+    loads = yield from loads_of_shot.slices(wanted, standing, terrain)
+    footprints, forces = yield from _simulate(wanted, loads, ground)
+    before = None
+    for _ in range(LEAN_PASSES):
+        left = _edited(wanted, ground, footprints, edits)
+        yield None
+        now = yield from leaning.slices(loads, standing, terrain, left.edited, asked)
+        if not leans_anew(now, before):
+            break
+        known = list(zip(before.motions if before else standing, loads, strict=True))
+        before = now
+        loads = yield from loads_of_shot.slices(wanted, now.motions, terrain, known)
+        footprints, forces = yield from _simulate(wanted, loads, ground)
+    check_volumes(footprints, wanted.material, factors)
+    yield None
+    left = _edited(wanted, ground, footprints, edits)
+    responses = yield from responses_of.slices(loads, motions, terrain, left, asked)
+    return PressedShot(loads, left, forces, responses)
+
+
+def _edited(
+    wanted: BakeSettings, ground: SoftGround, footprints: Sequence[Footprint], edits: Mapping[str, StepEdit]
+) -> BakeRecord:
+    left = BakeRecord(footprints, {})
+    return with_edits(left, edits, ground, wanted.cell_size_m) if edits else left
+
+
+def _simulate(
+    wanted: BakeSettings, loads: Sequence[CharacterLoads], ground: SoftGround
+) -> Generator[int, None, tuple[list[Footprint], dict[str, object] | None]]:
+    """The footprints in the order of their first contact; on request, the force on each sole at each frame [N]."""
+    footprints: list[Footprint] = []
+    check_cell_size(loads, wanted.cell_size_m, wanted.longest_bake_s)
+    frames: list[float] = []
+    forces: list[tuple[Array, ...]] = []
+    for result in simulate(loads, ground, wanted.cell_size_m):
+        footprints += result.footprints
+        frames.append(result.frame)
+        if wanted.keep_forces:
+            forces.append(result.forces)
+        yield len(frames)
+    footprints.sort(
+        key=lambda footprint: (footprint.start_frame, footprint.end_frame, footprint.character, footprint.sole)
+    )
+    return footprints, _force_table(loads, frames, forces) if wanted.keep_forces else None
+
+
+def _force_table(
+    loads: Sequence[CharacterLoads], frames: list[float], forces: list[tuple[Array, ...]]
+) -> dict[str, object]:
+    """The force on each sole at each frame [N], by character and sole."""
+    characters: dict[str, dict[str, list[list[float]]]] = {}
+    for number, character in enumerate(loads):
+        of_character = np.array([at_frame[number] for at_frame in forces])
+        names = [sole.sole.name for sole in character.motion.soles]
+        characters[character.motion.name] = {
+            name: np.round(of_character[:, sole], 3).tolist() for sole, name in enumerate(names)
+        }
+    return {"frames": frames, "characters": characters}
+
+
+def offsets_mm(loads: Sequence[CharacterLoads]) -> dict[str, dict[str, float]]:
+    """Constant float (positive) or sink of the source animation, by character and sole [mm]."""
+    return {
+        character.motion.name: {
+            sole.sole.name: round(float(offset) * 1e3, 3)
+            for sole, offset in zip(character.motion.soles, character.contacts.offset, strict=True)
+        }
+        for character in loads
+    }
+
+
+def edit_findings(left: BakeRecord) -> list[Finding]:
+    """Which of the artist's edits have lost their step."""
+    steps = [
+        Finding(
+            "edit_without_step",
+            "warning",
+            f"Step '{name}', which you edited, no longer exists: its foot does not touch the ground at that frame.",
+            "The edit is kept for when the step comes back; Reset All Steps drops it.",
+        )
+        for name in without_step(left.footprints, left.edits)
+    ]
+    soles = [
+        Finding(
+            "edit_without_sole",
+            "warning",
+            f"Step '{name}' was pressed with its own sole, as no foot in this bake and no mesh in this scene has the "
+            f"sole '{left.edits[name].sole}' of its edit.",
+            "The edit is kept for when that foot or mesh is there; choose another sole, or reset the step.",
+        )
+        for name in without_sole(left.footprints, left.edits)
+    ]
+    return steps + soles

@@ -1,0 +1,238 @@
+"""How the characters of a shot respond to the ground that they press, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..findings import Finding
+from ..ground.heightfield import Terrain
+from ..loads.estimate import CharacterLoads
+from ..motion.motion import CharacterMotion
+from ..numerics.slices import Slices, sliced
+from ..record.footprints import Footprint
+from ..record.record import BakeRecord
+from ..response.grounding import Response, responding
+from ..response.moved_steps import Followed, OutOfReach, follow
+from ..response.performance import suggested_speed
+from ..response.response import Gaps, at_scene_frames, gaps, mean_sinkage, respond, stood_on
+from ..settings import ResponseOptions
+
+NOTICEABLE_LEAN = np.radians(0.25)
+"""A body that leans no more than this moves its centre of mass by millimetres: the forces need not be found anew."""
+LEAN_PASSES = 4
+"""Most times that the ground is pressed anew by the leaning bodies. The lean of a frame follows from the ground before
+it, so that each pass makes the shot right further on (Picard iteration); two are mostly enough."""
+
+
+@dataclass(frozen=True)
+class CharacterResponse:
+    """One character's response and what it did for its feet.
+
+    Attributes
+    ----------
+    motion : CharacterMotion
+        The source, at scene frames.
+    response : Response
+    before, after : Gaps
+    sinkage : float
+        Mean depth of the character's prints [m].
+    out_of_reach : tuple of OutOfReach
+        Moved steps that its legs do not reach.
+    """
+
+    motion: CharacterMotion
+    response: Response
+    before: Gaps
+    after: Gaps
+    sinkage: float
+    out_of_reach: tuple[OutOfReach, ...] = ()
+
+
+@sliced
+def standing_on(
+    motions: Sequence[CharacterMotion], terrain: Terrain, options: ResponseOptions | None
+) -> Slices[tuple[CharacterMotion, ...]]:
+    """The motions as they will walk on the terrain, which is where they press it."""
+    if options is None or options.grounding is None:
+        return tuple(motions)
+    standing = []
+    for motion in motions:
+        as_it_is = motion.centre is not None
+        yield
+        standing.append(motion if as_it_is else (yield from stood_on.slices(motion, terrain)))
+    return tuple(standing)
+
+
+@dataclass(frozen=True)
+class Leaning:
+    """The motions with the lean that the pressed ground gives them, and by how much each leans, (F, 2) [rad]."""
+
+    motions: tuple[CharacterMotion, ...]
+    leans: tuple[NDArray[np.float64], ...]
+
+
+@sliced
+def leaning(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+    options: ResponseOptions | None,
+) -> Slices[Leaning]:
+    """The motions with the lean that the pressed ground gives them, for the forces to see; empty without a tilt."""
+    moved, leans = [], []
+    if options is not None and options.tilt is not None:
+        for of_character, motion in zip(loads, motions, strict=True):
+            if motion.centre is not None:
+                moved.append(motion)
+                leans.append(np.zeros((len(motion.frames), 2)))
+                continue
+            touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+            yield
+            response = yield from respond.slices(
+                motion, touching, terrain, footprints, tilt=options.tilt, grounding=None
+            )
+            moved.append(responding(motion, response))
+            leans.append(response.lean)
+    return Leaning(tuple(moved), tuple(leans))
+
+
+def leans_anew(now: Leaning, before: Leaning | None) -> bool:
+    """Whether a lean differs from the one that pressed the ground by so much that the forces must be found anew."""
+    then = before.leans if before is not None else [np.zeros(2)] * len(now.leans)
+    return any(float(np.abs(lean - was).max()) > NOTICEABLE_LEAN for lean, was in zip(now.leans, then, strict=True))
+
+
+@sliced
+def responses_of(
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    left: BakeRecord,
+    options: ResponseOptions | None,
+) -> Slices[list[CharacterResponse]]:
+    """Each rigged character's response to the pressed ground, on top of its source; its feet follow moved steps."""
+    responses: list[CharacterResponse] = []
+    if options is None:
+        return responses
+    for of_character, motion in zip(loads, motions, strict=True):
+        if motion.centre is not None:
+            continue
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        pressed = touching, terrain, left.edited
+        followed = follow(motion, touching, left.footprints, left.edits) if options.grounding else Followed()
+        yield
+        response = yield from respond.slices(
+            motion, *pressed, tilt=options.tilt, grounding=options.grounding, followed=followed
+        )
+        yield
+        before = yield from gaps.slices(motion, *pressed)
+        yield
+        after = yield from gaps.slices(responding(motion, response), *pressed)
+        sinkage = mean_sinkage(left.edited, motion.name)
+        responses.append(CharacterResponse(motion, response, before, after, sinkage, followed.out_of_reach))
+    return responses
+
+
+@sliced
+def gap_table(
+    responses: Sequence[CharacterResponse],
+    loads: Sequence[CharacterLoads],
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    footprints: Sequence[Footprint],
+) -> Slices[dict[str, object]]:
+    """Penetration and float of the standing soles before and after [mm], for the report.
+
+    Where no character responds, those of all as they are.
+    """
+    if responses:
+        return {
+            when: {character.motion.name: _statistics(getattr(character, when)) for character in responses}
+            for when in ("before", "after")
+        }
+    table = {}
+    for of_character, motion in zip(loads, motions, strict=True):
+        touching = at_scene_frames(of_character.contacts.touching, of_character.motion.frames, motion)
+        yield
+        left = yield from gaps.slices(motion, touching, terrain, footprints)
+        table[motion.name] = _statistics(left)
+    return {"before": table, "after": table}
+
+
+def floating_mm(gaps_mm: Mapping[str, Any]) -> float:
+    """How far feet float above their prints, apart from a few frames [mm], of a report's gaps."""
+    left = gaps_mm.get("after", gaps_mm["before"])
+    return max((of_character["float"]["p95"] for of_character in left.values()), default=0.0)
+
+
+def _statistics(of_soles: Gaps) -> dict[str, dict[str, float]]:
+    millimetres = of_soles.heights * 1e3
+    return {
+        name: {
+            "max": round(float(size.max(initial=0.0)), 3),
+            "p95": round(float(np.percentile(size, 95)) if len(size) else 0.0, 3),
+        }
+        for name, size in (("penetration", np.maximum(-millimetres, 0.0)), ("float", np.maximum(millimetres, 0.0)))
+    }
+
+
+NOTICEABLE_GAP_MM = 1.0
+"""Gaps from this on are worth a look [mm]."""
+WORST_GAPS = 10
+"""Frames that the report lists as the worst."""
+
+
+def worst_gaps(responses: Sequence[CharacterResponse]) -> list[dict[str, object]]:
+    """The largest gaps that are left, largest first, one for each character, sole and frame."""
+    gaps_left = [
+        (abs(height), character.motion.name, character.motion.soles[sole].sole.name, frame, height)
+        for character in responses
+        for frame, sole, height in zip(
+            character.after.frames, character.after.soles, character.after.heights, strict=True
+        )
+    ]
+    return [
+        {"character": name, "contact": sole, "frame": round(float(frame), 3), "gap_mm": round(float(height) * 1e3, 3)}
+        for _, name, sole, frame, height in sorted(gaps_left, reverse=True)[:WORST_GAPS]
+    ]
+
+
+def response_findings(responses: Sequence[CharacterResponse]) -> list[Finding]:
+    """What the user should know about the responses."""
+    without_legs = [
+        Finding(
+            "no_legs",
+            "warning",
+            f"'{character.motion.name}' has no leg with hip, knee and ankle: only its body responds.",
+            "Complete its joints in Advanced > Body Bones.",
+        )
+        for character in responses
+        if not character.response.legs
+    ]
+    too_far = [
+        Finding(
+            "step_out_of_reach",
+            "warning",
+            f"The leg of '{character.motion.name}' cannot follow step '{short.step}' to where it was moved: the foot "
+            f"goes {short.part:.0%} of the way, so it does not stand in its print.",
+            "Move the step less, or key the hips closer to it.",
+        )
+        for character in responses
+        for short in character.out_of_reach
+    ]
+    return without_legs + too_far
+
+
+def suggested_speeds(motions: Sequence[CharacterMotion], footprints: Sequence[Footprint]) -> dict[str, float]:
+    """Speed that people would choose on this ground, over that of level hard ground, by character."""
+    return {
+        motion.name: round(suggested_speed(mean_sinkage(footprints, motion.name)), 3)
+        for motion in motions
+        if motion.centre is None
+    }

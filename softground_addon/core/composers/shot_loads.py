@@ -1,0 +1,82 @@
+"""The loads of all characters of a shot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..ground.heightfield import Terrain
+from ..ground.terrain import MeshTerrain
+from ..loads.estimate import CharacterLoads, estimate_loads
+from ..motion.motion import CharacterMotion
+from ..numerics.slices import Slices, sliced
+from ..settings import BakeSettings
+
+
+@sliced
+def loads_of_shot(
+    wanted: BakeSettings,
+    motions: Sequence[CharacterMotion],
+    terrain: Terrain,
+    known: Iterable[tuple[CharacterMotion, CharacterLoads]] = (),
+) -> Slices[list[CharacterLoads]]:
+    """The loads of the motions of a shot, with the masses and force models that are wanted.
+
+    Parameters
+    ----------
+    wanted : BakeSettings
+    motions : sequence of CharacterMotion
+    terrain : Terrain
+    known : iterable of (CharacterMotion, CharacterLoads)
+        The loads of motions that were looked at before: where one of them is met again they are taken over.
+
+    Raises
+    ------
+    InputError
+        If nobody touches the ground, or it lies overhead or in layers under a foot.
+    """
+    loads, known_by = [], {id(motion): found for motion, found in known}
+    for motion, character in zip(motions, wanted.characters, strict=True):
+        if id(motion) in known_by:
+            loads.append(known_by[id(motion)])
+            continue
+        moved = replace(motion, mass=character.mass_kg)
+        work = estimate_loads.slices(moved, terrain, force_model=character.force_model, material=wanted.material)
+        loads.append((yield from work))
+        yield
+    _check_contacts(loads, terrain, wanted.ground.name if wanted.ground else None)
+    return loads
+
+
+def _check_contacts(loads: Sequence[CharacterLoads], terrain: Terrain, ground: str | None) -> None:
+    """Raise InputError if nothing touches the ground of that name, or it lies overhead or in layers under a foot."""
+    place = np.concatenate(
+        [
+            sole.landmark_positions()[character.contacts.touching[:, number]].reshape(-1, 3)
+            for character in loads
+            for number, sole in enumerate(character.motion.soles)
+        ]
+    )
+    name = f"'{ground}'" if ground else "the ground"
+    if not len(place):
+        characters = ", ".join(f"'{character.motion.name}'" for character in loads)
+        raise InputError(
+            f"No foot of {characters} touches {name} in these frames: move the ground under the feet, or correct the "
+            "feet in Advanced > Contacts."
+        )
+    if isinstance(terrain, MeshTerrain) and not terrain.is_height_field(place[:, 0], place[:, 1]).all():
+        raise InputError(
+            f"Ground {name} has several layers one above the other under the feet, such as a bridge or an overhang: "
+            "separate the layer that is walked on into an object of its own."
+        )
+    for character in loads:
+        contacts, leg = character.contacts, character.motion.leg_length
+        below = -(contacts.clearance + contacts.offset)[contacts.touching]
+        if len(below) and (depth := float(np.median(below))) > leg:
+            raise InputError(
+                f"The feet of '{character.motion.name}' are {depth:.2g} m below {name}: move the ground down to them. "
+                "If it is a room, turn its faces inward (Edit Mode, Mesh > Normals > Recalculate Inside)."
+            )
