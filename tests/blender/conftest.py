@@ -1,5 +1,7 @@
 """Each test starts in an empty file with the add-on registered."""
 
+import fcntl
+import os
 import shutil
 import subprocess
 
@@ -17,18 +19,34 @@ def scene(addon):
 
 
 @pytest.fixture(scope="session")
-def opened_as(addon, tmp_path_factory):
+def made_once(addon, tmp_path_factory):
+    """The file of a name that a function of its path makes, once for all processes that test side by side."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+
+    def made(name, make):
+        path = folder / f"{name}.blend"
+        with path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                make(path)
+        return path
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def opened_as(made_once):
     """Opens a scene as a function of it leaves it, which is called once and from then on read from a file."""
-    files = {}
 
     def opened(function, *arguments):
-        key = (function, *arguments)
-        if key not in files:
+        def make(path):
             bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
             function(bpy.context.scene, *arguments)
-            files[key] = tmp_path_factory.mktemp("scene") / "scene.blend"
-            bpy.ops.wm.save_as_mainfile(filepath=str(files[key]), copy=True)
-        bpy.ops.wm.read_homefile(filepath=str(files[key]))  # as a new file, which is not saved anywhere
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+        file = made_once("-".join(map(str, (function.__module__, function.__name__, *arguments))), make)
+        bpy.ops.wm.read_homefile(filepath=str(file))  # as a new file, which is not saved anywhere
         return bpy.context.scene
 
     return opened
@@ -63,11 +81,9 @@ def saved_walker(addon, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def rigify_file(addon, tmp_path_factory):
+def rigify_file(made_once):
     """Rigify's human and its metarig."""
-    path = tmp_path_factory.mktemp("rigify") / "human.blend"
-    rigs.make_rigify_file(path)
-    return path
+    return made_once("rigify", rigs.make_rigify_file)
 
 
 @pytest.fixture
