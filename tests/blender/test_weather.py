@@ -487,30 +487,33 @@ def changed_value(tree):
     next(node for node in tree.nodes if node.bl_idname == "ShaderNodeMath").operation = "TANGENT"
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda tree: None,
-        changed_value,
-        lambda tree: tree.nodes.remove(tree.nodes[40]),
-        lambda tree: tree.nodes.new("NodeFrame"),
-        lambda tree: tree.links.remove(tree.links[100]),
-        lambda tree: setattr(tree.nodes[50], "mute", True),
-    ],
-    ids=["as it was", "a value", "a node less", "a node more", "a link less", "a muted node"],
-)
-def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon, change):
-    matter, others = matter_of("sand", 0.2, 0.005), matter_of("sand", 0.2, 0.008)
+CHANGES = {
+    "as it was": lambda tree: None,
+    "a value": changed_value,
+    "a node less": lambda tree: tree.nodes.remove(tree.nodes[40]),
+    "a node more": lambda tree: tree.nodes.new("NodeFrame"),
+    "a link less": lambda tree: tree.links.remove(tree.links[100]),
+    "a muted node": lambda tree: setattr(tree.nodes[50], "mute", True),
+}
+
+
+def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon):
     about = {"up": (0.0, 0.0, 1.0), "span": span_of(1.0, 60.0, 24.0)}
-    older, fresh = nodes.new(), nodes.new()
-    nodes.build(older, matter=matter, soaking=(0.3, 0.9), **about)
-    inner = nodes.within(older)
-    change(inner)
-    nodes.build(older, matter=others, soaking=(0.2, 0.8), **about)
-    nodes.build(fresh, matter=others, soaking=(0.2, 0.8), **about)
-    assert nodes.within(older) == inner
-    assert content_of(inner) == content_of(nodes.within(fresh))
-    assert content_of(older) == content_of(fresh)
+    kinds = [
+        {"matter": matter_of("sand", 0.2, section), "soaking": soaking, **about}
+        for section, soaking in ((0.005, (0.3, 0.9)), (0.008, (0.2, 0.8)))
+    ]
+    groups = [nodes.new() for _ in kinds]
+    for group, kind in zip(groups, kinds, strict=True):
+        nodes.build(group, **kind)
+    fresh = [(content_of(group), content_of(nodes.within(group))) for group in groups]
+    group, inner = groups[0], nodes.within(groups[0])
+    for number, (change, make) in enumerate(CHANGES.items(), 1):
+        make(inner)
+        nodes.build(group, **kinds[number % 2])
+        assert nodes.within(group) == inner, change
+        assert (content_of(group), content_of(inner)) == fresh[number % 2], change
+    assert fresh[0] != fresh[1]
 
 
 def test_clear_takes_the_weather_along_and_a_bake_again_keeps_its_sliders(opened):

@@ -16,6 +16,7 @@ from tests.core.character import Slope
 from tests.core.pressing.test_prop_prints import resting
 from tests.core.prop_bodies import prop_sole, sphere
 from tests.core.walkers import walk
+from tests.tiers import slow_but_one
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 CELL = 0.01
@@ -60,7 +61,7 @@ def test_the_predicted_depth_is_the_pressed_one(options, painted, pressure):
     assert contacts.deepest(material, pressure) == pytest.approx(expected, rel=0.03, abs=1e-6)
 
 
-@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("pressure", slow_but_one(["CENTRE_OF_PRESSURE", "UNIFORM"]))
 def test_the_typical_step_is_the_median_of_those_that_are_pressed(pressure):
     """Also where it is told from some of them alone."""
     loads = walk(steps=5)
@@ -125,7 +126,7 @@ def test_the_typical_step_is_of_feet_whatever_else_prints():
     assert contacts.typical(SNOW) == pytest.approx(typical_of(both), rel=0.02)
 
 
-@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("pressure", slow_but_one(["CENTRE_OF_PRESSURE", "UNIFORM"]))
 def test_few_contacts_tell_the_deepest_of_many(pressure):
     loads = walk(steps=4)
     weights = np.random.default_rng(2).uniform(0.5, 1.5, 30)
