@@ -4,6 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
+from sample_scenes.character import create_character
+from sample_scenes.dog import Dog
+from sample_scenes.four_legged import WALK, go_on_four_legs
+from sample_scenes.keys import write_action
 from softground_addon.blender import settings, tread_images
 from softground_addon.blender.baking import bake_report
 from softground_addon.blender.ground import baked_ground, ground_mesh, own_data
@@ -54,6 +58,20 @@ def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scen
     bake(scene)
     bpy.ops.softground.clear_bake()
     assert own_data.SOLE not in ground.data.attributes
+
+
+def test_a_dog_wears_no_shoes_whatever_the_bones_of_its_forelegs_are_called(scene):
+    body = Dog()
+    dog = create_character("Dog", body, scene.collection)
+    write_action(dog, go_on_four_legs(body, WALK, 30, scene.render.fps), "Walk")
+    bpy.context.view_layer.objects.active = dog
+    scene.frame_end = 30
+    bpy.ops.softground.add_character()
+    scene.softground.tread = 0.002
+    bake(scene, cell_size=0.02)
+    footprints, _ = baked_ground.load(scene.softground.ground)
+    assert {step.sole for step in footprints} == {"foot.L", "foot.R", "hand.L", "hand.R"}
+    assert own_data.SOLE not in scene.softground.ground.data.attributes
 
 
 @pytest.mark.parametrize("pattern", ["BARE", "IMAGE", "SHOES"])
@@ -116,7 +134,7 @@ def test_steps_are_edited_and_exported_with_the_image_that_was_pressed(shod):
     options.tread_pattern, options.tread_image = "IMAGE", picture(CHECKER)
     shown(shod)
     footprints, about = baked_ground.load(options.ground)
-    treads = asked_of(about["inputs"]).treads
+    treads = asked_of(about["inputs"], footprints).treads
     bpy.data.images.remove(options.tread_image)
     assert treads.keys() == {(step.character, step.sole) for step in footprints}
     assert {tread.is_mirrored for tread in treads.values()} == {False, True}

@@ -141,10 +141,10 @@ def sign(
 def _tread(
     footprints: Sequence[Footprint], position: Array, made_with: BakeSettings, relief: Sequence[StepRelief]
 ) -> Array | None:
-    """What `own_data.SOLE` says of places (K, 3): the bars of shoes, on those who go on two feet; None if nobody
-    has any, or relief has the tread in the mesh."""
+    """What `own_data.SOLE` says of places (K, 3): the bars of those who wear shoes; None if nobody
+    does, or relief has the tread in the mesh."""
     in_relief = {(step.character, step.sole) for step, its in zip(footprints, relief, strict=False) if its.tread}
-    shod = shod_of(made_with.inputs()) - in_relief
+    shod = shod_of(made_with.inputs(), footprints) - in_relief
     is_shod = made_with.tread_m > 0 and made_with.tread_pattern in BARS
     if not is_shod or not any((step.character, step.sole) in shod for step in footprints):
         return None

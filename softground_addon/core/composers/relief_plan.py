@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ground.presets import SURFACES
-from ..motion.motion import CharacterMotion
+from ..motion.motion import CharacterMotion, Sole
 from ..numerics.slices import Slices, sliced
 from ..record.footprints import Footprint
 from ..relief import amounts, tread_map
@@ -29,27 +29,65 @@ IMAGE, SHOES = "IMAGE", "SHOES"
 
 FEET_IN_SHOES = 2
 """Feet of those who wear shoes."""
+PAW = 1.5
+"""Length over breadth up to which a foot is a paw or a hoof: foxes' come to 1.4, figures' shoes begin at 1.6."""
+UPRIGHT = 0.25
+"""Share of their contacts for which feet in shoes are alone on the ground, at least: people may fall and lie there."""
 
 TREAD = 0.003
 """Tread that the amounts of looks are given for [m]."""
 
 
-def shod_of(inputs: Mapping[str, Any]) -> set[tuple[str, str]]:
-    """Characters and names of the soles that wear shoes: the feet of those who go on two."""
+def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[tuple[str, str]]:
+    """Characters and names of the soles that wear shoes, by the settings and all footprints of a bake.
+
+    They are the feet of those who have two, and go upright on them, unless these are paws or hooves.
+    """
     shod = set()
     for one in inputs["characters"]:
-        feet = [sole["name"] for sole in one["soles"] if sole["bone"] and not sole["limb"]]
-        shod |= {(one["name"], name) for name in feet if len(feet) == FEET_IN_SHOES}
+        steps = [step for step in footprints if step.character == one["name"]]
+        limbs = {sole["name"] for sole in one["soles"] if sole["bone"] and sole["limb"]}
+        feet = _two_feet(one)
+        if _is_upright([step for step in steps if step.sole in feet], [step for step in steps if step.sole in limbs]):
+            paws = {step.sole for step in steps if step.pressed_by and _is_paw(step.pressed_by.pressing.sole)}
+            shod |= {(one["name"], name) for name in feet - paws}
     return shod
 
 
-def asked_of(inputs: Mapping[str, Any]) -> ReliefSettings | None:
+def _two_feet(character: Mapping[str, Any]) -> set[str]:
+    """Names of the feet of a character that has two; else none."""
+    feet = {sole["name"] for sole in character["soles"] if sole["bone"] and not sole["limb"]}
+    return feet if len(feet) == FEET_IN_SHOES else set()
+
+
+def _is_paw(sole: Sole) -> bool:
+    return sole.prop is None and sole.length < PAW * sole.breadth
+
+
+def _is_upright(on_feet: Sequence[Footprint], on_limbs: Sequence[Footprint]) -> bool:
+    """Whether contacts of feet pass without those of other limbs."""
+    if not on_feet or not on_limbs:
+        return True
+    of_feet, of_limbs = (
+        np.rint([(step.start_frame, step.end_frame + 1.0) for step in of]).astype(np.intp) for of in (on_feet, on_limbs)
+    )
+    first = min(of_feet.min(), of_limbs.min())
+    last = max(of_feet.max(), of_limbs.max())
+    begun, ended = (np.bincount(times - first, minlength=last - first + 1) for times in of_limbs.T)
+    alone = np.concatenate([[0], np.cumsum(np.cumsum(begun - ended) == 0)])  # frames without limbs before each
+    start, end = of_feet.T
+    return bool(np.mean((alone[end - first] - alone[start - first]) / np.maximum(end - start, 1)) >= UPRIGHT)
+
+
+def asked_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> ReliefSettings | None:
     """The relief that a bake was asked for, None where it has none.
 
     Parameters
     ----------
     inputs : mapping
         Of a bake, as the record has them; those of earlier versions know no relief.
+    footprints : sequence of Footprint
+        All of the bake.
 
     Raises
     ------
@@ -61,7 +99,7 @@ def asked_of(inputs: Mapping[str, Any]) -> ReliefSettings | None:
         return None
     try:
         numbers = [float(inputs[name]) for name in ("relief_strength", "tread_m")]
-        treads = treads_of(inputs)
+        treads = _treads_of(inputs, shod_of(inputs, footprints))
         known = look in SURFACES
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         known, numbers, treads = False, [], {}
@@ -73,7 +111,7 @@ def asked_of(inputs: Mapping[str, Any]) -> ReliefSettings | None:
     return ReliefSettings(amounts.of_look(look), strength, treads, tread / TREAD)
 
 
-def treads_of(inputs: Mapping[str, Any]) -> dict[tuple[str, str], SoleTread]:
+def _treads_of(inputs: Mapping[str, Any], shod: set[tuple[str, str]]) -> dict[tuple[str, str], SoleTread]:
     """The treads of those in shoes, by character and name of the sole; none of those whose meshes show none.
 
     Raises
@@ -81,7 +119,7 @@ def treads_of(inputs: Mapping[str, Any]) -> dict[tuple[str, str], SoleTread]:
     KeyError, TypeError, ValueError
         If there is no such pattern.
     """
-    pattern, shod = inputs["tread_pattern"], shod_of(inputs)
+    pattern = inputs["tread_pattern"]
     if pattern == SHOES:
         maps = {(name, sole): text for name, sole, text in inputs["shoe_treads"]}
         return {key: SoleTread(of_map(tread_map.from_text(text))) for key, text in maps.items() if key in shod}
@@ -101,9 +139,12 @@ def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -
     if wanted.tread_pattern != SHOES or not (wanted.relief_look and wanted.tread_m > 0):
         return wanted
     found = []
-    shod = shod_of(wanted.inputs())
+    feet = {(one["name"], name) for one in wanted.inputs()["characters"] for name in _two_feet(one)}
     soles = [
-        (one.name, of_foot.sole) for one in motions for of_foot in one.soles if (one.name, of_foot.sole.name) in shod
+        (one.name, of_foot.sole)
+        for one in motions
+        for of_foot in one.soles
+        if (one.name, of_foot.sole.name) in feet and not _is_paw(of_foot.sole)
     ]
     for name, sole in soles:
         of_sole = tread_map.from_underside(sole.underside, sole.length) if sole.underside is not None else None
@@ -130,7 +171,7 @@ def relief_at(
     InputError
         See `asked_of`.
     """
-    asked = asked_of(inputs)
+    asked = asked_of(inputs, footprints)
     if asked is None:
         return []
     return (yield from relief_of_steps.slices(footprints, x, y, asked, blur_sigma=blur_sigma))

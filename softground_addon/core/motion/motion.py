@@ -135,6 +135,11 @@ class Sole:
         """Length of the flat sole from heel to toe tip [m]."""
         return float(np.ptp(self.outline[:, 0]))
 
+    @property
+    def breadth(self) -> float:
+        """Breadth of the flat sole from side to side [m]."""
+        return float(np.ptp(self.outline[:, 1]))
+
 
 @dataclass(frozen=True)
 class SoleMotion:

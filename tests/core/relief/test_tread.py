@@ -1,9 +1,11 @@
 """Treads: a map of a sole from an image or a mesh presses what it shows, to scale, mirrored for left feet."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from softground_addon.core.composers.relief_plan import asked_of
+from softground_addon.core.composers.relief_plan import asked_of, shod_of
 from softground_addon.core.errors import InputError
 from softground_addon.core.relief import tread_map
 from softground_addon.core.relief.amounts import Amounts, Tread
@@ -11,6 +13,7 @@ from softground_addon.core.relief.print_relief import ARCH, FLESH, relief_of_pri
 from softground_addon.core.relief.print_shape import shape_of
 from softground_addon.core.relief.tread import LENGTH, PATTERNS, SoleTread, Under, bare, of_map
 from tests.core.relief.test_steps import MATERIALS, steps_on
+from tests.core.walkers import box_sole
 
 HEIGHT = 3.0
 """Of the tread [mm]."""
@@ -147,13 +150,49 @@ def inputs_of(**more):
 
 def test_records_ask_for_the_treads_that_they_hold():
     text = tread_map.as_text(tread_map.from_picture(checker(4, 2)))
-    asked = asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text)).treads
+    asked = asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text), ()).treads
     assert {key: tread.is_mirrored for key, tread in asked.items()} == {("A", "foot.L"): True, ("A", "foot.R"): False}
-    shoes = asked_of(inputs_of(tread_pattern="SHOES", shoe_treads=[["A", "foot.L", text]])).treads
+    shoes = asked_of(inputs_of(tread_pattern="SHOES", shoe_treads=[["A", "foot.L", text]]), ()).treads
     assert {key: tread.is_mirrored for key, tread in shoes.items()} == {("A", "foot.L"): False}
 
 
 @pytest.mark.parametrize("text", ["", "no map", "AAAA", 7, None])
 def test_records_with_a_broken_map_are_refused(text):
     with pytest.raises(InputError, match="bake again"):
-        asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text))
+        asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text), ())
+
+
+def shod_after(feet, limbs=(), *, sole=None):
+    """The soles of a walk in shoes, where it has limbs too; contacts as (first frame, last frame)."""
+    step = steps_on("wet_sand")[0]
+    if sole is not None:
+        step = replace(step, pressed_by=replace(step.pressed_by, pressing=replace(step.pressed_by.pressing, sole=sole)))
+    walk = [
+        replace(step, character="A", sole=f"{part}.{'LR'[number % 2]}", start_frame=float(first), end_frame=float(last))
+        for part, contacts in {"foot": feet, "hand": limbs}.items()
+        for number, (first, last) in enumerate(contacts)
+    ]
+    soles = inputs_of()["characters"][0]["soles"]
+    hands = [{"name": f"hand.{side}", "side": side, "bone": "hand", "limb": True} for side in "LR"]
+    return {name for _, name in shod_of(inputs_of(characters=[{"name": "A", "soles": soles + hands}]), walk)}
+
+
+STEPS = [(10 * number, 10 * number + 12) for number in range(6)]
+
+
+def test_feet_of_those_who_walk_and_then_fall_and_lie_wear_shoes():
+    assert shod_after(STEPS) == {"foot.L", "foot.R"}
+    assert shod_after([*STEPS, (60, 400), (70, 400)], [(68, 400), (75, 400), (66, 400)]) == {"foot.L", "foot.R"}
+    assert shod_after([(0, 200), (0, 200)], [(80, 200), (82, 200)]) == {"foot.L", "foot.R"}  # without a step
+
+
+def test_hind_feet_of_those_who_go_on_all_fours_are_bare_whatever_their_forefeet_are_called():
+    assert shod_after(STEPS, [(first + 2, last + 2) for first, last in STEPS]) == set()  # diagonal pairs
+    assert shod_after(STEPS, [(first + 7, last + 7) for first, last in STEPS]) == set()
+
+
+def test_paws_and_hooves_are_bare_also_of_those_who_go_on_two():
+    assert shod_after(STEPS, sole=box_sole(0.08, 0.07)) == set()
+    assert shod_after(STEPS, sole=box_sole(0.09, 0.065)) == set()
+    assert shod_after(STEPS, sole=box_sole(0.40, 0.24)) == {"foot.L", "foot.R"}  # figures with large heads
+    assert shod_after(STEPS, sole=box_sole(0.28, 0.10)) == {"foot.L", "foot.R"}
