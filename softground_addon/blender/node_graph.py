@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,6 +70,7 @@ class NodeGraph:
         self._place = [0.0, 0.0]
         self._places: list[float] = []
         self._known = iter(tree.nodes[:]) if known else None
+        self._made: dict[Hashable, Any] = {}
         self._links: set[tuple[Any, Any]] = set()
 
     def finish(self, geometry: Any) -> None:
@@ -110,10 +111,19 @@ class NodeGraph:
         else:
             self._links.add((source, socket))
 
+    def _once(self, *key: Hashable, make: Callable[[], Any]) -> Any:
+        """What was made for the same before, as the nodes of a file take more of it than thousands of vertices."""
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
+
     def attribute(self, name: str, kind: str = "FLOAT") -> Any:
-        node = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
-        self.link(name, node.inputs["Name"])
-        return node.outputs["Attribute"]
+        def make() -> Any:
+            node = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
+            self.link(name, node.inputs["Name"])
+            return node.outputs["Attribute"]
+
+        return self._once(name, kind, make=make)
 
     def put(self, geometry: Any, selection: Any, position: Any, offset: Any = (0.0, 0.0, 0.0)) -> Any:
         """Put the selected vertices elsewhere."""
@@ -124,12 +134,12 @@ class NodeGraph:
         self.link(offset, node.inputs["Offset"])
         return node.outputs["Geometry"]
 
-    def put_higher(self, geometry: Any, up: Any, height: Any, selection: Any = True) -> Any:
-        """Put the selected vertices higher by multiples of a vector."""
+    def put_higher(self, geometry: Any, up: Any, height: Any) -> Any:
+        """Put all vertices higher by multiples of a vector; a position is set faster than an offset."""
         node = self.node("GeometryNodeSetPosition")
         self.link(geometry, node.inputs["Geometry"])
-        self.link(selection, node.inputs["Selection"])
-        self.link(self.scaled(up, height), node.inputs["Offset"])
+        position = self.node("GeometryNodeInputPosition").outputs["Position"]
+        self.link(self.vector("ADD", position, self.scaled(up, height)), node.inputs["Position"])
         return node.outputs["Geometry"]
 
     def store(self, geometry: Any, name: str, value: Any, selection: Any, kind: str = "FLOAT") -> Any:
@@ -164,11 +174,16 @@ class NodeGraph:
             geometry = node.outputs["Geometry"]
         return geometry
 
-    def math(self, operation: str, first: Any, second: Any = 0.0) -> Any:
-        node = self.node("ShaderNodeMath", operation=operation)
-        self.link(first, node.inputs[0])
-        self.link(second, node.inputs[1])
-        return node.outputs["Value"]
+    def math(self, operation: str, first: Any, second: Any = 0.0, *, clamped: bool = False) -> Any:
+        """What an operation gives, kept between 0 and 1 if it is clamped."""
+
+        def make() -> Any:
+            node = self.node("ShaderNodeMath", operation=operation, use_clamp=clamped)
+            self.link(first, node.inputs[0])
+            self.link(second, node.inputs[1])
+            return node.outputs["Value"]
+
+        return self._once(operation, first, second, clamped, make=make)
 
     def both(self, first: Any, second: Any) -> Any:
         return self.logic("AND", first, second)
@@ -195,9 +210,12 @@ class NodeGraph:
         return node.outputs["Vector"]
 
     def separated(self, vector: Any) -> list[Any]:
-        node = self.node("ShaderNodeSeparateXYZ")
-        self.link(vector, node.inputs["Vector"])
-        return list(node.outputs)
+        def make() -> list[Any]:
+            node = self.node("ShaderNodeSeparateXYZ")
+            self.link(vector, node.inputs["Vector"])
+            return list(node.outputs)
+
+        return self._once("separated", vector, make=make)
 
     def sample(self, splines: Any, number: Any, length: Any) -> Any:
         """A node that looks at one of the splines, at a length along it."""
@@ -212,6 +230,20 @@ class NodeGraph:
         node = self.node("GeometryNodeAccumulateField", data_type=kind, domain="POINT")
         self.link(parts, node.inputs["Value"])
         return node
+
+    def object_geometry(self, obj: bpy.types.Object, name: str) -> Any:
+        """The geometry of an object, by a node of this name."""
+        node = self.node("GeometryNodeObjectInfo", label=name)
+        if node.name != name:
+            node.name = name
+        self.link(obj, node.inputs["Object"])
+        return node.outputs["Geometry"]
+
+    def points(self, count: int) -> Any:
+        """So many points."""
+        node = self.node("GeometryNodePoints")
+        self.link(count, node.inputs["Count"])
+        return node.outputs[0]
 
     def at_index(self, geometry: Any, value: Any, index: Any, kind: str = "FLOAT_VECTOR") -> Any:
         """What a field is at one of a geometry's points, or at the last of them."""
@@ -328,7 +360,7 @@ class Number:
 
     def within_one(self) -> Number:
         """No less than 0, no more than 1."""
-        return self.at_least(0.0).at_most(1.0)
+        return Number(self.graph, self.graph.math("ADD", self.socket, 0.0, clamped=True))
 
     def exp(self) -> Number:
         return self._with("EXPONENT", 0.0)
@@ -341,6 +373,9 @@ class Number:
 
     def floor(self) -> Number:
         return self._with("FLOOR", 0.0)
+
+    def fraction(self) -> Number:
+        return self._with("FRACT", 0.0)
 
     def _with(self, operation: str, other: Number | float) -> Number:
         value = other.socket if isinstance(other, Number) else other

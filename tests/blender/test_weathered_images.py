@@ -6,8 +6,9 @@ import pytest
 
 from softground_addon.blender import compat, jobs
 from softground_addon.blender.baking import bake_job
-from softground_addon.blender.ground import baked_ground, weather_modifier
+from softground_addon.blender.ground import baked_ground, weather_modifier, weather_table
 from softground_addon.blender.ground import weather_nodes as nodes
+from softground_addon.blender.node_graph import NodeGraph
 from softground_addon.blender.output import image_exports
 from softground_addon.core.errors import InputError
 from tests.blender import weathered_shots
@@ -95,6 +96,45 @@ def test_images_are_those_of_the_evaluated_mesh(opened, tmp_path, surface, frame
     for kind, channels in seen.items():
         for number, values in enumerate(channels):
             np.testing.assert_allclose(images[kind][..., number], values, rtol=1e-5, atol=2e-6, err_msg=kind)
+
+
+def test_a_group_of_an_earlier_build_finds_the_hollow_of_each_pixel(opened, tmp_path):
+    scene = opened("mud", Rain=30.0)
+    display_mesh = baked_ground.display_mesh_of(scene.softground.ground)
+    tree = nodes.within(weather_modifier.modifier_of(display_mesh).node_group)
+    hollows = weather_table.named(tree, weather_table.HOLLOWS).data
+    number, holds = np.zeros(len(display_mesh.data.vertices), np.int32), np.zeros(3 * len(hollows.vertices), np.float32)
+    display_mesh.data.attributes[nodes.HOLLOW].data.foreach_get("value", number)
+    hollows.attributes["pool"].data.foreach_get("vector", holds)
+    tree.nodes.remove(tree.nodes[weather_table.HOLLOWS])
+    graph, (pool, _, filled) = NodeGraph(tree), nodes.EARLIER
+    earlier = graph.dot(graph.attribute(pool, "FLOAT_VECTOR"), (1.0, 0.0, 0.0))
+    geometry = graph.node("NodeGroupInput").outputs["Geometry"]
+    stored = graph.store(geometry, nodes.WATER, earlier, graph.attribute(filled, "INT"))
+    tree.links.new(stored, tree.nodes["Group Output"].inputs["Geometry"])
+    water = write(scene, tmp_path, 30)["weather"][..., 2]
+    wanted = holds[::3][number[: SIDE**2]].reshape(SIDE, SIDE)
+    assert (wanted > 0).sum() > 20
+    np.testing.assert_allclose(water, wanted, rtol=1e-5)
+
+
+def test_the_images_of_a_linked_ground_have_its_water(opened, tmp_path):
+    scene = opened("mud", **weathered_shots.SOME)
+    (tmp_path / "own").mkdir()
+    own = write(scene, tmp_path / "own", 30)
+    library, name = tmp_path / "library.blend", scene.softground.ground.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(library), link=True) as (_, linked):
+        linked.objects = [name]
+    scene = bpy.context.scene
+    scene.collection.objects.link(linked.objects[0])
+    scene.softground.ground = linked.objects[0]
+    (tmp_path / "linked").mkdir()
+    of_linked = write(scene, tmp_path / "linked", 30)
+    assert own["weather"][..., 2].max() > 1e-3
+    for kind in KINDS:
+        np.testing.assert_allclose(of_linked[kind], own[kind], atol=1e-6)
 
 
 def test_keyed_weather_and_remapped_time_are_those_of_the_scene(opened, tmp_path):

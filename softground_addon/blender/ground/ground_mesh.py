@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -210,12 +210,13 @@ def stand_in(
     mesh: bpy.types.Mesh | None = None,
     *,
     weather_at: int | None = None,
+    weather: bpy.types.NodeTree | None = None,
     with_users: bool = True,
 ) -> Iterator[bpy.types.Object]:
     """A visible copy of the ground with a mesh in a scene of its own, evaluated; without a mesh, with no modifiers.
 
     Modifiers that change over time are evaluated at the first frame of the bake, or at one at which the copy is to be
-    under weather. Those of the user may be left out.
+    under weather, its own or another group's. Those of the user may be left out.
     """
     scene = bpy.data.scenes.new("SoftGround Evaluation")
     for shown_in in ground.users_scene[:1]:
@@ -230,9 +231,11 @@ def stand_in(
             copy.modifiers.clear()
         else:
             copy.data = mesh
-            weather = weather_modifier.modifier_of(copy) if weather_at is None else None
+            its_weather: Any = weather_modifier.modifier_of(copy)
+            if weather is not None:
+                its_weather.node_group = weather
             users = [] if with_users else users_modifiers(copy)
-            for unwanted in (playback.modifier_of(copy), weather, *users):
+            for unwanted in (playback.modifier_of(copy), its_weather if weather_at is None else None, *users):
                 if unwanted:
                     copy.modifiers.remove(unwanted)
         scene.collection.objects.link(copy)

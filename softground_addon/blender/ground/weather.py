@@ -20,9 +20,10 @@ from ...core.record.footprints import Footprint
 from ...core.record.record import BakeRecord
 from ...core.settings import BakeSettings
 from .. import compat, settings
-from . import baked_ground, ground_mesh, own_data, weather_keys, weather_modifier
+from . import baked_ground, ground_mesh, own_data, weather_keys, weather_modifier, weather_table
 from . import playback_nodes as played
 from . import weather_nodes as nodes
+from .weather_course_nodes import HOLLOWS
 
 Array = NDArray[np.float64]
 
@@ -71,10 +72,7 @@ def add(ground: bpy.types.Object, left: BakeRecord | None = None) -> Any:
 def values_of(ground: bpy.types.Object) -> dict[str, float]:
     """What the sliders of a ground's weather are at; nothing where there is none."""
     modifier: Any = weather_modifier.modifier_of(baked_ground.display_mesh_of(ground))
-    if modifier is None:
-        return {}
-    values = dict(compat.node_inputs(modifier))
-    return {name: values[key] for name, key in weather_modifier.inputs_of(modifier).items() if key in values}
+    return {} if modifier is None else weather_keys.values_of(modifier)
 
 
 def renew(ground: bpy.types.Object, values: Mapping[str, float], left: BakeRecord) -> None:
@@ -136,9 +134,12 @@ def _fit(
     since = places.times[:, 1]
     span = span_of(first, max(last, float(since.max(initial=last, where=since < NOT_YET))), rate * stretch)
     mesh = ground_mesh.mesh_of(display_mesh)
-    store(mesh, places, matter, span)
+    hollows = store(mesh, places, matter, span)
     given = {"matter": matter, "up": up.tolist(), "span": span, "soaking": soaking_shares(places)}
-    nodes.build(tree, **given, felt=known["felt"], again=nodes.AGAIN in mesh.attributes)
+    again, has_water = (name in mesh.attributes for name in (nodes.AGAIN, nodes.WATER))
+    nodes.build(tree, **given, felt=known["felt"], again=again, has_water=has_water)
+    if table := hollows_of(tree):
+        weather_table.fill(table, hollows)
     tree[weather_keys.LAST] = span.last
 
 
@@ -189,10 +190,25 @@ def _places(
     return weather_places(footprints, position, relief, start, np.maximum(end, last), **known)
 
 
-def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> None:
-    """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for."""
+def hollows_of(tree: Any) -> Any:
+    """The table of the hollows that a group of weather fills; None where no water stands, and in earlier builds."""
+    return weather_table.named(nodes.within(tree) or tree, HOLLOWS)
+
+
+def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Span) -> dict[str, NDArray[np.float64]]:
+    """Give a mesh what the node group reads, of its vertices; nothing that it does not ask for.
+
+    Returns
+    -------
+    dict of arrays
+        The table of the hollows in which its vertices lie; see `weather_course_nodes.HOLLOWS`.
+    """
     pressed, since, compacted = places.times.T
-    capacity, rise, filled = places.pool[:, 0], places.levels[:, :POWERS], places.levels[:, POWERS]
+    capacity, above, left = places.pool.T
+    rise, filled = places.levels[:, :POWERS], 1 + moment_of(places.levels[:, POWERS], span)
+    each, of_wet = np.unique(np.column_stack([capacity, left, filled, rise])[capacity > 0], axis=0, return_inverse=True)
+    hollow = np.zeros(len(capacity), dtype=np.intp)
+    hollow[capacity > 0] = 1 + of_wet.ravel()
     values: dict[str, NDArray[Any]] = {
         nodes.BLUR: places.blur,
         nodes.TRODDEN: places.trodden,
@@ -202,19 +218,29 @@ def store(mesh: bpy.types.Mesh, places: WeatherPlaces, matter: Matter, span: Spa
     if matter.snow_depth:
         values[nodes.COMPACTED] = compacted
     if matter.soaking:
-        values[nodes.POOL] = places.pool
-        values[nodes.RISE] = rise
-        values[nodes.FILLED] = np.where(capacity > 0, 1 + moment_of(filled, span), 0)
+        values[nodes.HOLLOW], values[nodes.ABOVE] = hollow, above
     if (again := places.again[:, 1] < NOT_YET).any():
         values[nodes.AGAIN] = places.again[:, 0]
         values[nodes.BEFORE] = np.where(again, 1 + moment_of(places.again[:, 1], span), 0)
         values[nodes.BLUR_BEFORE] = places.blur_before
     own_data.remove(mesh, set(nodes.OF_WEATHER) - set(values))
+    _write(mesh, values, nodes.KINDS)
+    pool, rise = np.split(np.vstack([np.zeros(6), each]), 2, axis=1)
+    return {"pool": pool, "rise": rise}
+
+
+def store_as_earlier(mesh: bpy.types.Mesh, places: WeatherPlaces, span: Span) -> None:
+    """Give a mesh, beside what `store` does, what a group of an earlier build reads."""
+    pools, rises, filled = nodes.EARLIER
+    moment = np.where(places.pool[:, 0] > 0, 1 + moment_of(places.levels[:, POWERS], span), 0)
+    _write(mesh, {pools: places.pool, rises: places.levels[:, :POWERS], filled: moment}, nodes.EARLIER)
+
+
+def _write(mesh: bpy.types.Mesh, values: Mapping[str, NDArray[Any]], kinds: Mapping[str, str]) -> None:
     for name, of_vertices in values.items():
-        kind = nodes.KINDS[name]
-        field = "vector" if kind == "FLOAT_VECTOR" else "value"
-        stored = of_vertices.astype(np.int32 if kind == "INT" else np.float32)
-        own_data.attribute(mesh, name, kind).data.foreach_set(field, stored.ravel())
+        field = "vector" if kinds[name] == "FLOAT_VECTOR" else "value"
+        stored = of_vertices.astype(np.int32 if kinds[name] == "INT" else np.float32)
+        own_data.attribute(mesh, name, kinds[name]).data.foreach_set(field, stored.ravel())
     mesh.update()
 
 

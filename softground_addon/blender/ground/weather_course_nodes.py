@@ -4,6 +4,9 @@ Rates are those of each part; within it every integral but that over the settlin
 value is that of the group's input, or of a curve if it is keyed, for each part. Rows begin with the moments at which
 vertices were last stepped on: a thousand, whatever the ground has of vertices. What is read more than once is kept with
 them, as nodes that ask for it would each have it worked out again.
+
+Where no slider is keyed, all this follows from an age. The add-on keeps a table of it for the values at which the
+sliders are, and the nodes look there as long as these and the frame are among what the table has.
 """
 
 from __future__ import annotations
@@ -19,12 +22,29 @@ from ..node_graph import NodeGraph, Number
 
 CENTIMETRES_AN_HOUR, MILLIMETRES_AN_HOUR = 0.01 / w.HOUR, 0.001 / w.HOUR
 
-SUMMED = ("Snowfall", "Temperature", "Wind", "Rain", "Drying", "Time Scale")
-"""The inputs that are summed up over time, of which keys count."""
+UNITS = {
+    "Snowfall": CENTIMETRES_AN_HOUR,
+    "Temperature": 1.0,
+    "Wind": 1.0,
+    "Rain": MILLIMETRES_AN_HOUR,
+    "Drying": MILLIMETRES_AN_HOUR,
+    "Time Scale": 1.0,
+}
+SUMMED = tuple(UNITS)
+"""The inputs that are summed up over time, of which keys count, and their units."""
 FIRST, STEP = "First Frame", "Frames in a Part"
 """Nodes with the span."""
 KEYED = "Keyed Sliders"
 """Node with how many sliders are keyed: 0 is none."""
+TABLE, AGES = "Table", "Ages in the Table"
+"""Nodes with the object that has what happened after each age, from 0 on, and with the last of these; none below 0.
+What `KEPT` calls *look* is the position, which a mesh has in any case."""
+HOLLOWS = "Hollows"
+"""Node with the object that has what water needs to know of each hollow: *pool*, what it holds as a depth of water on
+it [m], how much of its soaking is left and the number of the moment from which on it is there; *rise*, coefficients of
+`core.after.weather_places.WeatherPlaces.levels`."""
+PER_FRAME = MOMENTS // PARTS
+"""Ages in a frame: moments lie at multiples of it, as parts have whole frames."""
 GAUSS = ((0.5 - sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + sqrt(0.15), 5 / 18))
 """Places and weights of the Gauss-Legendre rule of three points, over 0 to 1: how snow settles within a row."""
 ROWS = MOMENTS + PARTS + 3
@@ -40,9 +60,19 @@ KEPT = {
 less than nothing by the share of a print that is blown full; excess at the *low* and the *high* share of soaking."""
 
 
+def field_of(name: str) -> str:
+    """What `core.after.weather_course.Weather` calls an input."""
+    return name.lower().replace(" ", "_")
+
+
 def keys_of(name: str) -> str:
     """Name of the node with an input's value in each part."""
     return f"{name} Keys"
+
+
+def tabled(number: int) -> str:
+    """Name of the node that has three of the values of `SUMMED` that the table is for: the first or the last."""
+    return f"Tabled Values {number}"
 
 
 def switch_of(name: str) -> str:
@@ -55,8 +85,8 @@ class CourseNodes:
 
     What only a slider that is at zero would ask for is not worked out, unless any is keyed. `acts` tells by the names
     of sliders what may be above 0: warmth for *Temperature*. `around` has by the names of `KEPT` what has happened
-    since the first frame, `aged` the same as fields of `rows`; the first of these is of what has not begun, where
-    `begun` is 0 and not 1.
+    since the first frame, as far as it is asked for, `aged` the same as fields of `rows`; the first of these is of what
+    has not begun, where `begun` is 0 and not 1.
 
     Parameters
     ----------
@@ -67,10 +97,18 @@ class CourseNodes:
     span : Span
     soaking : (float, float)
         Least and largest share of its soaking that a hollow has left.
+    table : bpy.types.Object
+        See `TABLE`.
     """
 
     def __init__(
-        self, graph: NodeGraph, said: Mapping[str, Number], matter: w.Matter, span: Span, soaking: tuple[float, float]
+        self,
+        graph: NodeGraph,
+        said: Mapping[str, Number],
+        matter: w.Matter,
+        span: Span,
+        soaking: tuple[float, float],
+        table: Any,
     ) -> None:
         self.graph, self._matter, self._soaking = graph, matter, soaking
         self.frame = graph.number(graph.node("GeometryNodeInputSceneTime").outputs["Frame"])
@@ -87,19 +125,57 @@ class CourseNodes:
             self.acts["Temperature"] if matter.snow_depth else self.acts["Temperature"] * self.acts["Snowfall"]
         )
 
-        points = graph.node("GeometryNodePoints")
-        graph.link(ROWS, points.inputs["Count"])
-        self.rows = points.outputs[0]
         self._index = graph.number(graph.node("GeometryNodeInputIndex").outputs["Index"])
         self.begun = self._index.above(0.5)
+        ages = (self.frame - self._first).at_least(0.0) * PER_FRAME
+        differs, last = self._differs(said, keyed, ages), self._value(AGES, -1.0)
+        self.rows = graph.points(ROWS)
         past, part = self._past(span)
         self._through = (part * (1.0 / PARTS)).at_most(1.0)
         rates = {name: self._rate(name, said[name]) for name in SUMMED}
         self._density = w.new_snow_density(rates["Temperature"]).where(self.acts["Snowfall"])
         kept = self._sum(*self._amounts(rates, past * rates["Time Scale"] * (1.0 / span.frame_rate)))
-        self._vectors = dict(zip(KEPT, kept, strict=False))
-        self.aged = self._named(lambda vector: vector)
-        self.around = self._named(lambda vector: graph.at_index(self.rows, vector, 1))
+        off, worked_out = (differs + ages.above(last)).socket, self.rows
+        tabled = self._tabled(table, ages, span)
+        self.rows = graph.choose("GEOMETRY", off, self.rows, worked_out)
+        self._vectors = {
+            name: graph.choose("VECTOR", off, *two) for name, *two in zip(KEPT, tabled, kept, strict=False)
+        }
+        look, loss, *_ = KEPT
+        self.aged = self._named(lambda vector: vector, look, loss)
+        self.around = self._named(
+            lambda vector: graph.at_index(self.rows, vector, 1), *((look, loss) if matter.snow_depth else (look,))
+        )
+
+    def _differs(self, said: Mapping[str, Number], keyed: Number, ages: Number) -> Number:
+        """Above 0 unless the sliders are at what the table is for, none keyed, and the frame is a whole age."""
+        graph, differs = self.graph, keyed + ages.fraction()
+        for number in range(len(SUMMED) // 3):
+            values = graph.combined(*(said[name].socket for name in SUMMED[3 * number : 3 * number + 3]))
+            apart = graph.vector("DISTANCE", values, (0.0,) * 3, output="Value")
+            if apart.node.name != tabled(number):
+                apart.node.name = apart.node.label = tabled(number)
+            differs = differs + graph.number(apart)
+        return differs
+
+    def _tabled(self, table: Any, ages: Number, span: Span) -> list[Any]:
+        """What the rows keep, from a table of ages; `ages` have gone by since the first frame."""
+        graph = self.graph
+        graph.next_row()
+        geometry = graph.object_geometry(table, TABLE)
+
+        def at(name: str, age: Number) -> Any:
+            return graph.at_index(geometry, graph.attribute(name, "FLOAT_VECTOR"), age.socket)
+
+        moments = (self._index - 1.0) * (span.step * PARTS / MOMENTS * PER_FRAME)
+        age = ((ages - moments) * self.begun).at_least(0.0)
+        self.rows = graph.points(MOMENTS + 2)
+        vectors = [at(name, age) for name in ("position", "loss")]
+        if self._matter.soaking:
+            excess = graph.vector("SUBTRACT", at("hollows", ages), at("hollows", ages - age))
+            seeped = graph.vector("MULTIPLY", at("hollows", age), (0.0, 0.0, 1.0))
+            vectors.append(graph.vector("MULTIPLY_ADD", excess, (1.0, 1.0, 0.0), seeped))
+        return self._keep(*(graph.number(vector) for vector in vectors))
 
     def between(self, left: Number) -> Number:
         """How far a share of soaking is through those for which there are sums."""
@@ -206,11 +282,11 @@ class CourseNodes:
         hollows = (low, high, w.seeped(age, soaking).where(self.acts["Water Table"]))
         return self._keep(*(graph.number(self._pack(*three)) for three in (look, (*loss, pale), hollows)))
 
-    def _named(self, of_rows: Callable[[Any], Any]) -> dict[str, Number]:
-        """The numbers of `KEPT`, from what is made of the vectors of these names."""
+    def _named(self, of_rows: Callable[[Any], Any], *names: str) -> dict[str, Number]:
+        """The numbers of some of the vectors of `KEPT`, from what is made of these."""
         named: dict[str, Number] = {}
-        for name, vector in self._vectors.items():
-            named |= zip(KEPT[name], self.graph.parts(of_rows(vector)), strict=True)
+        for name in names:
+            named |= zip(KEPT[name], self.graph.parts(of_rows(self._vectors[name])), strict=True)
         return named
 
     def _pack(self, *numbers: Number | float) -> Any:
@@ -225,9 +301,10 @@ class CourseNodes:
     def _depth(self, left: Number, settling: Number, since: Number) -> Number:
         """Depth of the snow of each row [kg/m²] that settles within it, and from its end on."""
         first, second, third = (
-            left * weight / w.settled_density(since + settling * (1.0 - at), self._density) for at, weight in GAUSS
+            self.graph.number(weight) / w.settled_density(since + settling * (1.0 - at), self._density)
+            for at, weight in GAUSS
         )
-        return first + second + third
+        return left * (first + second + third)
 
     def _hollows(self, soaking: w.Soaking, rained: Number, falling: Any, time: Number) -> list[Number]:
         """Rain that has not soaked in at either share, and time, from each row on to now."""

@@ -12,26 +12,11 @@ from numpy.typing import NDArray
 from ...core.after.weather import PARTS, Span, span_of
 from .. import compat
 from ..settings import typed
-from . import weather_modifier
-from .weather_course_nodes import (
-    CENTIMETRES_AN_HOUR,
-    FIRST,
-    KEYED,
-    MILLIMETRES_AN_HOUR,
-    STEP,
-    SUMMED,
-    keys_of,
-    switch_of,
-)
+from . import weather_modifier, weather_table
+from .weather_course_nodes import FIRST, KEYED, STEP, SUMMED, UNITS, field_of, keys_of, switch_of
 from .weather_nodes import nodes_of
 
-ON_PRINTS = {
-    "Snowfall": CENTIMETRES_AN_HOUR,
-    "Temperature": 1.0,
-    "Wind": 1.0,
-    "Rain": MILLIMETRES_AN_HOUR,
-    "Time Scale": 1.0,
-}
+ON_PRINTS = {name: unit for name, unit in UNITS.items() if name != "Drying"}
 """The inputs of which prints are others, and their units."""
 LAST = "softground_weather_last"
 """Custom property of the group: the frame up to which it tells moments apart, keys or none."""
@@ -55,6 +40,9 @@ def follow(display_mesh: bpy.types.Object) -> None:
         changed |= _put(nodes[switch_of(name)].inputs["Switch"], curve is not None)
         if curve is not None:
             changed |= _write(nodes[keys_of(name)].mapping, _means(curve, span))
+    if not keyed:
+        last = max([span.last, *(scene.frame_end for scene in display_mesh.users_scene)])
+        changed |= weather_table.follow(nodes.id_data, values_of(modifier), last - first)
     if changed:
         nodes.id_data.update_tag()
 
@@ -66,14 +54,18 @@ def moments_of(display_mesh: bpy.types.Object) -> Span:
     return span_of(nodes_of(tree)[FIRST].outputs[0].default_value, tree[LAST])
 
 
+def values_of(modifier: Any) -> dict[str, float]:
+    """What the sliders are at, by name."""
+    values = dict(compat.node_inputs(modifier))
+    return {name: values[key] for name, key in weather_modifier.inputs_of(modifier).items() if key in values}
+
+
 def rates(modifier: Any, span: Span) -> dict[str, Any]:
     """What acts on prints, as `core.after.weather_course.Weather` has it: numbers, or means over each part if keyed."""
-    keyed, values = _keyed(modifier), dict(compat.node_inputs(modifier))
-    found = {}
-    for name, key in weather_modifier.inputs_of(modifier).items():
-        if name in ON_PRINTS:
-            means = _means(keyed[name], span) if name in keyed else np.float64(typed(values[key]))
-            found[name.lower().replace(" ", "_")] = (means.astype(np.float64) * ON_PRINTS[name]).tolist()
+    keyed, values, found = _keyed(modifier), values_of(modifier), {}
+    for name, unit in ON_PRINTS.items():
+        means = _means(keyed[name], span) if name in keyed else np.float64(typed(values[name]))
+        found[field_of(name)] = (means.astype(np.float64) * unit).tolist()
     return {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
 
 

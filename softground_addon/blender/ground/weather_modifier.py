@@ -7,7 +7,7 @@ from typing import Any, cast
 import bpy
 
 from .. import node_graph
-from . import own_data, playback
+from . import own_data, playback, weather_table
 from . import weather_nodes as nodes
 
 MODIFIER = "SoftGround Weather"
@@ -56,4 +56,6 @@ def remove_unused() -> None:
         inner = nodes.within(group)
         bpy.data.node_groups.remove(group)
         if inner and not inner.users:
+            tables = [weather_table.named(inner, name) for name in weather_table.TABLES]
             bpy.data.node_groups.remove(inner)
+            weather_table.remove_unused(tables)

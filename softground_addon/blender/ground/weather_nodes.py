@@ -22,8 +22,9 @@ from ...core.after.weather import Matter, Span
 from ...core.after.weather_places import BOUNDS, COVERED, NEAR, POWERS
 from .. import node_graph
 from ..node_graph import NodeGraph, Number, new_group
+from . import weather_table
 from .playback_nodes import COMPRESSION, MOVED, REST, RIM
-from .weather_course_nodes import CourseNodes
+from .weather_course_nodes import ENDLESS, HOLLOWS, TABLE, CourseNodes
 
 GROUP = "SoftGround Weather"
 MARK = "softground_weather"
@@ -46,9 +47,9 @@ AGAIN, BEFORE, BLUR_BEFORE = (
 )
 """First frame of the last step into an earlier print, and moment and blur that hold until then; only where there are
 such steps."""
-POOL, RISE, FILLED = "softground_weather_pool", "softground_weather_rise", "softground_weather_filled"
-"""See `core.after.weather_places.WeatherPlaces`; from the moment on that has the number `FILLED`, which is 0 where no
-hollow is."""
+HOLLOW, ABOVE = "softground_weather_hollow", "softground_weather_above"
+"""Number of the hollow among those of `weather_course_nodes.HOLLOWS`, 0 where there is none; how far the undisturbed
+ground is above its bottom [m]."""
 KINDS = {
     BLUR: "FLOAT_VECTOR",
     TRODDEN: "FLOAT_VECTOR",
@@ -58,18 +59,21 @@ KINDS = {
     AGAIN: "FLOAT",
     BEFORE: "INT",
     BLUR_BEFORE: "FLOAT_VECTOR",
-    POOL: "FLOAT_VECTOR",
-    RISE: "FLOAT_VECTOR",
-    FILLED: "INT",
+    HOLLOW: "INT",
+    ABOVE: "FLOAT",
 }
-OF_WEATHER = tuple(KINDS)
+EARLIER = {
+    "softground_weather_pool": "FLOAT_VECTOR",
+    "softground_weather_rise": "FLOAT_VECTOR",
+    "softground_weather_filled": "INT",
+}
+"""What groups of earlier builds read of the hollow of each vertex, `WeatherPlaces.pool` and `levels`, the frame as the
+number of its moment, which is 0 where no hollow is."""
+OF_WEATHER = (*KINDS, *EARLIER)
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
 """What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
 standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
-
-STANDING = "softground_weather_standing"
-"""Depth of standing water without the bake's own [m], there only while the group works."""
 
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
@@ -154,6 +158,7 @@ def build(
     soaking: tuple[float, float] = (1.0, 1.0),
     felt: bool = False,
     again: bool = False,
+    has_water: bool = True,
 ) -> None:
     """Fill a group, in place of what is in it; its inputs stay. See `node_graph.build`.
 
@@ -173,13 +178,30 @@ def build(
         Whether steps felt the weather: how deep they are below new snow is then not what the record has.
     again : bool
         Whether there are steps into earlier prints.
+    has_water : bool
+        Whether the bake itself has water in prints.
     """
     inner = within(tree)
     if inner is None:
         inner = bpy.data.node_groups.new(WITHIN, "GeometryNodeTree")
         _add_sockets(inner)
-    fill = partial(_fill, matter=matter, up=up, span=span, soaking=soaking, felt=felt, again=again)
+    there = {name: weather_table.named(inner, name) for name in weather_table.TABLES}
+    asked = (TABLE, HOLLOWS) if matter.soaking else (TABLE,)
+    tables = {name: there[name] or weather_table.new() for name in asked}
+    weather_table.describe(inner, matter, span, soaking)
+    fill = partial(
+        _fill,
+        matter=matter,
+        up=up,
+        span=span,
+        soaking=soaking,
+        felt=felt,
+        again=again,
+        has_water=has_water,
+        tables=tables,
+    )
     node_graph.build(inner, fill)
+    weather_table.remove_unused(there.values())
     node_graph.build(tree, partial(_hold, inner=inner))
 
 
@@ -201,12 +223,14 @@ def _fill(
     soaking: tuple[float, float],
     felt: bool,
     again: bool,
+    has_water: bool,
+    tables: Mapping[str, Any],
 ) -> None:
     """Make the nodes of a group; see `build`."""
     group = graph.node("NodeGroupInput")
     said = {name: graph.number(group.outputs[name]) for name, *_ in INPUTS}
-    course = CourseNodes(graph, said, matter, span, soaking)
-    ground = _Vertices(graph, course, matter, up, again=again)
+    course = CourseNodes(graph, said, matter, span, soaking, tables[TABLE])
+    ground = _Vertices(graph, course, matter, up, again=again, has_water=has_water, hollows=tables.get(HOLLOWS))
 
     graph.next_row()
     geometry = group.outputs["Geometry"]
@@ -227,14 +251,25 @@ class _Vertices:
     matter : Matter
     up : (3,) floats
         See `build`.
-    again : bool
+    again, has_water : bool
         See `build`.
+    hollows : bpy.types.Object or None
+        Where water stands; see `weather_course_nodes.HOLLOWS`.
     """
 
     def __init__(
-        self, graph: NodeGraph, course: CourseNodes, matter: Matter, up: Sequence[float], *, again: bool
+        self,
+        graph: NodeGraph,
+        course: CourseNodes,
+        matter: Matter,
+        up: Sequence[float],
+        *,
+        again: bool,
+        has_water: bool,
+        hollows: Any,
     ) -> None:
         self._graph, self._course, self._matter, self._up = graph, course, matter, tuple(up)
+        self._has_water, self._hollows = has_water, hollows
         self._acts = course.acts
         not_yet = graph.compare("LESS_THAN", course.frame.socket, graph.attribute(PRESSED))
         self._moment, self._blur = graph.attribute(MOMENT, "INT"), graph.attribute(BLUR, "FLOAT_VECTOR")
@@ -280,8 +315,11 @@ class _Vertices:
             left = relief * graph.number(graph.attribute(MOVED, "BOOLEAN")) + change
             height = height - self._thawed((left + matter.snow_depth).at_least(0.0)).where(acts["Temperature"])
         fresh = (cover * (1.0 / COVERED)).within_one()
+        floods = acts["Rain"] + acts["Water Table"]
+        standing = [self._standing(table, relief + height).where(floods)] if matter.soaking else []
         # Once and together, as each node works out all that it asks for anew.
-        geometry, (height, fresh, *looks) = graph.captured(geometry, height, fresh, *worn.values())
+        geometry, (height, fresh, *others) = graph.captured(geometry, height, fresh, *standing, *worn.values())
+        standing, looks = others[: len(standing)], others[len(standing) :]
         if worn:
             blown = graph.forgotten(geometry, *worn)  # what takes the place of another is copied
             for name, look in zip(worn, looks, strict=True):
@@ -292,23 +330,15 @@ class _Vertices:
         if matter.wet:
             wetness = self._around("wet", self._inside).where(acts["Drying"], otherwise=1.0)
         dry = graph.store(geometry, WETNESS, wetness.socket, True)
-        if not matter.soaking:
+        if not standing:
             return graph.put_higher(dry, self._up, height.socket)
-        floods = acts["Rain"] + acts["Water Table"]
-        wet = self._flooded(geometry, table, relief + height, wetness)
+        depth = deepest = standing[0]
+        if self._has_water:  # which stays
+            deepest = graph.number(graph.attribute(WATER)).at_least(depth)
+        wet = graph.store(geometry, WATER, deepest.socket, True)
+        wet = graph.store(wet, WETNESS, wetness.at_least(depth.above(0.0)).socket, True)
         geometry = graph.choose("GEOMETRY", floods.socket, dry, wet)
-        standing = graph.number(graph.attribute(STANDING)).where(floods)
-        geometry = graph.put_higher(geometry, self._up, (height + standing).socket)
-        return graph.choose("GEOMETRY", floods.socket, geometry, graph.forgotten(geometry, STANDING))
-
-    def _flooded(self, geometry: Any, table: Number, relief: Number, wetness: Number) -> Any:
-        """The geometry that knows of the water in the hollows of its relief, and is not under it yet."""
-        graph, hollows = self._graph, self._graph.attribute(FILLED, "INT")
-        wet = graph.store(geometry, STANDING, self._standing(table, relief).socket, hollows)
-        standing = graph.number(graph.attribute(STANDING))
-        deepest = graph.number(graph.attribute(WATER)).at_least(standing)  # the bake's own water stays
-        wet = graph.store(wet, WATER, deepest.socket, True)
-        return graph.store(wet, WETNESS, wetness.at_least(standing.above(0.0)).socket, True)
+        return graph.put_higher(geometry, self._up, (height + depth.where(floods)).socket)
 
     def dried(self, geometry: Any, halo: Number) -> Any:
         """The geometry with how dry ground looks that is wet to begin with."""
@@ -326,10 +356,17 @@ class _Vertices:
 
     def _standing(self, table: Number, relief: Number) -> Number:
         """Depth of water in hollows of a relief [m]."""
+        graph = self._graph
+        hollows = graph.object_geometry(self._hollows, HOLLOWS)
+        level = graph.at_index(hollows, self._levels(table).socket, graph.attribute(HOLLOW, "INT"), "FLOAT")
+        return (graph.number(level) - graph.number(graph.attribute(ABOVE)) - relief).at_least(0.0)
+
+    def _levels(self, table: Number) -> Number:
+        """Height of the water in each of the hollows over its bottom [m], far below it in a dry one."""
         graph, course = self._graph, self._course
-        capacity, above, left = graph.parts(graph.attribute(POOL, "FLOAT_VECTOR"))
-        rise = graph.attribute(RISE, "FLOAT_VECTOR")
-        low, high, seeped = course.hollows(graph.attribute(FILLED, "INT"))
+        capacity, left, filled = graph.parts(graph.attribute("pool", "FLOAT_VECTOR"))
+        rise = graph.attribute("rise", "FLOAT_VECTOR")
+        low, high, seeped = course.hollows(filled.socket)
         excess = low + (high - low) * course.between(left)
         share = (excess / capacity).within_one()
         root = share.root()
@@ -337,7 +374,7 @@ class _Vertices:
         brim = graph.number(graph.dot(rise, (1.0,) * POWERS))
         risen = ((brim - table).at_least(0.0) * seeped).where(self._acts["Water Table"])
         level = graph.number(graph.dot(rise, powers)).where(self._acts["Rain"]).at_least(risen)
-        return (level - above - relief).at_least(0.0) * level.above(0.0)
+        return level - (1.0 - level.above(0.0)) * ENDLESS
 
     def _thawed(self, left: Number) -> Number:
         """What has melted of snow of which so much would be left without [m]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ from ...core.after.weather_places import NOT_YET, SIGMAS, weather_places
 from ...core.playback.keyframe_tables import keyframe_tables
 from ...core.playback.vertex_histories import VertexHistories
 from ..mesh_arrays import positions
-from . import baked_ground, ground_mesh, own_data, weather, weather_keys, weather_modifier
+from . import baked_ground, ground_mesh, own_data, weather, weather_keys, weather_modifier, weather_table
 from . import playback_nodes as played
 from . import weather_nodes as nodes
 
@@ -91,24 +91,50 @@ def weathered_points(
     try:
         points.vertices.add(count)
         places = weather_places(footprints, position, final, start, end, **known)
-        weather.store(points, places, matter, weather_keys.moments_of(display_mesh))
+        span = weather_keys.moments_of(display_mesh)
+        modifier: Any = weather_modifier.modifier_of(display_mesh)
+        hollows = weather.store(points, places, matter, span)
+        if weather.hollows_of(modifier.node_group) is None and matter.soaking:
+            weather.store_as_earlier(points, places, span)
         own_data.attribute(points, played.MOVED, "BOOLEAN").data.foreach_set("value", np.ones(count, dtype=bool))
         if water is not None:
             own_data.attribute(points, nodes.WATER, "FLOAT").data.foreach_set("value", water.astype(np.float32))
         up = ground_mesh.up_of(display_mesh, unit_scale)
 
-        def at(frame: int, height: Array, *shading: Array) -> Weathered:
-            for name, values in zip((played.COMPRESSION, played.RIM), shading, strict=True):
-                own_data.attribute(points, name, "FLOAT").data.foreach_set("value", values.astype(np.float32))
-            ground_mesh.write_positions(points, (height[:, None] * up).astype(np.float32))
-            with ground_mesh.stand_in(display_mesh, points, weather_at=frame, with_users=False) as evaluated:
-                mesh = ground_mesh.mesh_of(evaluated)
-                shown = (played.COMPRESSION, played.RIM, nodes.WETNESS, nodes.FRESH, nodes.WATER)
-                return Weathered(positions(mesh) @ up / (up @ up), *(_values(mesh, name) for name in shown))
+        with _looking_up(modifier.node_group, hollows) as group:
 
-        yield at
+            def at(frame: int, height: Array, *shading: Array) -> Weathered:
+                for name, values in zip((played.COMPRESSION, played.RIM), shading, strict=True):
+                    own_data.attribute(points, name, "FLOAT").data.foreach_set("value", values.astype(np.float32))
+                ground_mesh.write_positions(points, (height[:, None] * up).astype(np.float32))
+                with ground_mesh.stand_in(
+                    display_mesh, points, weather_at=frame, weather=group, with_users=False
+                ) as evaluated:
+                    mesh = ground_mesh.mesh_of(evaluated)
+                    shown = (played.COMPRESSION, played.RIM, nodes.WETNESS, nodes.FRESH, nodes.WATER)
+                    return Weathered(positions(mesh) @ up / (up @ up), *(_values(mesh, name) for name in shown))
+
+            yield at
     finally:
         bpy.data.meshes.remove(points)
+
+
+@contextmanager
+def _looking_up(tree: Any, columns: Mapping[str, Array]) -> Iterator[Any]:
+    """A group of weather as one for other hollows, which may be a linked one; None if it looks up none."""
+    if weather.hollows_of(tree) is None:
+        yield None
+        return
+    table, outer, inner = weather_table.new(), tree.copy(), nodes.within(tree).copy()
+    try:
+        weather_table.fill(table, columns)
+        inner.nodes[weather_table.HOLLOWS].inputs["Object"].default_value = table
+        next(node for node in outer.nodes if node.bl_idname == "GeometryNodeGroup").node_tree = inner
+        yield outer
+    finally:
+        bpy.data.node_groups.remove(outer)
+        bpy.data.node_groups.remove(inner)
+        weather_table.remove_unused([table])
 
 
 def _values(mesh: bpy.types.Mesh, name: str) -> Array:

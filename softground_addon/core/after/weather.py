@@ -208,10 +208,9 @@ def worn(compression: Any, rim: Any, change: Any) -> tuple[Any, Any]:
     >>> worn(np.array([4.0, 0.0]), np.array([0.0, 1.0]), np.array([5.0, -3.0]))
     (array([0., 2.]), array([1., 0.]))
     """
-    laid = np.maximum(change, 0.0)
-    deep, high = compression - laid, rim + (change - laid)
-    left_deep, left_high = np.maximum(deep, 0.0), np.maximum(high, 0.0)
-    return left_deep + (left_high - high), left_high + (left_deep - deep)
+    deep = compression - rim - change
+    left = np.maximum(np.maximum(compression - np.maximum(change, 0.0), 0.0), deep)
+    return left, left - deep
 
 
 def soaked(wet: Any, soaking: Soaking) -> Any:

@@ -90,6 +90,7 @@ class Course:
     pale: Array
     _rained: Array
     _soaked: Array
+    _wet_since: Array
 
     def excess(self, share: float) -> Array:
         """Rain that ground with a share of its soaking has not taken up (N,) [m]."""
@@ -100,8 +101,8 @@ class Course:
         return np.interp(frame, self.frames, values)
 
 
-def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -> Course:
-    """The course of a weather up to a frame.
+def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span, moments: int = MOMENTS) -> Course:
+    """The course of a weather up to a frame, from each of so many moments on into which a span is divided.
 
     Examples
     --------
@@ -115,10 +116,10 @@ def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -
     >>> course_of(nights, sand, frame=86 * 720, span=Span(0, 256 * 360, 1.0)).cover[0].round(2)
     0.0
     """
-    begin = np.linspace(span.first, span.last, MOMENTS + 1)
-    past = np.clip(frame - begin, 0.0, np.append(np.full(MOMENTS, span.step * PARTS / MOMENTS), np.inf))
+    begin = np.linspace(span.first, span.last, moments + 1)
+    past = np.clip(frame - begin, 0.0, np.append(np.full(moments, span.step * PARTS / moments), np.inf))
     rates = (
-        np.broadcast_to(getattr(weather, name), PARTS + 1)[np.arange(MOMENTS + 1) * PARTS // MOMENTS] for name in KEYED
+        np.broadcast_to(getattr(weather, name), PARTS + 1)[np.arange(moments + 1) * PARTS // moments] for name in KEYED
     )
     snowfall, temperature, wind, rain, drying, scale = rates
     time = past * scale / span.frame_rate
@@ -151,28 +152,66 @@ def course_of(weather: Weather, matter: w.Matter, *, frame: float, span: Span) -
     if matter.soaking:
         soaked = np.diff(w.soaked(_before(np.where(rain > 0, time, 0.0)), matter.soaking))
         seeped = w.seeped(age, matter.soaking)
+    wet = _wetness(matter, fallen, melted, rained, drying * time, reserve[-1] - lowest)
     return Course(
         frames=np.append(np.minimum(begin, frame), frame),
         cover=cover,
         thawed=thawed,
         variance=variance,
         kept=kept,
-        wet=_wetness(matter, fallen, melted, rained, drying * time, reserve[-1] - lowest[0]),
+        wet=wet if matter.wet else np.full_like(wet, wet[0]),
         seeped=seeped,
         pale=w.halo(age),
         _rained=rained,
         _soaked=soaked,
+        _wet_since=wet,
     )
 
 
-def _wetness(matter: w.Matter, fallen: Array, melted: Array, rained: Array, dried: Array, lying: float) -> Array:
-    """How wet the ground looks that was open since each moment; `lying` is the water in the new snow [m]."""
+def steady_table(
+    weather: Weather, matter: w.Matter, soaking: tuple[float, float], *, ages: int, per_frame: int, frame_rate: float
+) -> dict[str, Array]:
+    """What a weather that does not change has done after 0, 1, 2 ... times a part of a frame, each (ages + 1, 3).
+
+    Parameters
+    ----------
+    weather : Weather
+        Of numbers.
+    matter : Matter
+    soaking : (float, float)
+        Shares of their soaking that hollows have left, at which water is known.
+    ages : int
+    per_frame : int
+        Ages in a frame.
+    frame_rate : float
+
+    Returns
+    -------
+    dict of arrays
+        *look*: cover [m], variance [m²], how wet it looks. *loss*: less than nothing by the share of a print that is
+        blown full, what would have melted [m], paleness. *hollows*: excess at either share [m] of the time since the
+        first frame, and the share that has seeped in.
+    """
+    last = ages / per_frame
+    course = course_of(weather, matter, frame=last, span=Span(0.0, last, frame_rate), moments=ages)
+    excess = [course.excess(share) for share in soaking]
+    since = {
+        "look": (course.cover, course.variance, course._wet_since),
+        "loss": (course.kept - 1.0, course.thawed, course.pale),
+    }
+    table = {name: np.stack(three, axis=-1)[ages::-1] for name, three in since.items()}
+    soaked = [(one[0] - one)[: ages + 1] for one in excess]
+    return table | {"hollows": np.stack([*soaked, course.seeped[ages::-1]], axis=-1)}
+
+
+def _wetness(matter: w.Matter, fallen: Array, melted: Array, rained: Array, dried: Array, lying: Array) -> Array:
+    """How wet the ground looks on which weather acts since each moment; `lying` is the water in the new snow [m]."""
     water = _before(dried - rained - (melted if matter.snow_depth else 0.0))
     wet = w.wetness(water[-1] - _least_to_come(water))
     if matter.wet:
         return wet
-    gone = melted.sum() if matter.snow_depth else fallen.sum() - lying
-    return np.full_like(wet, wet[0] * float(w.wetted(rained.sum() + gone)))
+    gone = _to_now(melted) if matter.snow_depth else _to_now(fallen) - lying
+    return wet * w.wetted(_to_now(rained) + gone)
 
 
 def _before(parts: Array) -> Array:
