@@ -28,8 +28,9 @@ POWDER = {"material.youngs_modulus": "190000", "tread": "0"}
 BODY = Dog(withers=0.38, mass=6.0, brush=2.3)
 GAIT = replace(TROT, speed=1.64, step_width=0.05, lift=0.30, crouch=0.02)
 """At this speed half a stride is as long as the trunk, so that hind paws land where the forepaws were."""
-WAY = Course(((0.0, 0.0), (1.6, 0.0), (3.2, 0.22), (4.8, 0.85), (6.4, 1.9)))
-FRAMES = 64
+WAY = Course(((0.0, 0.0), (1.6, 0.0), (3.2, 0.22), (4.8, 0.65), (6.8, 1.05), (9.0, 0.95), (12.0, 0.3), (15.0, -0.6)))
+"""A long bend over the level part of the ground [m]."""
+FRAMES = 190
 START = 2.3  # m along y; the fox goes toward -y
 PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.12, hills=22.0, seed=6)
@@ -68,7 +69,7 @@ def claims(built: FoxInPowder) -> list[Claim]:
     fore = np.array([step.position[:2] for step in steps if step.sole.startswith("hand")])
     apart = np.linalg.norm(hind[:, None] - fore, axis=-1).min(axis=1)
     return [
-        Claim("Steps in the snow", len(steps), 18, 40),
+        Claim("Steps in the snow", len(steps), 50, 100),
         Claim("Depth of the deepest [m]", max(step.max_depth_m for step in steps), 0.03, 0.15),
         Claim("From a hind paw to the next print of a forepaw [m]", float(np.median(apart)), 0.0, 0.03),
     ]
@@ -78,7 +79,7 @@ def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
     """From just above the snow, with the sun low ahead."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(24), radians(11), (1.0, 0.74, 0.52), 6.5, 0.10, _SKY)
+    open_air.add_low_sun(scene, radians(48), radians(9), (1.0, 0.74, 0.52), 8.0, 0.11, _SKY)
     chance = np.random.default_rng(4)
     spots = np.column_stack([chance.normal(0.0, 60.0, 150), -chance.uniform(30.0, 120.0, 150)])
     firs.add_firs(spots, chance.uniform(4.0, 12.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.8)
