@@ -15,7 +15,7 @@ from softground_addon.blender.characters.recognition import recognise
 from softground_addon.blender.characters.rig_mapping import map_rig
 from softground_addon.blender.characters.rig_sampling import sample_character
 
-from . import rigs
+from . import grounds, rigs
 from .responders import mapping_of
 
 FRAMES = 60
@@ -181,3 +181,40 @@ def test_a_limb_lies_where_its_skin_does_though_other_bones_bend_it(scene):
     assert motion.ground_level == pytest.approx(0.75 - 0.6 * 0.4 - 0.4 * 0.9, abs=2e-3)
     assert limb.bears[20:].all()
     assert limb.lowest()[20:] == pytest.approx(motion.ground_level, abs=2e-3)
+
+
+def climber(riser: float) -> bpy.types.Object:
+    """A body of 1 m on two feet that nothing names; each lands 0.3 m before the other one and a riser higher."""
+    feet = {"Qx": -0.15, "Zk": 0.15}
+    bones = {"Root": ((0, 0, 0), (0, 0, 0.1)), "Pm": ((0, 0, 0.9), (0, 0, 1.0))}
+    bones |= {name: ((x, 0, 0.05), (x, 0, 0.051)) for name, x in feet.items()}
+    armature = rigs.build("Climber", bones, dict.fromkeys(("Pm", *feet), "Root"))
+    box("seat", 0.3, (0, 0, 0.95), armature, "Pm")
+    time = np.arange(90) / 30
+    for number, (name, x) in enumerate(feet.items()):
+        box(f"{name} foot", 0.1, (x, 0, 0.11), armature, name)
+        cycles, phase = np.divmod(time + number / 2, 1.0)
+        swing = np.clip((phase - 0.6) / 0.4, 0, None)
+        ahead = 0.6 * (cycles + swing - np.sin(2 * np.pi * swing) / (2 * np.pi)) - 0.3 * number
+        up = cycles + np.clip(2 * swing - (riser < 0), 0, 1)
+        height = 0.08 * np.sin(np.pi * swing) + riser * (2 * up - number)
+        path = np.stack([0 * time, height, ahead], axis=-1)
+        rigs.key(armature, "location", {frame + 1: value for frame, value in enumerate(path.tolist())}, bone=name)
+    seat = np.stack([0 * time, 2 * riser * time, 0.6 * time], axis=-1)
+    rigs.key(armature, "location", {frame + 1: value for frame, value in enumerate(seat.tolist())}, bone="Pm")
+    return armature
+
+
+@pytest.mark.parametrize("riser", [0.17, -0.17])
+def test_both_feet_print_on_stairs_though_they_never_stand_on_the_same_step(scene, riser):
+    scene.render.fps = 30
+    character = add_character(scene, climber(riser))
+    assert {sole.bone for sole in character.soles} == {"Qx", "Zk"}
+    stairs = grounds.plane(scene, height=lambda x, y: 0.06 + riser * np.round(-y / 0.3))
+    scene.softground.ground = stairs
+    bpy.context.view_layer.update()
+    steps = grounds.bake(scene, cell_size=0.02).report["steps"]
+    stood = {(step["contact"], round(-step["position"][1] / 0.3)) for step in steps}
+    assert stood >= {("Qx", 0), ("Zk", 1), ("Qx", 2), ("Zk", 3), ("Qx", 4), ("Zk", 5)}
+    for step in steps:
+        assert step["position"][2] == pytest.approx(0.06 + riser * round(-step["position"][1] / 0.3), abs=0.03)

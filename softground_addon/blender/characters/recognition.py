@@ -151,7 +151,7 @@ def _source(number: int, contacts: SkinContacts, followed: FollowedSkin, recordi
     if not len(parts):
         return None
     bears = contacts.bears[:, number]
-    height = followed.motion.positions[bears][..., 2] - contacts.level
+    height = followed.motion.positions[bears][..., 2] - contacts.floor[bears, number, None]
     low = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=0)
     weight = np.bincount(followed.motion.part, low, len(followed.bones))
     bones = [followed.bones[part] for part in parts]

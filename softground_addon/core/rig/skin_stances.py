@@ -100,15 +100,17 @@ def skin_stances(
     never = np.zeros(len(recording.frames), dtype=bool)
     bears = {source.name: never for source in sources}
     bears |= {sources[number].name: contacts.bears[:, contact] for contact, number in enumerate(present)}
+    floor = {sources[number].name: contacts.floor[:, contact] for contact, number in enumerate(present)}
     feet = [source for source in sources if not source.limb and bears[source.name].any()]
     standing = {
-        source.name: _standing(followed, group == sources.index(source), bears[source.name], contacts.level)
+        source.name: _standing(followed, group == sources.index(source), bears[source.name], floor[source.name])
         for source in feet
     }
-    band = contacts.level + SOLE_BAND * followed.motion.height
     meshes = {}
     for source in feet:
-        mesh = _mesh(skin, bones, source, own[source.name], recording.of(np.array([standing[source.name]])), band)
+        at = standing[source.name]
+        band = floor[source.name][at] + SOLE_BAND * followed.motion.height
+        mesh = _mesh(skin, bones, source, own[source.name], recording.of(np.array([at])), band)
         if mesh is not None:
             meshes[source.name] = mesh
     height, tracks = followed.motion.height, contacts.tracks
@@ -129,9 +131,11 @@ def _bones_of(bones: RigBones, source: SoleSource, mapping: RigMapping) -> froze
     return limb_family(bones, source, mapping) if source.limb else bone_families(bones, source)[0]
 
 
-def _standing(followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[np.bool_], level: float) -> int:
+def _standing(
+    followed: FollowedSkin, parts: NDArray[np.bool_], bears: NDArray[np.bool_], floor: NDArray[np.float64]
+) -> int:
     """The sample at which most of some parts' points are near the ground while they bear."""
-    height = followed.motion.positions[:, parts[followed.motion.part], 2] - level
+    height = followed.motion.positions[:, parts[followed.motion.part], 2] - floor[:, None]
     near = (np.abs(height) < UNDERSIDE * followed.motion.height).sum(axis=1)
     return int(np.where(bears, near, -1).argmax())
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..numerics.intervals import runs
 from ..numerics.slices import Slices, sliced
 from .bearing import bearing, without_glimpses
+from .footing import footing_of
 from .ground_level import ground_of
 from .merging import merged
 from .skin_motion import Array, Indices, Mask, PartTracks, SkinMotion, track_parts
@@ -32,7 +33,9 @@ class SkinContacts:
     Attributes
     ----------
     level : float
-        Height of the ground [m].
+        Height of the ground [m], of stairs that of the step on which skin rests most often.
+    floor : (F, C) float array
+        That under each contact [m].
     drift : (2,) float array
         Horizontal velocity of the ground [m/s]: minus the travel that an in-place cycle lacks.
     group : (P,) int array
@@ -44,6 +47,7 @@ class SkinContacts:
     """
 
     level: float
+    floor: Array
     drift: Array
     group: Indices
     bears: Mask
@@ -63,20 +67,42 @@ def find_contacts(skin: SkinMotion, groups: Indices | None = None) -> Slices[Ski
     parts = tracks = yield from track_parts.slices(skin)
     yield
     level, drift = yield from ground_of.slices(parts)
+    uneven = not drift.any() and footing_of(parts, level) is not None
+    ground = _Ground(-np.inf if uneven else level, level, drift)
     if groups is None:
         assert skin.links is not None, "without them no parts can be told to be one contact"
-        parts = yield from track_parts.slices(skin, floor=level)
-        bears = bearing(parts, level, drift)
+        parts = yield from track_parts.slices(skin, floor=ground.floor)
+        _, bears = ground.borne(parts)
         groups = merged(parts, bears, skin.links)
         groups = _numbered(groups)
         if (groups >= 0).any():
-            groups = yield from _without_brushes(skin, groups, level, drift)
+            groups = yield from _without_brushes(skin, groups, ground)
     bears = np.zeros((len(skin.positions), 0), dtype=bool)
+    footing = np.zeros(bears.shape)
     if (groups >= 0).any():
-        parts = yield from track_parts.slices(skin, groups, level)
-        bears = without_glimpses(bearing(parts, level, drift), parts)
-        level = _shared_level(parts, bears, level)
-    return SkinContacts(level * skin.height, drift * skin.height, groups, bears, tracks)
+        parts = yield from track_parts.slices(skin, groups, ground.floor)
+        footing, bears = ground.borne(parts)
+        bears = without_glimpses(bears, parts)
+        if not uneven:
+            level = _shared_level(parts, bears, level)
+            footing = np.full(bears.shape, level)
+    return SkinContacts(level * skin.height, footing * skin.height, drift * skin.height, groups, bears, tracks)
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What a character bears on: one level, or where that is unknown (`floor` -inf) as many as its parts rest at."""
+
+    floor: float
+    level: float
+    drift: Array
+
+    def borne(self, tracks: PartTracks) -> tuple[Array, Mask]:
+        """Height of the ground under each part [H], and when it bears, (F, P)."""
+        footing = None if np.isfinite(self.floor) else footing_of(tracks, self.level)
+        if footing is None:
+            return np.full(tracks.low.shape, self.level), bearing(tracks, self.level, self.drift)
+        return footing, bearing(replace(tracks, low=np.abs(tracks.low - footing)), 0.0, self.drift)
 
 
 def _shared_level(tracks: PartTracks, bears: Mask, level: float) -> float:
@@ -90,14 +116,14 @@ def _numbered(groups: Indices) -> Indices:
     return np.asarray(numbers - (values[0] == -1), dtype=np.intp)
 
 
-def _without_brushes(skin: SkinMotion, groups: Indices, level: float, drift: Array) -> Slices[Indices]:
+def _without_brushes(skin: SkinMotion, groups: Indices, ground: _Ground) -> Slices[Indices]:
     """The groups less those that only brush the ground: short, and slipping or rare, while others bear.
 
     Limbs that mirror each other are contacts together: none is a brush whose twin is a contact, and a short one whose
     twin never bears is.
     """
-    tracks = yield from track_parts.slices(skin, groups, level)
-    bears, slip = bearing(tracks, level, drift), tracks.slip(drift)
+    tracks = yield from track_parts.slices(skin, groups, ground.floor)
+    (_, bears), slip = ground.borne(tracks), tracks.slip(ground.drift)
     fast, time = np.percentile(slip, 90, axis=0), bears.sum(axis=0)
     twin = _twin_groups(groups, skin.twin, len(time))
     keeps = np.zeros(len(time), dtype=bool)

@@ -17,11 +17,19 @@ LIFT = 0.12
 
 
 def animal(
-    legs: int, *, duty: float, stride: float, on_the_spot: bool = False, leaves: int = 0, seed: int = 0
+    legs: int,
+    *,
+    duty: float,
+    stride: float,
+    on_the_spot: bool = False,
+    leaves: int = 0,
+    seed: int = 0,
+    riser: float = 0.0,
 ) -> tuple[SkinMotion, np.ndarray]:
     """An animal 1 m tall that walks along x, its feet plates of 8 cm, and when each foot stands (F, legs).
 
-    `leaves` more parts lie inside of feet, as the leaf bones of imported rigs do.
+    `leaves` more parts lie inside of feet, as the leaf bones of imported rigs do. Each foot of two lands a `riser`
+    higher than the other one stands.
     """
     chance = np.random.default_rng(seed)
     time = np.arange(FRAMES)[:, None] / PERIOD + np.arange(legs) * (1 / 2 if legs == 2 else 0.618) + 0.1
@@ -31,7 +39,8 @@ def animal(
     ahead = (np.floor(time) + (swing - np.sin(2 * np.pi * swing) / (2 * np.pi))) * stride
     if on_the_spot:
         ahead = ahead - time * stride
-    lift = LIFT * np.sin(np.pi * swing)
+    stair = np.floor(time) + np.clip(2 * swing, 0, 1) if riser > 0 else np.floor(time) + np.clip(2 * swing - 1, 0, 1)
+    lift = LIFT * np.sin(np.pi * swing) + riser * (2 * stair - np.arange(legs))
     plate = np.stack(np.meshgrid(np.linspace(-0.04, 0.04, 5), np.linspace(-0.02, 0.02, 3), [0.0, 0.03]), axis=-1)
     plate = plate.reshape(-1, 3)
     root = np.stack([np.arange(legs) // 2 * 0.4, np.where(np.arange(legs) % 2, -0.15, 0.15)], axis=-1)
@@ -43,6 +52,7 @@ def animal(
     body = chance.uniform((0.2, -0.2, 0.6), (0.6, 0.2, 1.0), (20, 3))
     trunk = np.broadcast_to(body, (FRAMES, 20, 3)).copy()
     trunk[:, :, 0] += (0.0 if on_the_spot else 1.0) * np.arange(FRAMES)[:, None] / PERIOD * stride
+    trunk[:, :, 2] += 2 * riser * np.arange(FRAMES)[:, None] / PERIOD
     display_meshes = chance.integers(0, legs, leaves)
     points = [*np.moveaxis(feet, 1, 0), *(feet[:, leg, :4] + (0, 0, 0.001) for leg in display_meshes), trunk]
     part = np.repeat(np.arange(len(points)), [piece.shape[1] for piece in points])
@@ -103,6 +113,27 @@ def test_the_gait_of_an_animal_is_found_in_its_skin(
     assert_gait(found, stands)
     speed = stride * RATE / PERIOD if on_the_spot else 0.0
     assert np.linalg.norm(found.drift) / scale == pytest.approx(speed, abs=0.1 * speed + 0.01)
+
+
+@given(
+    duty=st.floats(0.55, 0.7),
+    stride=st.floats(0.4, 0.9),
+    riser=st.floats(0.05, 0.25),
+    down=st.booleans(),
+    scale=st.floats(-3, 3).map(lambda power: 10.0**power),
+    turn=st.floats(0, 6.28),
+)
+def test_the_gait_is_found_on_stairs_and_how_high_each_foot_stands(
+    duty: float, stride: float, riser: float, down: bool, scale: float, turn: float
+) -> None:
+    riser = -riser if down else riser
+    skin, stands = animal(2, duty=duty, stride=stride, riser=riser)
+    found = find_contacts(changed(skin, scale=scale, turn=turn, lift=0.3))
+    assert_gait(found, stands)
+    for leg in range(2):
+        bears = found.bears[:, found.group[leg]]
+        sole = skin.positions[:, skin.part == leg, 2].min(axis=1) + 0.3
+        assert found.floor[bears, found.group[leg]] / scale == pytest.approx(sole[bears], abs=0.02)
 
 
 @given(
