@@ -11,6 +11,7 @@ import numpy as np
 
 from sample_scenes import firs, open_air, production, stage
 from sample_scenes.body import Body
+from sample_scenes.character import crease_trousers
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.run import Run, run
 from softground_addon.blender.after import debris_object
@@ -66,6 +67,7 @@ def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     bake = built.bakes[PRESET]
     step = bake.footprints[STEP]
+    crease_trousers(bpy.data.objects["Hiker"])
     stage.go_to(scene, step.start_frame + AFTER)
     stage.aim(scene.camera, step.position + np.array((0.60, -1.10, 0.10)), step.position + np.array((0.08, 0.05, 0.17)))
     open_air.add_low_sun(scene, radians(-58), radians(8), (1.0, 0.74, 0.52), 8.0, 0.13, open_air.PALE_DUSK)
