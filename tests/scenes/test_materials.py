@@ -53,7 +53,8 @@ def test_open_ground_has_three_octaves_apart_and_none_of_them_repeats(ensure_mat
     nodes = ensure_material(surface).node_tree.nodes
     assert not {node.type for node in nodes} & {"TEX_IMAGE", "TEX_WAVE", "TEX_CHECKER", "TEX_BRICK"}
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
-    textures = [node for node in upstream(output.inputs["Displacement"]) if node.type in ("TEX_NOISE", "TEX_VORONOI")]
+    relief = upstream(output.inputs["Displacement"]) | upstream(principled(ensure_material(surface)).inputs["Normal"])
+    textures = [node for node in relief if node.type in ("TEX_NOISE", "TEX_VORONOI")]
     sizes = [1.0 / node.inputs["Scale"].default_value for node in textures]
     assert min(sizes) < 0.01  # seen at 0.3 m
     assert any(0.01 < size < 0.2 for size in sizes)  # at 2 m
@@ -160,6 +161,27 @@ def spot(scene, tmp_path):
         return pixels.reshape(48, 48, 4)[..., :3]
 
     return ground, seen
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_what_is_displaced_is_low(spot, ensure_material, surface):
+    """EEVEE draws stripes where the mesh bends, the stronger the higher the displacement stands from 0."""
+    ground, seen = spot
+    material = ensure_material(surface)
+    ground.data.materials.append(material)
+    ground.scale = (100.0, 100.0, 1.0)
+    scene, tree = ground.users_scene[0], material.node_tree
+    scene.camera.data.ortho_scale, scene.view_settings.view_transform = 18.0, "Raw"
+    output = tree.get_output_node("ALL")
+    height = output.inputs["Displacement"].links[0].from_node.inputs["Height"].links[0].from_socket
+    shown = tree.nodes.new("ShaderNodeEmission")
+    grey = tree.nodes.new("ShaderNodeMath")
+    grey.operation, grey.inputs[1].default_value, grey.inputs[2].default_value = "MULTIPLY_ADD", 4.0, 0.5
+    tree.links.new(height, grey.inputs[0])
+    tree.links.new(grey.outputs[0], shown.inputs["Color"])
+    tree.links.new(shown.outputs[0], output.inputs["Surface"])
+    heights = (seen() - 0.5) / 4.0
+    assert 0.001 < np.abs(heights).max() < 0.05
 
 
 @pytest.mark.slow

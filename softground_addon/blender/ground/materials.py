@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import bpy
@@ -53,6 +53,8 @@ class Ground:
         From 0 to 1: whether a foot was here, whether it left a hollow, whether the ground stands up as a rim.
     tread : Socket
         Height of the bars that the tread of a shoe left in the print [m].
+    normal : Socket
+        Unit normal of the smooth ground, with the swells of open ground.
     """
 
     place: Socket
@@ -60,6 +62,7 @@ class Ground:
     deep: Socket
     risen: Socket
     tread: Socket
+    normal: Socket
 
     @property
     def edge(self) -> Socket:
@@ -194,17 +197,22 @@ def _material(
 
 def _look(graph: Graph, surface: str, ground: Ground, *, is_open: bool = True) -> Look:
     """What a surface hands to the shader, with what weather has made of it; open ground has shades and swells."""
-    look = _looks(surface)[0](graph, ground)
+    build, _ = _looks(surface)
     if not is_open:
+        look = build(graph, ground)
         inputs, relief = under_weather(graph, surface, look.inputs, look.relief)
         return Look(relief, inputs)
     wide = graph.noise(ground.place, WIDE, 5.0, 0.65)
     dark, light, uneven = _WIDE[surface]
+    # Swells are decimetres high. EEVEE makes bump of a displacement with an error that grows with its height and
+    # the curvature of the mesh (stripes on the walls of prints); a bump node has none.
+    normal = graph.out(graph.node("ShaderNodeBump", {"Height": wide, "Distance": uneven}))
+    look = build(graph, replace(ground, normal=normal))
     shade = graph.ramp(wide, 0.30, 0.70, dark, light)
     colour = graph.node("ShaderNodeVectorMath", {0: look.inputs["Base Color"], "Scale": shade}, operation="SCALE")
-    shaded = {**look.inputs, "Base Color": graph.out(colour)}
+    shaded = {"Normal": normal, "Coat Normal": normal, **look.inputs, "Base Color": graph.out(colour)}
     inputs, relief = under_weather(graph, surface, shaded, look.relief)
-    return Look(relief + (wide + -0.5) * uneven, inputs)
+    return Look(relief, inputs)
 
 
 def _ground(graph: Graph) -> Ground:
@@ -217,6 +225,7 @@ def _ground(graph: Graph) -> Ground:
         deep=graph.ramp(compression, 0.006, 0.020),
         risen=graph.ramp(graph.attribute(RIM) * shows, 0.0002, 0.005),
         tread=_tread(graph, pressed),
+        normal=graph.normal(),
     )
 
 
@@ -332,7 +341,7 @@ def _mud(graph: Graph, ground: Ground) -> Look:
     colour = graph.mix(graph.ramp(lumps, 0.3, 0.7), (0.128, 0.076, 0.041), (0.205, 0.130, 0.076))
     colour = graph.mix(wet, colour, (0.080, 0.045, 0.023))
     colour = graph.mix(water * 0.93, colour, (0.150, 0.100, 0.060))
-    level = graph.node("ShaderNodeMix", {"Factor_Float": water, "A_Vector": graph.normal(), "B_Vector": UP}, **_VECTOR)
+    level = graph.node("ShaderNodeMix", {"Factor_Float": water, "A_Vector": ground.normal, "B_Vector": UP}, **_VECTOR)
     return Look(
         relief,
         {
