@@ -218,3 +218,14 @@ def test_both_feet_print_on_stairs_though_they_never_stand_on_the_same_step(scen
     assert stood >= {("Qx", 0), ("Zk", 1), ("Qx", 2), ("Zk", 3), ("Qx", 4), ("Zk", 5)}
     for step in steps:
         assert step["position"][2] == pytest.approx(0.06 + riser * round(-step["position"][1] / 0.3), abs=0.03)
+
+
+@pytest.mark.parametrize("riser", [0.17, -0.17])
+def test_stairs_without_a_mesh_print_on_a_slope_and_only_a_mesh_of_them_is_the_remedy(scene, riser):
+    scene.render.fps = 30
+    add_character(scene, climber(riser))
+    report = grounds.bake(scene, cell_size=0.02).report
+    assert {step["contact"] for step in report["steps"]} == {"Qx", "Zk"}
+    assert min(step["frame_end"] - step["frame_start"] for step in report["steps"][1:]) > 12
+    assert [finding["code"] for finding in report["self_check"]] == ["level_on_slope", "few_cells", "no_legs"]
+    assert "Use Selected" in report["self_check"][0]["remedy"]

@@ -99,7 +99,7 @@ def self_check(
         found += _pace(character, steps)
         found += yield from _edge(motion, steps, terrain, ground)
         if motion.skin is not None:
-            found += yield from _skin(motion, motion.skin, steps, terrain, ground)
+            found += yield from _skin(character, motion.skin, steps, terrain, ground)
     unplaced = sum(footprint.unplaced_rim_m3 for footprint in footprints)
     if unplaced > 0:
         message = f"{unplaced * 1e6:.0f} cm³ of displaced ground did not fit at the edge of the ground"
@@ -242,7 +242,7 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
         around = step.position[:2, None] + ring * sole.sole.length
         if np.isfinite(terrain.heights(*around)).all():
             continue
-        now = int(np.abs(motion.frames - (step.start_frame + step.end_frame) / 2).argmin())
+        now = _middle(step, motion.frames)
         pose = sole.transforms[now : now + 1]
         points = sole_points(sole.sole, pose)
         area = np.concatenate([patch.area for patch in points.patches])
@@ -261,6 +261,11 @@ def _edge(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain,
             "extend the ground beyond the steps.",
         )
     ]
+
+
+def _middle(step: Footprint, frames: Array) -> int:
+    """The sample nearest to the middle of a step."""
+    return int(np.abs(frames - (step.start_frame + step.end_frame) / 2).argmin())
 
 
 @dataclass(frozen=True)
@@ -286,9 +291,10 @@ class _Touching:
 
 
 def _skin(
-    motion: CharacterMotion, skin: LowSkin, steps: Sequence[Footprint], terrain: Terrain, ground: str
+    character: CharacterLoads, skin: LowSkin, steps: Sequence[Footprint], terrain: Terrain, ground: str
 ) -> Slices[list[Finding]]:
     """Whether ground, steps and resting skin agree."""
+    motion = character.motion
     height = np.empty(skin.rise.shape)
     for start in range(0, len(height), SOME_FRAMES):
         x, y, z = np.moveaxis(skin.position[start : start + SOME_FRAMES], -1, 0)
@@ -300,6 +306,17 @@ def _skin(
         return []
     found = []
     if abs(over) > OFF_SKIN * skin.height:
+        if _stands_level_on_slope(motion, steps, terrain, abs(over)):
+            slope = float(np.median(character.contacts.normal[character.contacts.touching][:, 2]))
+            return [
+                Finding(
+                    "level_on_slope",
+                    "error",
+                    f"The feet of '{motion.name}' stand level where '{ground}' slopes by "
+                    f"{np.degrees(np.arccos(slope)):.0f}°",
+                    "on stairs, select a mesh of them and press Use Selected; on a hill, turn the feet to the slope.",
+                )
+            ]
         side, ground_way, body_way = ("above", "up", "down") if over > 0 else ("below", "down", "up")
         found.append(
             Finding(
@@ -314,6 +331,22 @@ def _skin(
     if steps:
         found += yield from _skin_and_steps(motion, touching, steps)
     return found
+
+
+def _stands_level_on_slope(motion: CharacterMotion, steps: Sequence[Footprint], terrain: Terrain, off: float) -> bool:
+    """Whether soles lie level on ground that slopes, so that no move of it takes away that skin is `off` it [m]."""
+    soles = {sole.sole.name: sole for sole in motion.soles if sole.sole.prop is None}
+    spans = [np.zeros((0, 2))]
+    for step in steps:
+        if step.sole in soles:
+            x, y, z = soles[step.sole].landmark_positions()[_middle(step, motion.frames)].T
+            spans.append(np.ptp([z, z - terrain.heights(x, y)], axis=1)[None])
+    known = np.concatenate(spans)
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
+        return False
+    of_sole, over_ground = np.median(known, axis=0)
+    return bool(over_ground > max(off, 2 * of_sole))
 
 
 def _resting(height: Array, skin: LowSkin) -> float | None:
@@ -346,7 +379,7 @@ def _skin_and_steps(motion: CharacterMotion, touching: _Touching, steps: Sequenc
         first, last = np.searchsorted(frames, [step.start_frame - 1, step.end_frame + 1 + 1e-6])
         covered[first:last] |= touching.near(step, slice(first, last), reach)
         if sole.bears is not None:
-            middle = int(np.abs(frames - (step.start_frame + step.end_frame) / 2).argmin())
+            middle = _middle(step, frames)
             seen += 1
             if not touching.near(step, slice(middle, middle + 1), reach).any():
                 alone.append(step.start_frame)

@@ -62,6 +62,24 @@ def test_a_ground_off_the_resting_skin_is_told_by_how_much(over):
     assert f"ground {way}" in findings["ground_off_skin"].remedy
 
 
+@pytest.mark.parametrize(("turned", "code"), [(0.0, "level_on_slope"), (1.0, "ground_off_skin")])
+def test_feet_that_stand_level_on_a_slope_want_stairs_and_not_a_ground_of_another_height(turned, code):
+    slope, ends = np.arctan(0.4), np.array([(-0.13, 0.0, 0.0), (0.13, 0.0, 0.0)])
+    loads = stands(skin=np.add(PLACES, (0, 0, 0.04)))
+    soles = tuple(
+        replace(foot, sole=replace(foot.sole, landmarks=ends, landmark_patch=np.zeros(2, int)))
+        for foot in loads.motion.soles
+    )
+    for foot, place in zip(soles, PLACES, strict=True):
+        foot.transforms[:] = pose(place, 0.0, turned * slope)
+    loads = replace(loads, motion=replace(loads.motion, soles=soles))
+    normal = np.broadcast_to((-np.sin(slope), 0.0, np.cos(slope)), loads.contacts.normal.shape)
+    loads = replace(loads, contacts=replace(loads.contacts, normal=normal))
+    told = found(loads, Slope(slope=0.4))
+    assert told.keys() == {code}
+    assert ("slopes by 22°" in told[code].message) == ("Use Selected" in told[code].remedy) == (not turned)
+
+
 def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_apart():
     away = np.add(PLACES, (1.0, 0, 0))
     assert found(stands(skin=np.concatenate([PLACES[:1], away]))).keys() == {"step_without_skin"}
