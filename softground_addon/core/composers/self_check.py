@@ -326,6 +326,8 @@ def _skin(
                 f"move the ground {ground_way} by as much, or the character {body_way}.",
             )
         )
+    else:
+        over = 0.0  # what presses is the ground itself, and the feet may rest a little apart
     rise = (height - over) / skin.height
     touching = _Touching(skin, np.abs(rise) < NEAR, (rise < NEAR) & (rise > -SUNK))
     if steps:

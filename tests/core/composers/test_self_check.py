@@ -92,6 +92,12 @@ def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_
     assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_feet_that_rest_apart_on_both_sides_of_the_ground_each_have_skin(side):
+    heights = np.array([(0, 0, -0.011), (0, 0, 0.008)]) * side * STATURE  # within 1.2 %, but apart by more than 1.5 %
+    assert not found(stands(skin=PLACES + heights))
+
+
 @pytest.mark.parametrize(("depth", "agrees"), [(0.05, True), (0.3, False)])
 def test_a_step_whose_skin_has_sunk_into_the_ground_is_that_skins(depth, agrees):
     loads = stands()
