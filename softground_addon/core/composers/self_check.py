@@ -33,7 +33,7 @@ SUNK = 0.08
 """Feet dip through the ground by up to this in cycles as they are sold, in body heights."""
 BESIDE = 0.15
 """A step within this of touching skin is that skin's, in body heights: a foot's length."""
-DISAGREE = 0.2
+DISAGREE = 0.15
 """Share of steps, and of moments of rest, that may go without the other: brushes, and the ends of contacts."""
 LEAST_REST = 3
 """Frames of rest without a step that may be the rounding of a contact's ends."""

@@ -92,6 +92,16 @@ def test_a_step_where_no_skin_rests_and_skin_that_rests_without_a_step_are_told_
     assert found(other)["skin_without_step"].message.endswith(f"from frame {frames[len(frames) // 2]:.0f} on")
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.12, False), (0.18, True)])
+def test_skin_that_rests_without_a_step_for_more_than_15_percent_of_the_time_is_told(share, told):
+    loads = stands()
+    frames = loads.motion.skin.frames
+    skin = skin_at(frames, np.concatenate([PLACES, np.add(PLACES[:1], (1.0, 0, 0))]))
+    skin.rise[round(len(frames) * (1 - share)) :, :2] = 1.0
+    findings = found(replace(loads, motion=replace(loads.motion, skin=skin)))
+    assert ("skin_without_step" in findings) == told
+
+
 @pytest.mark.parametrize("side", [1, -1])
 def test_feet_that_rest_apart_on_both_sides_of_the_ground_each_have_skin(side):
     heights = np.array([(0, 0, -0.011), (0, 0, 0.008)]) * side * STATURE  # within 1.2 %, but apart by more than 1.5 %
