@@ -7,14 +7,12 @@ from math import cos, pi, radians
 from pathlib import Path
 
 import bpy
+import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from sample_scenes import production, stage
-from sample_scenes.body import Body
-from sample_scenes.character import create_character
-from sample_scenes.gait import Gait, walk
-from sample_scenes.keys import write_action
-from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes import firs, open_air, production, stage
+from sample_scenes.character import crease_trousers
+from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
 """Fitted to the soles."""
@@ -23,6 +21,9 @@ PRESET = "Snow"
 SOFTER = "2.2e5"
 """Young's modulus for prints of a hand's breadth [Pa]."""
 FRAMES, SHOWN = 72, 60
+START = 1.6  # m along y; the walk is toward -y
+FIRS = 190
+HEIGHT = open_air.rolling(swell=0.2, hills=14.0, seed=11)
 PICTURE = (960, 540)
 
 MOMENTS, HOLD = 32, 900
@@ -37,23 +38,15 @@ class BeforeAfter:
     """One walk, with its response as a layer that fades."""
 
     bakes: dict[str, Bake]
-    walker: bpy.types.Object
 
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> BeforeAfter:
     """A walk past the camera, which is there first."""
-    body = Body()
-    walker = create_character("Hiker", body, scene.collection)
-    walker.location = (0.0, 1.6, 0.0)
-    write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    scene.frame_start, scene.frame_end = 1, FRAMES
+    ground = open_air.add_ground(scene, "Snow", (-8.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    scene.camera = stage.add_camera(scene, "Beside the Boots", lens=34.0)
-    stage.aim(scene.camera, (1.22, -1.50, 0.66), (-0.02, -1.00, 0.13))
-    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "400000"}
-    chosen |= {"material.youngs_modulus": SOFTER, "sink_feet": "true", "ground_margin": "4.0"} | dict(options or {})
-    bake = production.bake(scene, [Walker(walker, body.mass)], PRESET, cell_size, options=chosen)
-    return BeforeAfter({PRESET: bake}, walker)
+    open_air.add_camera(scene, (1.34, -1.62, 0.42), (-0.06, -0.98, 0.20), 32.0, (0.0, -1.0, 0.1), 8.0)
+    chosen = {"relief_vertices": "400000", "material.youngs_modulus": SOFTER} | dict(options or {})
+    return BeforeAfter({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 
 
 def claims(built: BeforeAfter) -> list[Claim]:
@@ -71,9 +64,13 @@ def claims(built: BeforeAfter) -> list[Claim]:
 def shoot(_built: BeforeAfter, folder: Path, samples: int) -> list[Path]:
     """The same frame without and with the layer, and the wipe between them."""
     scene = bpy.context.scene
-    stage.add_sun(scene, radians(65), radians(17))
-    scene.view_settings.exposure = -0.4
+    open_air.add_low_sun(scene, radians(60), radians(13), (1.0, 0.82, 0.64), 6.5, 0.20, (radians(14.0), 1.2))
+    scene.view_settings.exposure = 0.55
+    chance = np.random.default_rng(5)
+    spots = np.column_stack([-chance.uniform(26.0, 110.0, FIRS), chance.normal(14.0, 45.0, FIRS)])
+    firs.add_firs(spots, chance.uniform(5.0, 12.0, FIRS), HEIGHT, firs.WINTRY, snow=0.7)
     scene.frame_set(SHOWN)
+    crease_trousers(bpy.data.objects["Hiker"])
     pictures = []
     for name, strength in (("before", 0.0), ("after", 1.0)):
         scene.softground.characters[0].response_strength = strength
