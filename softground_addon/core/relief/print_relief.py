@@ -241,7 +241,7 @@ class PrintRelief:
         for drag in self._drags:
             ridges = ridges * drag.kept(around)
         if self._tread.is_flesh:
-            height = np.minimum(places.floor * FLESH, ARCH * self._size)
+            height = np.minimum(places.floor * FLESH, ARCH * self._size) * (1.0 - tread.kept)
             return ridges * around.pressed * height * min(1.0, self._tread_strength)
         worn = np.clip(0.45 + 0.4 * around.noise(43, 30.0) + 0.25 * around.noise(44, 11.0), 0.0, 1.0)
         lost = tread.kept + (tread.lost - tread.kept) * worn * worn

@@ -79,13 +79,13 @@ def trainer(under: Under) -> Array:
 _PADS = np.array(
     [
         (-0.365, 0.005, 0.125, 0.37), (-0.13, -0.24, 0.25, 0.20), (0.13, -0.17, 0.14, 0.30), (0.165, 0.22, 0.125, 0.28),
-        (0.405, 0.27, 0.085, 0.165), (0.425, 0.045, 0.046, 0.085), (0.395, -0.115, 0.040, 0.075),
-        (0.350, -0.255, 0.036, 0.070), (0.295, -0.375, 0.034, 0.070),
+        (0.405, 0.27, 0.080, 0.150), (0.425, 0.04, 0.044, 0.068), (0.395, -0.115, 0.038, 0.062),
+        (0.350, -0.255, 0.035, 0.060), (0.295, -0.38, 0.034, 0.060),
     ]
 )  # fmt: skip
 """Heel, outer side, ball and toes of a bare right foot as ellipses: middle over length and over breadth from the middle
 of the foot, ahead and to the left, and half axes. Drawn after prints on paper."""
-_FLESH = 0.014
+_FLESH = 0.009
 """Width over which pads of flesh fall off, and over which they run together [m]."""
 
 

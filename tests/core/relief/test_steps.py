@@ -6,12 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+from softground_addon.core.composers.relief_plan import TREAD
+from softground_addon.core.ground import presets
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.ground.presets import SURFACES
 from softground_addon.core.playback.ramps import QUANTUM
 from softground_addon.core.playback.vertex_histories import vertex_histories
 from softground_addon.core.record.pressed_ground import sample_at
 from softground_addon.core.relief import amounts
+from softground_addon.core.relief.print_shape import shape_of
 from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, water_at
 from softground_addon.core.relief.tread import SoleTread, bare, hiking
 from tests.core.walkers import pressed, walk
@@ -155,6 +158,30 @@ def test_tables_name_what_is_wrong():
     ):
         with pytest.raises(InputError, match=message):
             amounts.parse(text, "Relief 'x'", "soil")
+
+
+def test_water_in_mud_leaves_half_of_the_tread_to_be_seen():
+    step = steps_on("mud")[0]
+    place = around([step])
+    water = water_at(relief("mud", [step], place), place.shape[1])
+    floor = shape_of(step, MATERIALS["mud"].blur_sigma).at(*place)[0] > 0.012
+    assert 0.1 < (water[floor] > 0).mean() < 0.6
+
+
+@pytest.mark.parametrize("pattern", [hiking, bare])
+@pytest.mark.parametrize("name", ["snow", "dry_sand", "wet_sand", "mud", "soil"])
+def test_soles_show_on_the_floor_on_each_of_the_grounds_that_two_clicks_give(name, pattern):
+    preset = presets.find(name)
+    look = preset.surface
+    step = steps_on(look)[0]
+    place = around([step])
+    treads = {(step.character, step.sole): SoleTread(pattern)}
+    with_it, without = (
+        all_together(relief(look, [step], place, treads=treads, tread_strength=high / TREAD), place.shape[1])[:, 0]
+        for high in (preset.tread, 0.0)
+    )
+    floor = shape_of(step, MATERIALS[look].blur_sigma).at(*place)[0] > 0.012
+    assert np.std((with_it - without)[floor]) > 0.0005
 
 
 def test_water_lies_level_in_mud_and_a_later_step_takes_it_along():

@@ -1,6 +1,7 @@
 """Treads: a map of a sole from an image or a mesh presses what it shows, to scale, mirrored for left feet."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from softground_addon.core.relief import tread_map
 from softground_addon.core.relief.amounts import Amounts, Tread
 from softground_addon.core.relief.print_relief import ARCH, FLESH, relief_of_print
 from softground_addon.core.relief.print_shape import shape_of
-from softground_addon.core.relief.tread import LENGTH, PATTERNS, SoleTread, Under, bare, of_map
+from softground_addon.core.relief.tread import _PADS, LENGTH, PATTERNS, SoleTread, Under, bare, of_map
 from tests.core.relief.test_steps import MATERIALS, steps_on
 from tests.core.walkers import box_sole
 
@@ -95,6 +96,15 @@ def test_a_bare_foot_is_on_its_heel_ball_and_five_toes_and_not_on_its_arch():
     assert stands(0.31, 0.15) > 0.6  # before the big toe
     row = bare(under(np.full(400, 0.385 * LENGTH), np.linspace(0.05, -0.05, 400)))
     assert np.diff((row < 0.5).astype(int)).tolist().count(1) >= 3  # toe by toe
+
+
+def test_ground_stands_between_toes():
+    toes = _PADS[-5:, :2]
+    for one, other in pairwise(toes):
+        line = one + (other - one) * np.linspace(0.0, 1.0, 101)[:, None]
+        stands = bare(under(line[:, 0] * LENGTH, line[:, 1] * 0.1))
+        assert max(stands[0], stands[-1]) < 0.1
+        assert stands.max() > 0.4
 
 
 @pytest.mark.parametrize("look", ["wet_sand", "snow"])
