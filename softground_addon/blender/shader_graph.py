@@ -10,6 +10,10 @@ import bpy
 
 Colour = tuple[float, float, float]
 
+FLAT = 0.1
+"""Size of noise that no print is deep enough to show more than a plane of [m]: in two dimensions it compiles in half
+the time, which in EEVEE is most of a material's."""
+
 
 @dataclass(frozen=True)
 class Socket:
@@ -73,9 +77,9 @@ class Graph:
         return self.out(self.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP"))
 
     def noise(self, place: Socket, size: float, detail: float = 2.0, roughness: float = 0.5) -> Socket:
-        """Noise around 0.5 whose features are about `size` [m] large."""
+        """Noise around 0.5 whose features are about `size` [m] large; from `FLAT` on they vary with x and y alone."""
         inputs = {"Vector": place, "Scale": 1.0 / size, "Detail": detail, "Roughness": roughness}
-        return self.out(self.node("ShaderNodeTexNoise", inputs))
+        return self.out(self.node("ShaderNodeTexNoise", inputs, noise_dimensions="2D" if size >= FLAT else "3D"))
 
     def cells(self, place: Socket, size: float) -> Any:
         """Voronoi cells of about `size` [m]: outputs are distance to the centre [cells], random colour."""

@@ -61,6 +61,13 @@ def test_open_ground_has_three_octaves_apart_and_none_of_them_repeats(ensure_mat
     assert max(sizes) > 2.0  # at 20 m
 
 
+@pytest.mark.parametrize("surface", SURFACES)
+def test_what_is_wider_than_a_print_is_deep_varies_in_plan_alone_as_that_compiles_faster(ensure_material, surface):
+    noises = [node for node in ensure_material(surface).node_tree.nodes if node.bl_idname == "ShaderNodeTexNoise"]
+    assert {node.noise_dimensions for node in noises if node.inputs["Scale"].default_value < 9} == {"2D"}
+    assert {node.noise_dimensions for node in noises if node.inputs["Scale"].default_value > 11} <= {"3D"}
+
+
 @pytest.mark.parametrize("surface", ["sand", "soil"])
 def test_what_rain_wets_shines_in_patches(ensure_material, surface):
     shader = principled(ensure_material(surface))
