@@ -46,7 +46,7 @@ MAKE = {
     "auto-rig pro": lambda scene: auto_rig_pro.walking(),
 }
 
-QUICK = ("walker", "feet on a root", "ik")
+QUICK = ("feet on a root", "ik")
 QUICK_AND_SLOW = [rig if rig in QUICK else pytest.param(rig, marks=pytest.mark.slow) for rig in (*MAKE, "rigify")]
 
 
@@ -334,6 +334,7 @@ def test_tilt_presets_set_the_papers_gains_for_the_characters_mass(scene):
     assert (tilt.frequency, tilt.damping) == pytest.approx((0.6, 0.85))
 
 
+@pytest.mark.slow
 def test_acting_raises_the_arms_or_the_knees_on_the_rig(scene):
     set_up(shots.walker(scene))
     scene.softground.material.youngs_modulus = 5e4

@@ -47,12 +47,12 @@ HANG_S = 20
 """What an input may take [s of the processor, so that a busy machine decides nothing]."""
 
 
-def counts(whole):
+def counts(whole, quick=QUICK):
     """Few inputs in the quick tests, a tenth in the slow ones, all in the marathon."""
     WHOLE.append(whole)
     return pytest.mark.parametrize(
         "count",
-        [QUICK, pytest.param(whole // 10, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
+        [quick, pytest.param(whole // 10, marks=pytest.mark.slow), pytest.param(whole, marks=pytest.mark.marathon)],
     )
 
 
@@ -388,7 +388,7 @@ def felt(addon, tmp_path_factory):
     return path
 
 
-@counts(1000)
+@counts(1000, quick=10)
 @pytest.mark.timeout(3600)
 def test_steps_and_weather_of_a_forged_bake_are_edited_or_refused(count, felt):
     bpy.ops.wm.open_mainfile(filepath=str(felt))

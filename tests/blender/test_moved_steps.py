@@ -9,11 +9,12 @@ from softground_addon.blender.baking import bake_job
 from softground_addon.core.record.edits import StepEdit
 from tests.blender import responders, shots
 from tests.blender.test_character_keys import MAKE, rigify, set_up
+from tests.tiers import slow_but_one
 
 MOVE, TURN = (0.06, 0.08), 12.0
 
 
-@pytest.fixture(params=["walker", "ik", pytest.param("rigify", marks=pytest.mark.slow)])
+@pytest.fixture(params=slow_but_one(["ik", "walker", "rigify"]))
 def rig(scene, request):
     if request.param == "rigify":
         return rigify(request.getfixturevalue("rigify_file"))

@@ -141,7 +141,7 @@ def test_it_is_known_no_more_when_an_undo_has_brought_back_something_else(shot, 
     assert prediction.of(shot) is None
 
 
-@pytest.mark.parametrize("change", [a_cube, another_frame, the_view_of_the_ground, softer])
+@pytest.mark.parametrize("change", slow_but_one([another_frame, a_cube, the_view_of_the_ground, softer]))
 def test_it_survives_an_undo_of_something_else(shot, change):
     bpy.ops.softground.create_ground()
     bpy.ops.softground.predict_depth()

@@ -233,6 +233,7 @@ def test_an_armature_without_bones_is_refused(scene):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_a_rigify_human_maps_to_its_deform_bones(rigify_file):
     mapping = map_rig(rigs.open_rigify(rigify_file, "Generated"))
     assert [(s.bone, s.toe_bone) for s in mapping.soles] == [(f"DEF-foot.{s}", f"DEF-toe.{s}") for s in "LR"]
@@ -245,6 +246,7 @@ def test_a_rigify_human_maps_to_its_deform_bones(rigify_file):
     assert all(bone.startswith("DEF-") for bone, _ in mapping.joints.values())
 
 
+@pytest.mark.slow
 def test_a_rigify_metarig_maps_to_its_own_bones(rigify_file):
     mapping = map_rig(rigs.open_rigify(rigify_file, "Metarig"))
     assert [(s.bone, s.toe_bone) for s in mapping.soles] == [(f"foot.{s}", f"toe.{s}") for s in "LR"]

@@ -132,6 +132,7 @@ def assert_samples_equal_the_users_scene(scene, armature, frames=(1, 2, 7, 13, 2
     assert moved > 0.2
 
 
+@pytest.mark.slow
 def test_samples_of_a_rigify_human_follow_its_ik_controls(rigify_file):
     armature = rigs.open_rigify(rigify_file, "Generated")
     rigs.key(armature, "location", {1: (0, 0, 0), 20: (0.1, 0.3, 0.5)}, bone="foot_ik.L")

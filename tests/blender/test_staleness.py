@@ -12,6 +12,7 @@ from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.reading import analysis, staleness
 from tests.blender import rigs, shots
 from tests.blender.grounds import plane
+from tests.tiers import slow_but_one
 
 
 @pytest.fixture(scope="module", params=["NEVER", "ALWAYS"])
@@ -117,14 +118,13 @@ def add_strip(scene):
     track.strips.new("again", 60, armature.animation_data.action)
 
 
+ANY_SETTING = (change_setting, change_mass, remap_time, halve_gravity, change_unit)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (change_setting, "settings"),
-        (change_mass, "settings"),
-        (remap_time, "settings"),
-        (halve_gravity, "settings"),
-        (change_unit, "settings"),
+        *slow_but_one((change, "settings") for change in ANY_SETTING),
         (move_ground, "'Field' has changed"),
         (delete_vertex, "'Field"),
         (move_character, "'Walker' or a parent of it was moved"),
@@ -182,7 +182,7 @@ def follow_by_constraint(field, support):
 
 
 @pytest.mark.parametrize("detail", ["NEVER", "ALWAYS"])
-@pytest.mark.parametrize("stand", [stand_on_parent, stand_on_hidden_parent, follow_by_constraint])
+@pytest.mark.parametrize("stand", slow_but_one([stand_on_hidden_parent, stand_on_parent, follow_by_constraint]))
 def test_a_ground_is_known_to_have_been_moved_by_what_it_stands_on_however_it_is_hidden(scene, tmp_path, detail, stand):
     shots.walker(scene, frames=30)
     bpy.ops.softground.add_character()

@@ -594,6 +594,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 def test_a_group_that_is_filled_again_is_as_one_that_is_new(addon):
     about = {"up": (0.0, 0.0, 1.0), "span": span_of(1.0, 60.0, 24.0)}
     kinds = [

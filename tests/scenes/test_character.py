@@ -8,6 +8,7 @@ from sample_scenes.figure import PARTS, hiker
 from sample_scenes.gait import Gait, walk
 from sample_scenes.motion import joint_paths
 from sample_scenes.shoe import outline_width, shoe_mesh
+from tests.tiers import slow_but_one
 
 BODIES = [
     Body(),
@@ -16,7 +17,7 @@ BODIES = [
 ]
 
 
-@pytest.fixture(params=BODIES, ids=["average", "small", "heavy"])
+@pytest.fixture(params=slow_but_one(BODIES))
 def body(request):
     return request.param
 

@@ -21,6 +21,7 @@ STIFF_SPINES = {"run_rajagopal": 1.5}
 
 
 @pytest.mark.parametrize("name", [file.stem for file in sorted(DATA.glob("*.csv"))])
+@pytest.mark.slow
 def test_a_skeleton_of_rigid_bones_is_about_as_near_as_the_joints(name):
     trial = read(name)
     motion = motion_of_bvh(trial.bvh, mass=trial.mass, rate=trial.rate)

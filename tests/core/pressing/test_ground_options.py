@@ -17,6 +17,7 @@ from softground_addon.core.record.footprints import QUANTUM, recompose
 from tests.core.pressing.test_ground_invariants import Hills, random_loads
 from tests.core.pressing.test_pressure import rolling
 from tests.core.walkers import BALL, FOOT_LENGTH, box_sole, equilibrium_depth, loads_of, pose, pressed, standing, walk
+from tests.tiers import slow_but_one
 
 SNOW = GroundMaterial(0.25e6, 0.05, 0.2)
 SAND = GroundMaterial(0.33e6, 0.5, 0.05)
@@ -318,7 +319,7 @@ def test_volumes_limits_and_the_record_hold_with_every_option(seed, material, ce
     check_every_frame([random_loads(seed)], Hills(height, 0.1), material, cell, pressure)
 
 
-@pytest.mark.parametrize("pressure", ["UNIFORM", "CENTRE_OF_PRESSURE"])
+@pytest.mark.parametrize("pressure", slow_but_one(["CENTRE_OF_PRESSURE", "UNIFORM"]))
 def test_a_walk_with_every_option_on_does_not_depend_on_frame_rate_cell_size_or_heading(pressure):
     reference, _ = check_every_frame([rolling(walk(steps=2))], FlatTerrain(), ALL, 0.01, pressure)
     for rate in (24.0, 60.0, 120.0):

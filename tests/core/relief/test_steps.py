@@ -18,6 +18,7 @@ from softground_addon.core.relief.print_shape import shape_of
 from softground_addon.core.relief.steps import ReliefSettings, all_together, relief_of_steps, water_at
 from softground_addon.core.relief.tread import SoleTread, bare, hiking
 from tests.core.walkers import pressed, walk
+from tests.tiers import slow_but_one
 
 MATERIALS = {
     "snow": GroundMaterial(375e3, 0.05, 0.2, blur_sigma=0.005),
@@ -53,7 +54,7 @@ def relief(look, footprints, place, **more):
                            blur_sigma=MATERIALS[look].blur_sigma)  # fmt: skip
 
 
-@pytest.mark.parametrize("pattern", [hiking, bare])
+@pytest.mark.parametrize("pattern", slow_but_one([hiking, bare]))
 @pytest.mark.parametrize("look", SURFACES)
 def test_volumes_stay_within_a_percent_and_heights_change(look, pattern):
     footprints = steps_on(look)

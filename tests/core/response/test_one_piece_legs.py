@@ -12,6 +12,7 @@ from softground_addon.core.response.clean_feet import clean, foot_faults
 from softground_addon.core.response.foot_holds import FootHold
 from softground_addon.core.response.grounding import leg_soles, responding
 from tests.core.response.test_grounding import ANKLE, LEG, walk
+from tests.tiers import slow_but_one
 
 FLOOR = FlatTerrain(0.0)
 
@@ -51,7 +52,7 @@ def test_a_foot_that_hangs_from_a_shin_is_no_shank():
     assert leg_soles(replace(motion, joints=joints)) == {}
 
 
-@pytest.mark.parametrize(("slide", "turn"), [(0.0, 0.0), (0.03, 0.0), (0.02, 0.1)], ids=["as it is", "slides", "turns"])
+@pytest.mark.parametrize(("slide", "turn"), slow_but_one([(0.02, 0.1), (0.0, 0.0), (0.03, 0.0)]))
 def test_their_feet_stand_without_slide_or_gap_and_their_parts_stay_whole(slide, turn):
     motion, touching = blocks(slide, turn)
     after = responding(motion, clean(motion, touching, FLOOR))
