@@ -20,6 +20,7 @@ from ..motion.motion import SMALLEST, TALLEST, CharacterMotion, LowSkin, shortes
 from ..numerics.slices import Slices, sliced
 from ..pressing.sole_points import places, sole_points
 from ..record.footprints import QUANTUM, Footprint
+from ..skin.ground_level import SUNK
 from ..skin.skin_motion import CALM_SPEED
 
 Array = NDArray[np.float64]
@@ -29,8 +30,6 @@ OFF_SKIN = 0.012
 """The ground may be this far from where the skin rests, in body heights: 2 cm for an adult, the give of a shoe."""
 NEAR = 0.015
 """Calm skin this near to where it rests touches, in body heights (`skin.bearing.TOUCH`)."""
-SUNK = 0.08
-"""Feet dip through the ground by up to this in cycles as they are sold, in body heights."""
 BESIDE = 0.15
 """A step within this of touching skin is that skin's, in body heights: a foot's length."""
 DISAGREE = 0.15

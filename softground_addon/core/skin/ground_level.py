@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..numerics.slices import Slices, sliced
+from .bearing import TOUCH
 from .skin_motion import Array, PartTracks
 
 REACH = 0.05
@@ -17,10 +18,13 @@ AROUND = 0.5
 """Time to either side over which that is looked for [s]: a stride of a run."""
 FURTHER_PART = 0.15
 """How much a further part that rests at a level adds to a moment's vote for it."""
-BELOW = 0.03
-"""Skin deeper than this below a level speaks against it, in body heights."""
+SUNK = 0.08
+"""Feet dip through the ground by up to this in cycles as they are sold: skin that rests deeper below a level speaks
+against it, in body heights."""
 AGAINST = 0.35
-"""How much a moment with such skin takes off."""
+"""How much a moment of such rest takes off."""
+AS_LONG = 2 / 3
+"""Share of the votes for a level that a part has at a higher one, while nothing rests at the lower, to raise it."""
 SAME_WAY = 0.15
 """Velocities that differ by less are one, in H/s, or over the speed itself."""
 STANDS = 0.15
@@ -96,7 +100,11 @@ def _width(way: Array) -> Array:
 
 @sliced
 def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
-    """Height of the ground [H], where calm skin that moves with the ground is most often, and the votes for it."""
+    """Height of the ground [H], where calm skin that moves with the ground is most often, and the votes for it.
+
+    Of feet that land alone at different heights, the highest tells it, whichever is seen in more frames: what sinks
+    below it prints, what hovers over it never does.
+    """
     lowest = tracks.lowest
     speed = max(float(np.linalg.norm(drift)), 1.0)
     agrees = np.clip(1.5 - tracks.slip(drift) / (4 * SAME_WAY * speed), 0.1, 1.0)
@@ -104,17 +112,32 @@ def level_of(tracks: PartTracks, drift: Array) -> Slices[tuple[float, float]]:
     if not weight.any():
         return float(np.percentile(lowest, OFTEN)), 0.0
     levels = np.arange(lowest.min(), (tracks.low[weight > 0]).max() + BIN, BIN)
-    score = np.empty(len(levels))
+    score, rests = np.empty(len(levels)), np.empty((len(levels), weight.shape[1]))
     count = max(_SLICE // weight.size, 1)
     for start in range(0, len(levels), count):
         here = slice(start, start + count)
-        near = np.clip(1.5 - np.abs(tracks.low - levels[here, None, None]) / BIN, 0.0, 1.0) * weight
+        near = _at(levels[here, None, None], tracks) * weight
+        rests[here] = near.sum(axis=1)
         votes = near.max(axis=2) * (1 + FURTHER_PART * np.clip((near > 0.3).sum(axis=2) - 1, 0, 3))
-        score[here] = votes.sum(axis=1) - AGAINST * (lowest < levels[here, None] - BELOW).sum(axis=1)
+        sunk = (weight * (tracks.low < levels[here, None, None] - SUNK)).max(axis=2)
+        score[here] = (votes - AGAINST * sunk).sum(axis=1)
         yield
-    best = levels[int(score.argmax())]
+    best = _raised(float(levels[score.argmax()]), levels[rests.argmax(axis=0)], tracks, weight)
     here = weight * (np.abs(tracks.low - best) < 1.5 * BIN)
-    return float((tracks.low * here).sum() / here.sum()) if here.any() else float(best), float(score.max())
+    return float((tracks.low * here).sum() / here.sum()) if here.any() else best, float(score.max())
+
+
+def _raised(level: float, own: Array, tracks: PartTracks, weight: Array) -> float:
+    """A level [H], or the highest of those that each part has of its `own` (P,) where it rests alone about as long."""
+    resting = (_at(level, tracks) * weight).max(axis=1)
+    alone = (_at(own, tracks) * weight)[resting == 0].sum(axis=0)
+    raises = (own > level + TOUCH) & (own < level + SUNK) & (alone > AS_LONG * resting.sum())
+    return float(own[raises].max(initial=level))
+
+
+def _at(level: Array | float, tracks: PartTracks) -> Array:
+    """How much each part is at a level [H], (F, P) or (L, F, P)."""
+    return np.clip(1.5 - np.abs(tracks.low - level) / BIN, 0.0, 1.0)
 
 
 def _calm(tracks: PartTracks) -> Array:

@@ -282,6 +282,49 @@ def test_the_ground_moves_as_feet_do_that_stand_on_it_not_as_those_of_a_flight(b
     assert drift.tolist() == pytest.approx([2.0, 0.0])
 
 
+def run_of(rate: float, sinks: float) -> tuple[SkinMotion, np.ndarray]:
+    """A body 1 m tall that runs on the spot for a second and a half, and when each foot stands.
+
+    Its second foot stands so much lower than the first [m].
+    """
+    time = np.arange(round(1.5 * rate)) / rate
+    phase = (time[:, None] / 0.7 + (0.13, 0.63)) % 1.0
+    stands, swing = phase < 0.3, np.clip((phase - 0.3) / 0.7, 0.0, 1.0)
+    ahead = np.where(stands, 0.25 - phase / 0.6, -0.25 + swing - np.sin(2 * np.pi * swing) / (2 * np.pi) / 2)
+    height = 0.3 * np.sin(np.pi * swing) ** 2 - (0.0, sinks)
+    plate = np.stack(np.meshgrid([-0.06, 0.0, 0.06], [-0.03, 0.03], [0.0, 0.04]), axis=-1).reshape(-1, 3)
+    feet = np.stack([ahead / 2, np.broadcast_to((-0.1, 0.1), ahead.shape), height], axis=-1)[:, :, None] + plate
+    trunk = np.broadcast_to(
+        np.random.default_rng(0).uniform((-0.1, -0.1, 0.6), (0.1, 0.1, 1.0), (20, 3)), (len(time), 20, 3)
+    )
+    positions = np.concatenate([feet[:, 0], feet[:, 1], trunk], axis=1)
+    part = np.repeat([0, 1, 2], [len(plate), len(plate), 20])
+    height_of_body = float(np.median(np.ptp(positions[..., 2], axis=1)))
+    return SkinMotion(positions, part, np.zeros((3, 3), dtype=bool), rate, height_of_body), stands
+
+
+@pytest.mark.parametrize("rate", [24.0, 25.0, 30.0, 48.0, 60.0, 120.0])
+@pytest.mark.parametrize("sinks", [-0.06, -0.03, 0.0, 0.03, 0.06])
+def test_the_ground_of_a_run_is_one_at_every_frame_rate_and_both_feet_print(rate: float, sinks: float) -> None:
+    """Of feet that land alone, the higher one tells it: the other one sinks in."""
+    skin, stands = run_of(rate, sinks)
+    found = find_contacts(skin)
+    assert found.level == pytest.approx(max(-sinks, 0.0), abs=0.012)
+    for foot in range(2):
+        seen = found.bears[:, found.group[foot]]
+        assert found.group[foot] >= 0
+        assert seen[stands[:, foot]].mean() > 0.7
+        assert not seen[~np.convolve(stands[:, foot], np.ones(5), "same").astype(bool)].any()
+
+
+@pytest.mark.parametrize("frames", [38, 49])
+def test_who_stands_on_a_box_and_then_on_the_floor_stands_on_the_floor(frames: int) -> None:
+    """Skin that rests far below a level speaks against it, even where it rests there for less time."""
+    skin, _ = animal(1, duty=0.999, stride=0.0)
+    skin.positions[:frames, :, 2] += 0.5
+    assert find_contacts(skin).level == pytest.approx(0.0, abs=0.005)
+
+
 def test_the_ground_is_not_where_feet_dip_below_it_calmly_in_swing() -> None:
     dips = -0.05 - 0.03 * np.sin(np.linspace(0, np.pi, 4))
     level, drift = ground_of(run_on_the_spot(6, dips, -1.2))
