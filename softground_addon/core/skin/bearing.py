@@ -72,6 +72,7 @@ def bearing(tracks: PartTracks, level: float, drift: Array) -> Mask:
     sliding = near & (speed < tracks.calm)
     bears |= sliding & ~bears.any(axis=1, keepdims=True)
     bears = _dragged(bears, (np.abs(height) < DRAGS) & (speed < tracks.calm))
+    bears = _without_gaps(bears, height < LEAVE, round(BLIP * tracks.rate))
     return _landed(_without_blips(bears, round(BLIP * tracks.rate)), height) if len(bears) > FEW else bears
 
 
@@ -92,6 +93,17 @@ def _without_blips(bears: Mask, longest: int) -> Mask:
             least = 1 if first == 0 or last == len(bears) else longest
             lasting[first:last, part] = last - first > least
     return lasting
+
+
+def _without_gaps(bears: Mask, low: Mask, longest: int) -> Mask:
+    """With the gaps of at most `longest` samples in which what bears before and after stays `low`: nothing leaves the
+    ground and lands so soon, but skin that dips through it is seen now by one vertex, now by another."""
+    without = bears.copy()
+    for part in np.flatnonzero(bears.any(axis=0)):
+        for first, last in zip(*runs(~bears[:, part]), strict=True):
+            if first > 0 and last < len(bears) and last - first <= longest and low[first:last, part].all():
+                without[first:last, part] = True
+    return without
 
 
 def _dragged(bears: Mask, lies: Mask) -> Mask:

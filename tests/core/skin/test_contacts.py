@@ -432,6 +432,21 @@ def test_a_foot_that_slides_on_from_one_rest_to_the_next_has_not_left_the_ground
     assert not bearing(raised, 0.0, np.zeros(2))[15:25, 0].any()
 
 
+@pytest.mark.parametrize("lifted", [0.0, 0.05])
+def test_a_heel_that_dips_through_the_ground_bears_on_whichever_of_its_skin_is_there(lifted: float) -> None:
+    """What is at the ground's level is one vertex now, another one then, with a jump of speed in between."""
+    rate, frames = 60.0, np.arange(60)
+    stands, jumps = (frames >= 20) & (frames < 40), (frames == 21) | (frames == 24)
+    low = np.where(stands, 0.0, 0.1) + lifted * jumps
+    rise = np.where(stands, 0.05, 2.0) + jumps
+    still = np.zeros((2, 60, 1, 2))
+    tracks = PartTracks(low[:, None], still[0], rise[:, None], still, 0.3, rate)
+    bears = bearing(tracks, 0.0, np.zeros(2))[:, 0]
+    assert not bears[~stands].any()
+    assert bears[25:40].all()
+    assert bears[20:25].all() == (lifted == 0)
+
+
 @pytest.mark.parametrize("loops", [False, True])
 def test_what_bears_at_the_end_of_a_loop_bears_on_at_its_beginning(loops: bool) -> None:
     """A foot that is too fast at first to touch, not too fast to stay, beside one that stands on the belt."""
