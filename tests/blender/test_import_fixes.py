@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
-from softground_addon.blender.characters.import_fixes import scale_to_metres, size_of
+from softground_addon.blender.characters.import_fixes import size_of
 from softground_addon.blender.compat import action_curves
+from softground_addon.core.motion.motion import scale_to_metres
 from tests.blender import shots
 from tests.blender.grounds import bake
 from tests.blender.test_self_check import codes

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.motion.motion import shortest_length
+from ...core.motion.motion import scale_to_metres, shortest_length
 from ...core.motion.props import mass_properties
 from ...core.numerics.components import components
 from ...core.rig.mapping import RigMapping
@@ -17,7 +17,7 @@ from .. import jobs
 from ..properties import SoftGroundCharacter
 from ..settings import SIDE_TO_CODE, fit_cells, found, is_set_up, name_of, take_defaults, time_stretch_of
 from .frame_ranges import ancestors, animated_frames
-from .import_fixes import put_under, scale_to_metres, size_of
+from .import_fixes import put_under, size_of
 from .prop_extraction import surface_of
 from .recognition import SHARE, Recognised, recognise
 from .rig_mapping import CHOOSE_CONTACTS, require_armature

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError
-from ...core.motion.motion import SMALLEST, TALLEST
 from ..compat import action_curves
 from ..settings import frame_rate_of, time_stretch_of
 from .frame_ranges import ancestors
@@ -20,11 +19,6 @@ def size_of(scene: bpy.types.Scene, armature: bpy.types.Object) -> float:
     heads = np.array([bone.head_local for bone in bones]).reshape(-1, 3)
     in_world = heads @ np.array(armature.matrix_world)[:3, :3].T * scene.unit_settings.scale_length
     return float(np.ptp(in_world, axis=0).max()) if len(heads) else 0.0
-
-
-def scale_to_metres(size: float) -> float:
-    """Factor that a body of such a size [m] lacks: 0.01 where its file is in centimetres, 100 the reverse, or 1."""
-    return 0.01 if size > TALLEST else 100.0 if 0 < size < SMALLEST else 1.0
 
 
 def put_under(scene: bpy.types.Scene, armature: bpy.types.Object, name: str) -> bpy.types.Object:

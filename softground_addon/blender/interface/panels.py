@@ -7,10 +7,9 @@ from typing import Any
 
 import bpy
 
-from ...core.motion.motion import JOINTS
+from ...core.motion.motion import JOINTS, scale_to_metres
 from .. import session, settings
 from ..characters import selection
-from ..characters.import_fixes import scale_to_metres
 from ..ground import baked_ground, ground_mesh, still_ground
 from ..live import live
 from ..settings import is_prop, is_set_up

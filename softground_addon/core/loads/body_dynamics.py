@@ -135,8 +135,8 @@ def body_dynamics(motion: CharacterMotion, airborne: Mask | None = None, *, cuto
         smooth, rate, acceleration = smooth_path(
             path, motion.time_step, _last_pass(points, cutoff, frame_step), sampled=sampled, steady_ends=STEADY_ENDS
         )
-        force = acceleration[:, 3:] / motion.gravity + (0.0, 0.0, 1.0)
-        return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.gravity, points, cutoff)
+        force = acceleration[:, 3:] / motion.fall + (0.0, 0.0, 1.0)
+        return BodyDynamics(smooth[:, 3:], force, rate[:, :3] / motion.fall, points, cutoff)
 
     body = smoothed(_cutoff_by_noise(points.centre, frame_step, usual))
     flying = flights(airborne, body, motion) if airborne is not None else np.zeros(0, dtype=bool)
@@ -166,7 +166,7 @@ def with_flight(
     pulled = ~airborne & (body.force[:, 2] < 0)
     if not (flying.any() or pulled.any()):
         return body
-    points, level, cutoff, fall = body.points, body.points, body.cutoff, motion.gravity
+    points, level, cutoff, fall = body.points, body.points, body.cutoff, motion.fall
     if flying.any():
         points, level, cutoff, fall = _falling_freely(motion, body, flying)
         cutoff *= cutoff_factor
@@ -187,7 +187,7 @@ def with_flight(
             if (pulling == pulled).all():
                 break
             pulled = pulling
-        if pulled.sum() <= MOST_PULLED * (~airborne).sum() or fall >= RATES_OF_FALL[1] * motion.gravity:
+        if pulled.sum() <= MOST_PULLED * (~airborne).sum() or fall >= RATES_OF_FALL[1] * motion.fall:
             break
         fall *= LOWER_BOB
     centre[:, 2] += (acted / fall - 1) * (centre[:, 2] - centre[:, 2].mean())
@@ -374,7 +374,7 @@ def _rate_of_fall(motion: CharacterMotion, body: BodyDynamics, flying: Mask) -> 
     A jump made by hand, retimed or put on a larger rig hangs in the air or drops like a stone. Its forces are those
     of the same motion at the time scale at which it falls with gravity.
     """
-    edge, gravity = _leak(body, motion.time_step), motion.gravity
+    edge, gravity = _leak(body, motion.time_step), motion.fall
     window = np.lib.stride_tricks.sliding_window_view(np.pad(flying, edge, mode="edge"), 2 * edge + 1)
     inner = 1 - body.force[window.all(axis=1), 2]
     if not len(inner):

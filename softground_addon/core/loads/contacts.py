@@ -126,7 +126,7 @@ def detect_contacts(motion: CharacterMotion, terrain: Terrain) -> Contacts:
     drift = _ground_drift(feet or tracks, motion)
     seen = _seen_on_skin(motion, terrain, tracks)
     # Where a whole body travels, its speed tells more finely than its skin when a foot that swings has left.
-    if seen is not None and (drift.any() or not motion.joints or motion.is_of_other_units):
+    if seen is not None and (drift.any() or not motion.joints):
         return seen
     body_speed = np.linalg.norm(_body_velocity(motion) - drift, axis=-1)
     found = [

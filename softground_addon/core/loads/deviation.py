@@ -96,7 +96,7 @@ def _noise(motion: CharacterMotion, body: BodyDynamics) -> float:
     impulse = np.zeros((count, 1))
     impulse[count // 2] = 1.0
     _, _, answer = smooth_path(impulse, motion.frame_step, body.cutoff)
-    return float(np.std(residual) * np.linalg.norm(answer) / motion.gravity)
+    return float(np.std(residual) * np.linalg.norm(answer) / motion.fall)
 
 
 def _of_shares(motion: CharacterMotion, loads: CharacterLoads, share: Array) -> Array:

@@ -69,10 +69,8 @@ def estimate_loads(
     else:
         body = body_dynamics(source, ~contacts.touching.any(axis=1))
         yield
-        # A cycle on the spot is acted, and a body in wrong units moves as none could: its skin tells better when it
-        # touches than the forces that would move it so.
-        acted = source.is_of_other_units or treadmill_speed(source, contacts) > 0
-        if source.ground_level is None or not acted:
+        # A cycle on the spot is acted: its skin tells better when it touches than the forces that would move it so.
+        if source.ground_level is None or treadmill_speed(source, contacts) == 0:
             contacts = refine_contacts(source, contacts, body)
         yield
         forces = whole_body_forces(source, contacts, body, crisp_landings=crisp_landings)

@@ -197,7 +197,8 @@ def _raised_cosine(time: Array, width: float) -> Array:
 
 
 def _landings(motion: CharacterMotion, contacts: Contacts) -> Iterator[tuple[int, int, int, float]]:
-    """Sole, first and last step of each contact that begins within the motion, and its speed into the ground [m/s].
+    """Sole, first and last step of each contact that begins within the motion, and its speed into the ground [m/s],
+    by the unit in which it falls with gravity.
 
     The speed is that of the step before the first one that touches.
     """
@@ -209,4 +210,4 @@ def _landings(motion: CharacterMotion, contacts: Contacts) -> Iterator[tuple[int
             normal = contacts.normal[first, index]
             landmark = (points[first] @ normal).argmin()
             into_ground = (points[first - 2, landmark] - points[first - 1, landmark]) @ normal / motion.time_step
-            yield index, int(first), int(last), max(float(into_ground), 0.0)
+            yield index, int(first), int(last), max(float(into_ground), 0.0) * motion.gravity / motion.fall

@@ -43,6 +43,11 @@ JOINTS = ("hips", "spine", "neck", "head", *(f"{joint}_{side}" for side in "lr" 
 """Names that `CharacterMotion.joints` may hold. `toe` is the tip of the foot; any may be missing."""
 
 
+def scale_to_metres(size: float) -> float:
+    """Factor that a body of such a size [m] lacks: 0.01 where its file is in centimetres, 100 the reverse, or 1."""
+    return 0.01 if size > TALLEST else 100.0 if 0 < size < SMALLEST else 1.0
+
+
 def shortest_length(lengths: Iterable[float]) -> float:
     """Length of the shortest of some soles by which cells are sized [m]: a fingertip beside a trunk sizes none.
 
@@ -281,9 +286,9 @@ class CharacterMotion:
         return float(self.frames[1] - self.frames[0]) / self.frame_rate if len(self.frames) > 1 else 1 / self.frame_rate
 
     @property
-    def is_of_other_units(self) -> bool:
-        """Whether its skin has a size at which gravity does not set the pace of legs."""
-        return self.skin is not None and not SMALLEST < self.skin.height < TALLEST
+    def fall(self) -> float:
+        """Gravity in the units of its file, as its skin tells them [m/s²]: a file in centimetres moves as in metres."""
+        return self.gravity / (scale_to_metres(self.skin.height) if self.skin else 1.0)
 
     @property
     def stands_still(self) -> bool:
@@ -305,12 +310,12 @@ class CharacterMotion:
     @property
     def pendulum_time(self) -> float:
         """sqrt(leg length/gravity) [s], 0.3 s for an adult: times in this unit suit a mouse and a giant."""
-        return float(np.sqrt(self.leg_length / self.gravity))
+        return float(np.sqrt(self.leg_length / self.fall))
 
     @property
     def froude_speed(self) -> float:
         """sqrt(gravity·leg length) [m/s], 3 m/s for an adult: the speed at a Froude number of 1."""
-        return float(np.sqrt(self.gravity * self.leg_length))
+        return float(np.sqrt(self.fall * self.leg_length))
 
     @property
     def time_scale(self) -> float:

@@ -15,6 +15,7 @@ from softground_addon.core.ground.heightfield import FlatTerrain
 from softground_addon.core.ground.material import GroundMaterial
 from softground_addon.core.loads.body_dynamics import body_dynamics, with_flight
 from softground_addon.core.loads.estimate import estimate_loads
+from softground_addon.core.motion.motion import LowSkin
 from softground_addon.core.numerics.intervals import runs
 from tests.core import spring_mass
 from tests.core.character import standing
@@ -66,6 +67,38 @@ def at_pace(name, slowed, *, rate=60.0):
 
 def stride(name):
     return 2 * GAITS[name].times[-1]
+
+
+def in_units(motion, factor):
+    """The motion of a skinned body as a file with units of another size has it."""
+
+    def scaled(sole):
+        transforms = sole.transforms.copy()
+        transforms[..., :3, 3] *= factor
+        return replace(sole, sole=replace(sole.sole, landmarks=sole.sole.landmarks * factor), transforms=transforms)
+
+    far_up = np.full((len(motion.frames), 1, 3), 2.0 * factor)
+    return replace(
+        motion,
+        leg_length=motion.leg_length * factor,
+        joints={name: path * factor for name, path in motion.joints.items()},
+        soles=tuple(scaled(sole) for sole in motion.soles),
+        skin=LowSkin(motion.frames, far_up, far_up[..., 2], 0.3 * factor, 1.78 * factor),
+    )
+
+
+@pytest.mark.parametrize("factor", [100.0, 0.01])
+@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("force_model", ["WHOLE_BODY", "IMPULSE"])
+def test_a_file_in_other_units_touches_and_weighs_as_in_metres(factor, gait, force_model):
+    motion, _ = motion_and_forces(GAITS[gait], rate=30.0, seconds=4.0)
+    expected, found = (
+        estimate_loads(in_units(motion, size), FlatTerrain(), force_model=force_model, material=SNOW)
+        for size in (1.0, factor)
+    )
+    assert (found.contacts.touching == expected.contacts.touching).all()
+    assert vertical(found) == pytest.approx(vertical(expected), abs=1e-3)
+    assert found.forces.forces == pytest.approx(expected.forces.forces, rel=1e-3, abs=1e-3 * 77.5 * 9.81)
 
 
 @given(
