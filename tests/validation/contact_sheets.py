@@ -77,9 +77,13 @@ def read_clip(scene: bpy.types.Scene) -> tuple[CharacterLoads, Terrain]:
 
 
 def draw_sheet(name: str, loads: CharacterLoads, terrain: Terrain, file: Path) -> None:
-    """A row for each sole: how high it is, when it touches, and where skin near it rests."""
+    """A row for each sole: how high it is, when it touches, and where skin near it rests.
+
+    What the character as a whole floats or sinks by is taken out of the soles; what one foot does more is shown.
+    """
     motion, touching, skin = loads.motion, loads.contacts.touching, loads.motion.skin
     height = skin.height if skin else 2 * motion.leg_length
+    offset = np.median(loads.contacts.offset[touching.any(axis=0)]) if touching.any() else 0.0
     figure, rows = plt.subplots(
         len(motion.soles),
         1,
@@ -91,6 +95,7 @@ def draw_sheet(name: str, loads: CharacterLoads, terrain: Terrain, file: Path) -
     for row, sole, touches in zip(rows[:, 0], motion.soles, touching.T, strict=True):
         points = sole.landmark_positions()
         over = (points[..., 2] - terrain.heights(points[..., 0], points[..., 1])).min(axis=1) / height
+        over -= offset / height
         row.plot(motion.frames, np.where(over < HIGHEST, over, np.nan), color="tab:blue", label="sole")
         for first, end in zip(*runs(touches), strict=True):
             row.axvspan(motion.frames[first], motion.frames[end - 1], color="tab:orange", alpha=0.35, linewidth=0)
@@ -101,7 +106,7 @@ def draw_sheet(name: str, loads: CharacterLoads, terrain: Terrain, file: Path) -
         row.set_ylabel(sole.sole.name, rotation=0, ha="right")
         row.set_ylim(-0.06, HIGHEST)
     rows[-1, 0].set_xlabel("frame; heights in body heights; shaded: contact; dots: calm skin on the ground beside it")
-    figure.suptitle(f"{name}: {height:.3g} m, {motion.mass:.3g} kg")
+    figure.suptitle(f"{name}: {height:.3g} m, {motion.mass:.3g} kg, soles {offset * 100:+.1f} cm over the ground")
     figure.savefig(file, dpi=80)
     plt.close(figure)
 
