@@ -12,6 +12,7 @@ from ..findings import Finding
 from ..motion.motion import CharacterMotion, SoleMotion
 from ..numerics.intervals import runs
 from .contacts import REST_SPEED, Contacts
+from .sliding import treadmill_velocity
 
 Mask = NDArray[np.bool_]
 
@@ -57,11 +58,11 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
     if motion.centre is not None:
         return []  # a prop may lie anywhere
     shortest = REST_TIME * motion.pendulum_time / motion.time_step
-    carried = contacts.touching.any(axis=1)
+    carried, belt = contacts.touching.any(axis=1), treadmill_velocity(motion, contacts)
     missed = []
     for number, sole in enumerate(motion.soles):
         clearance = contacts.clearance[:, number]
-        for first, last in zip(*runs(_rests(sole, motion)), strict=True):
+        for first, last in zip(*runs(_rests(sole, motion, belt)), strict=True):
             during = slice(first, last)
             if last - first < shortest or contacts.touching[during, number].any():
                 continue
@@ -71,12 +72,13 @@ def missed_steps(motion: CharacterMotion, contacts: Contacts) -> list[MissedStep
     return sorted(missed, key=lambda step: step.frame)
 
 
-def _rests(sole: SoleMotion, motion: CharacterMotion) -> Mask:
-    """When some landmark of a sole hardly moves, (F,)."""
+def _rests(sole: SoleMotion, motion: CharacterMotion, belt: NDArray[np.float64]) -> Mask:
+    """When some landmark of a sole hardly moves against a ground that moves with `belt` (2,) [m/s], (F,)."""
     points = sole.landmark_positions()
     if len(points) < 2:
         return np.zeros(len(points), dtype=bool)
-    speed = np.linalg.norm(np.gradient(points, motion.time_step, axis=0), axis=-1).min(axis=1)
+    velocity = np.gradient(points, motion.time_step, axis=0) - (*belt, 0.0)
+    speed = np.linalg.norm(velocity, axis=-1).min(axis=1)
     return np.asarray(speed < REST_SPEED * motion.froude_speed)
 
 

@@ -3,10 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from softground_addon.core.ground.heightfield import FlatTerrain
-from softground_addon.core.loads.contacts import detect_contacts
+from softground_addon.core.loads.contacts import Contacts, detect_contacts
 from softground_addon.core.loads.missed_steps import advice, missed_steps
+from softground_addon.core.loads.sliding import treadmill_speed
 from tests.core.character import Slope, character, flat_sole
 from tests.core.walkers import walk
 
@@ -62,6 +64,25 @@ def test_jumps_and_raised_feet_are_no_steps():
     one = [flat_sole(np.stack([0 * time, 0 * time + y, z], -1)) for y, z in ((-0.1, lifted), (0.1, 0 * time))]
     for soles in (both, one):
         assert not found(character(soles, rate=RATE), FlatTerrain())
+
+
+@pytest.mark.parametrize(("speed", "steps"), [(0.0, 0), (-2.0, 4)])
+def test_in_a_run_on_the_spot_a_foot_rests_that_moves_with_the_belt_and_none_that_hangs(speed, steps):
+    """One foot stands on the belt for a third of the time; the other one is level in the air once it has left."""
+    time = np.arange(0, 2.5, 1 / RATE)
+    phase = (time / 0.6 + 0.9) % 1.0
+    stands = phase < 1 / 3
+    forth = np.where(stands, -1.2 * phase, -0.4 + 0.6 * (phase - 1 / 3))
+    up = 0.3 * np.sin(np.pi * np.clip((phase - 1 / 3) * 1.5, 0, 1))
+    hangs = (phase > 0.45) & (phase < 0.9)
+    other = np.cumsum(np.where(hangs, speed, 3.0)) / RATE
+    feet = np.stack([forth, 0 * time + 0.1, up], axis=-1), np.stack([other, 0 * time - 0.1, 0 * time + 0.2], axis=-1)
+    motion = character([flat_sole(feet[0]), flat_sole(feet[1], name="away")], hips=(0, 0, 0.9), rate=RATE)
+    touching = np.stack([stands, np.zeros_like(stands)], axis=-1)
+    clearance = np.stack([path[:, 2] for path in feet], axis=-1)
+    contacts = Contacts(touching, np.zeros(2), np.broadcast_to((0.0, 0.0, 1.0), (*touching.shape, 3)), clearance)
+    assert treadmill_speed(motion, contacts) == pytest.approx(2.0)
+    assert [step.sole for step in missed_steps(motion, contacts)] == ["away"] * steps
 
 
 def test_the_advice_names_how_many_since_when_and_what_to_do():
