@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from softground_addon.core.motion.motion import Sole
+from softground_addon.core.motion.motion import CharacterMotion, Sole, SoleMotion
 from softground_addon.core.motion.props import Prop, supports
+from softground_addon.core.numerics.rigid import rotation
+from tests.core.walkers import loads_of, pose
 
 
 def prop_sole(vertices, triangles, name="body", give=0.0):
@@ -34,6 +36,22 @@ def wheel(radius, width, *, sides=96):
     rims = [circle + np.array([0, side * width / 2, 0]) for side in (-1, 1)]
     vertices = np.concatenate([*rims, [[0, -width / 2, 0], [0, width / 2, 0]]])
     return vertices, np.concatenate([_band(2, sides), _caps(2, sides)])
+
+
+def rolling(frame_rate, speed=1.0, seconds=1.5, radius=0.35, width=0.06, force=400.0, slide=False):
+    """A wheel that rolls along x, known at scene frames only."""
+    count = round(seconds * frame_rate) + 1
+    time = np.arange(count) / frame_rate
+    poses = pose(np.stack([speed * time, 0 * time, 0 * time + radius], -1))
+    if not slide:
+        poses[:, :3, :3] = rotation(np.stack([0 * time, speed * time / radius, 0 * time], -1))
+    sole = prop_sole(*wheel(radius, width))
+    motion = CharacterMotion("wheel", 1.0, 0.3, 1.0 + np.arange(count), frame_rate, (SoleMotion(sole, poses[:, None]),))
+    motion = motion.resampled(round(120 / frame_rate))
+    steps = len(motion.frames)
+    return loads_of(
+        [sole], [motion.soles[0].transforms], np.full((steps, 1), force), np.ones((steps, 1), bool), frame_rate
+    )
 
 
 def box(x, y, z):

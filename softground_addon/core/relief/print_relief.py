@@ -96,15 +96,13 @@ class PrintRelief:
         self._tread = tread if GROOVE * self._size > 1.5 * finest else None
         self._tread_strength = tread_strength
         self._drags = drags
-        self._wider, self._deeper, self._level = 0.0, 0.0, -np.inf
+        self._wider, self._deeper, self._level, self._part = 0.0, 0.0, -np.inf, 1.0
         self.crumbs: list[ScatteredCrumbs] = []
-        x, y = (place.ravel() for place in np.meshgrid(*shape.window.centres(shape.cell_size)))
+        x, y = shape.moved(finest)
         places = self._look_up(x, y)
         self._wider = self._widening(places)
         self.crumbs = self._crumbs(x, y)
-        relief = self._relief(places)
-        weight = places.fade * relief.pressed * places.floor
-        self._deeper = float(np.clip(relief.height.sum() / max(weight.sum(), 1e-12), -MOST_VOLUME, MOST_VOLUME))
+        self._deeper = self._balance(places)
         self._level = self._water_level(places)
 
     @property
@@ -114,7 +112,24 @@ class PrintRelief:
 
     def at(self, x: Array, y: Array) -> Relief:
         """The relief at world places (N,)."""
-        return self._relief(self._look_up(x, y))
+        moves = np.flatnonzero(self._shape.moves(x, y))
+        there = self._relief(self._look_up(x[moves], y[moves]))
+        whole = np.zeros((4, len(x)))
+        whole[:, moves] = there.height, there.compression, there.water, there.pressed
+        return Relief(*whole)
+
+    def _balance(self, places: _Places) -> float:
+        """How much deeper the print has to be for its volume to stay, over its depth; layers that ask for more than
+        `MOST_VOLUME` are lowered: no print throws up more than it has pressed."""
+        whole = self._relief(places)
+        weight = max(float((places.fade * whole.pressed * places.floor).sum()), 1e-12)
+        asked = float(whole.height.sum()) / weight
+        possible = float(np.clip(asked, -MOST_VOLUME, MOST_VOLUME))
+        if possible != asked:
+            of_wall = float(self._rebuilt(places, self._wider)[0].sum()) / weight
+            self._part = float(np.clip((possible - of_wall) / (asked - of_wall), 0.0, 1.0))
+            asked = of_wall + self._part * (asked - of_wall)
+        return float(np.clip(asked, -MOST_VOLUME, MOST_VOLUME))
 
     def _widening(self, places: _Places) -> float:
         """How much further out the wall has to be for the print to keep its volume [m]; 0 where it is kept as it is."""
@@ -205,7 +220,7 @@ class PrintRelief:
 
     def _relief(self, places: _Places) -> Relief:
         height, compression, pressed = self._rebuilt(places, self._wider)
-        share = min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
+        share = self._part * min(1.0, self._shape.depth / (SHALLOW * self._amounts.depth * MM))
         around = self._around(places, pressed)
         made_of = (*self._amounts.layers, *self.crumbs, *self._drags)
         layers = sum((layer.heights(around) for layer in made_of), np.zeros(len(places.x)))

@@ -36,6 +36,8 @@ SHARP = 0.02
 LEVEL = 0.995
 """Length of a sole seen from above, in parts of the greatest, from which it lies flat."""
 
+_FADE = 5
+"""Number among `PrintShape.fields` of how near the end of the ground that moves a cell is."""
 MOVED = 1e-5
 """Ground that moves less has no relief [m]; and none beside such cells: what has relief moves anyway."""
 FADING = 0.012
@@ -80,11 +82,31 @@ class PrintShape:
 
     def at(self, x: Array, y: Array) -> Array:
         """The fields at world places (N,), bilinear between cells, (8, N)."""
+        return self._between(self.fields, x, y)
+
+    def moves(self, x: Array, y: Array) -> Mask:
+        """At which of world places (N,) the print moves the ground."""
+        return np.asarray(self._between(self.fields[_FADE, None], x, y)[0] > 0)
+
+    def moved(self, spacing: float) -> tuple[Array, Array]:
+        """World places where the print moves the ground (N,): cells' centres and, at such a spacing, those between."""
+        parts = max(1, round(self.cell_size / spacing))
+        between = np.arange(parts) * self.cell_size / parts
+        x, y = (
+            places.ravel()
+            for places in np.meshgrid(
+                *((one[:, None] + between).ravel() for one in self.window.centres(self.cell_size))
+            )
+        )
+        moves = self.moves(x, y)
+        return x[moves], y[moves]
+
+    def _between(self, fields: Array, x: Array, y: Array) -> Array:
         column = np.clip(x / self.cell_size - 0.5 - self.window.column, 0.0, self.window.columns - 1.001)
         row = np.clip(y / self.cell_size - 0.5 - self.window.row, 0.0, self.window.rows - 1.001)
         left, low = np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
         corner = low * self.window.columns + left
-        flat = self.fields.reshape(len(self.fields), -1)
+        flat = fields.reshape(len(fields), -1)
         above = corner + self.window.columns
         around = (flat[:, at] for at in (corner, corner + 1, above, above + 1))
         return np.asarray(bilinear.between(around, np.asarray(column - left), np.asarray(row - low)))

@@ -9,11 +9,10 @@ from scipy.optimize import brentq
 
 from softground_addon.core.composers.prediction import contact_loads
 from softground_addon.core.ground.material import FIRM_RATIO, GroundMaterial
-from softground_addon.core.motion.motion import CharacterMotion, SoleMotion
 from softground_addon.core.numerics.rigid import rotation
 from softground_addon.core.pressing.indentation import Springs, stress
 from tests.core.character import Slope
-from tests.core.prop_bodies import box, prop_sole, sphere, wheel
+from tests.core.prop_bodies import box, prop_sole, rolling, sphere
 from tests.core.walkers import loads_of, pose, pressed
 
 GROUND = GroundMaterial(1e6, 0.25, 0.2)
@@ -106,22 +105,6 @@ def test_no_load_sinks_a_body_below_the_layer():
     material = replace(GROUND, layer_depth=0.05)
     _, (print_,) = pressed(resting(prop_sole(*box(0.2, 0.2, 0.2)), [0, 0, 0.1], 1e7), material)
     assert print_.max_depth_m == pytest.approx(0.05, abs=1e-9)
-
-
-def rolling(frame_rate, speed=1.0, seconds=1.5, radius=0.35, width=0.06, force=400.0, slide=False):
-    """A wheel that rolls along x, known at scene frames only."""
-    count = round(seconds * frame_rate) + 1
-    time = np.arange(count) / frame_rate
-    poses = pose(np.stack([speed * time, 0 * time, 0 * time + radius], -1))
-    if not slide:
-        poses[:, :3, :3] = rotation(np.stack([0 * time, speed * time / radius, 0 * time], -1))
-    sole = prop_sole(*wheel(radius, width))
-    motion = CharacterMotion("wheel", 1.0, 0.3, 1.0 + np.arange(count), frame_rate, (SoleMotion(sole, poses[:, None]),))
-    motion = motion.resampled(round(120 / frame_rate))
-    steps = len(motion.frames)
-    return loads_of(
-        [sole], [motion.soles[0].transforms], np.full((steps, 1), force), np.ones((steps, 1), bool), frame_rate
-    )
 
 
 def rut_depth(ground, middle=0.75):
