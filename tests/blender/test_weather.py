@@ -14,6 +14,7 @@ from softground_addon.blender import compat
 from softground_addon.blender.ground import (
     baked_ground,
     ground_mesh,
+    own_data,
     weather,
     weather_keys,
     weather_modifier,
@@ -24,7 +25,7 @@ from softground_addon.blender.interface import weather_panel
 from softground_addon.blender.output import exports
 from softground_addon.core.after.weather import MOMENTS, matter_of, span_of
 from softground_addon.core.after.weather_course import Weather
-from softground_addon.core.after.weather_places import NOT_YET, WeatherPlaces, section_of, weather_places
+from softground_addon.core.after.weather_places import COVERED, NOT_YET, WeatherPlaces, section_of, weather_places
 from tests.blender import shots, weathered_shots
 from tests.core.after.weathered_ground import weathered
 from tests.tiers import slow_but_one
@@ -32,7 +33,7 @@ from tests.tiers import slow_but_one
 FRAMES = (1, 20, 34, 300)
 SOME = weathered_shots.SOME | {"Water Table": 2.0, "Halo": 0.8}
 DEFAULTS = {name: value for name, value, *_ in nodes.INPUTS}
-MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)
+MAY_LACK = (*nodes.OF_WEATHER, nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED, nodes.BLOWN)
 """What is not stored where the ground does not ask for it, and where there is no weather."""
 HOUR = 3600.0
 
@@ -137,6 +138,7 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface, tw
         monkeypatch.setattr(weather, "weather_places", trodden_twice)
     scene = opened(surface)
     before = {frame: positions(scene, frame) for frame in FRAMES}
+    trodden = {frame: read(shown(scene, frame), own_data.COMPRESSION) for frame in FRAMES}
     assert bpy.ops.softground.add_weather() == {"FINISHED"}
     ground = carrier(scene)
     mesh = ground.data
@@ -166,6 +168,8 @@ def test_the_nodes_do_what_the_closed_forms_say_at_any_frame(opened, surface, tw
             if not matter.wet or nodes.WETNESS in now.attributes:
                 close(read(now, nodes.WETNESS), wanted.wetness, atol=1e-3)
             close(read(now, nodes.FRESH), wanted.fresh, atol=1e-3)
+            covered = (1.0 - wanted.kept) * trodden[frame] / COVERED  # by what has been blown into prints
+            close(read(now, nodes.BLOWN), np.clip(covered, 0.0, 1.0), atol=1e-3)
             if matter.wet:
                 close(read(now, nodes.DRIED), wanted.dried, atol=1e-3)
             if matter.soaking and not about["inputs"].get("relief_look"):
@@ -214,7 +218,8 @@ def held(scene, span):
 def everything(scene, frame):
     """Positions and what weather stores at a frame, side by side."""
     now = shown(scene, frame)
-    stored = [read(now, name)[:, None] for name in (nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED)]
+    names = (nodes.WETNESS, nodes.FRESH, nodes.WATER, nodes.DRIED, nodes.BLOWN)
+    stored = [read(now, name)[:, None] for name in names]
     return np.hstack([read(now, "position", 3), *stored])
 
 

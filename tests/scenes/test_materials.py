@@ -99,6 +99,19 @@ def test_ripples_end_where_a_foot_was(spot, ensure_material):
     assert change[-10:].mean() < 0.25 * change[:14].mean()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", ["sand", "snow"])
+def test_prints_that_wind_has_covered_look_like_open_ground(spot, ensure_material, surface):
+    ground, seen = spot
+    ground.data.materials.append(ensure_material(surface))
+    pressed = seen()
+    ground.data.attributes.new("softground_blown", "FLOAT", "POINT").data.foreach_set("value", np.ones(6))
+    covered = seen()
+    ground.data.attributes.remove(ground.data.attributes["softground_compression"])
+    assert np.array_equal(covered, seen())
+    assert np.abs(covered - pressed)[:, -16:].mean() > 0.01
+
+
 def test_a_surface_has_one_material_however_often_it_is_asked_for(ensure_material):
     first = ensure_material("snow")
     first.node_tree.nodes.clear()  # the user is free to change it

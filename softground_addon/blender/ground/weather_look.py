@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..shader_graph import Graph, Socket
-from .weather_nodes import DRIED, FRESH, WATER, WETNESS
+from .weather_nodes import BLOWN, DRIED, FRESH, WATER, WETNESS
 
 NEW_SNOW = (0.915, 0.935, 0.96)
 SOAKED = (0.42, 0.38, 0.34)
@@ -27,8 +27,8 @@ FILM = 0.07
 
 
 def bare(graph: Graph) -> Socket:
-    """How much of the ground new snow has not covered, 1 to 0."""
-    return graph.math("SUBTRACT", 1.0, graph.attribute(FRESH))
+    """How much of the ground neither new snow has covered nor wind, 1 to 0."""
+    return graph.math("SUBTRACT", 1.0, graph.math("MAXIMUM", graph.attribute(FRESH), graph.attribute(BLOWN)))
 
 
 def under_weather(graph: Graph, surface: str, inputs: Mapping[str, Any], relief: Socket) -> tuple[Any, Socket]:

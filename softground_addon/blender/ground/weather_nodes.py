@@ -72,8 +72,10 @@ number of its moment, which is 0 where no hollow is."""
 OF_WEATHER = (*KINDS, *EARLIER)
 
 WETNESS, FRESH, WATER, DRIED = "softground_wetness", "softground_fresh", "softground_water", "softground_dried"
+BLOWN = "softground_blown"
 """What the group stores for materials: how wet the ground looks and how much of it new snow covers, 0 to 1; depth of
-standing water [m]; how dry it looks where it was wet to begin with, 0 to 1."""
+standing water [m]; how dry it looks where it was wet to begin with, and how much of a print blown sand or snow covers,
+0 to 1."""
 
 INPUTS = (
     ("Snowfall", 0.0, 0.0, 100.0, "New snow in centimetres per hour. It settles, and rounds whatever it covers"),
@@ -307,8 +309,10 @@ class _Vertices:
         if matter.blown:
             filled = self._number(self._course.aged["filled"], self._moment)
             change = (rounded + relief * filled).where(acts["Wind"], otherwise=change)
-            compression, rim = (graph.number(graph.attribute(name)) * (filled + 1.0) for name in (COMPRESSION, RIM))
-            worn = dict(zip((COMPRESSION, RIM), w.worn(compression, rim, rounded), strict=True))
+            pressed, risen = (graph.number(graph.attribute(name)) for name in (COMPRESSION, RIM))
+            left = filled + 1.0
+            worn = dict(zip((COMPRESSION, RIM), w.worn(pressed * left, risen * left, rounded), strict=True))
+            worn[BLOWN] = (pressed * filled * (-1.0 / COVERED)).within_one()
         height = change + cover.where(acts["Snowfall"])
         if matter.snow_depth:
             # Vertices that the user adds have no place at rest.
@@ -321,7 +325,7 @@ class _Vertices:
         geometry, (height, fresh, *others) = graph.captured(geometry, height, fresh, *standing, *worn.values())
         standing, looks = others[: len(standing)], others[len(standing) :]
         if worn:
-            blown = graph.forgotten(geometry, *worn)  # what takes the place of another is copied
+            blown = graph.forgotten(geometry, COMPRESSION, RIM)  # what takes the place of another is copied
             for name, look in zip(worn, looks, strict=True):
                 blown = graph.store(blown, name, look.socket, True)
             geometry = graph.choose("GEOMETRY", acts["Wind"].socket, geometry, blown)

@@ -39,6 +39,8 @@ class Weathered:
         How wet it looks and how much of it new snow covers, 0 to 1; depth of standing water [m].
     dried : array
         How dry it looks where it was wet to begin with, 0 to 1.
+    kept : array
+        The part of a print that is not blown full, 0 to 1.
     """
 
     height: Array
@@ -46,6 +48,7 @@ class Weathered:
     fresh: Array
     water: Array
     dried: Array
+    kept: Array
 
 
 def weathered(
@@ -82,6 +85,7 @@ def weathered(
         fresh=np.clip(cover / COVERED, 0.0, 1.0),
         water=water,
         dried=_dried(places, wetness, weather, matter, course, frame),
+        kept=kept,
     )
 
 
