@@ -26,11 +26,20 @@ BARS = ("HIKING", "TRAINER")
 """Patterns that materials may draw as bars across a print, where the mesh is too coarse for the pattern itself."""
 IMAGE, SHOES = "IMAGE", "SHOES"
 """Patterns that are read: from an image that is the same under all soles, and from the undersides of each."""
+FLESH = "BARE"
+"""The pattern of a foot without a shoe."""
 
 FEET_IN_SHOES = 2
 """Feet of those who wear shoes."""
 PAW = 1.5
 """Length over breadth up to which a foot is a paw or a hoof: foxes' come to 1.4, figures' shoes begin at 1.6."""
+APART = 0.1
+"""Length over which toes are apart, over that of the sole, from which a foot is bare: a dinosaur's come to 0.25, rats'
+to 0.4, shoes to 0."""
+GAP = 0.01
+"""Least distance of toes that are apart, over the length of the sole."""
+LINES = 100
+"""Across the front half of a sole, along which toes are looked for."""
 UPRIGHT = 0.25
 """Share of their contacts for which feet in shoes are alone on the ground, at least: people may fall and lie there."""
 
@@ -41,7 +50,7 @@ TREAD = 0.003
 def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[tuple[str, str]]:
     """Characters and names of the soles that wear shoes, by the settings and all footprints of a bake.
 
-    They are the feet of those who have two, and go upright on them, unless these are paws or hooves.
+    They are the feet of those who have two, and go upright on them, unless these are paws or hooves or have toes apart.
     """
     shod = set()
     for one in inputs["characters"]:
@@ -49,8 +58,10 @@ def shod_of(inputs: Mapping[str, Any], footprints: Sequence[Footprint]) -> set[t
         limbs = {sole["name"] for sole in one["soles"] if sole["bone"] and sole["limb"]}
         feet = _two_feet(one)
         if _is_upright([step for step in steps if step.sole in feet], [step for step in steps if step.sole in limbs]):
-            paws = {step.sole for step in steps if step.pressed_by and _is_paw(step.pressed_by.pressing.sole)}
-            shod |= {(one["name"], name) for name in feet - paws}
+            pattern = inputs["tread_pattern"]
+            soles = {step.sole: step.pressed_by.pressing.sole for step in steps if step.pressed_by}
+            bare = {name for name, sole in soles.items() if _is_bare(sole, pattern=pattern)}
+            shod |= {(one["name"], name) for name in feet - bare}
     return shod
 
 
@@ -60,8 +71,26 @@ def _two_feet(character: Mapping[str, Any]) -> set[str]:
     return feet if len(feet) == FEET_IN_SHOES else set()
 
 
-def _is_paw(sole: Sole) -> bool:
-    return sole.prop is None and sole.length < PAW * sole.breadth
+def _is_bare(sole: Sole, *, pattern: str) -> bool:
+    """Whether it is a paw, a hoof, or a foot whose toes are apart, to which the pattern of a bare foot may belong."""
+    if sole.prop is not None:
+        return False
+    return sole.length < PAW * sole.breadth or (pattern != FLESH and _toes_apart(sole.outline) > APART)
+
+
+def _toes_apart(outline: Array) -> float:
+    """Length over which toes are apart, over that of the sole: where lines across its front half leave an outline
+    (N, 2) and come back to it."""
+    x, y = outline.T
+    length = float(np.ptp(x))
+    lines = x.max() - 0.5 * length * (np.arange(LINES) + 0.5) / LINES
+    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
+    crosses = (x <= lines[:, None]) != (next_x <= lines[:, None])
+    along = (lines[:, None] - x) / np.where(next_x == x, 1.0, next_x - x)
+    ends = np.sort(np.where(crosses, y + along * (next_y - y), np.inf), axis=1)
+    back, left = ends[:, 2::2], ends[:, 1:-1:2]
+    gaps = np.where(np.isfinite(back), back, 0.0) - np.where(np.isfinite(back), left, 0.0)
+    return 0.5 * float(np.mean((gaps > GAP * length).any(axis=1)))
 
 
 def _is_upright(on_feet: Sequence[Footprint], on_limbs: Sequence[Footprint]) -> bool:
@@ -144,7 +173,7 @@ def with_shoe_treads(wanted: BakeSettings, motions: Sequence[CharacterMotion]) -
         (one.name, of_foot.sole)
         for one in motions
         for of_foot in one.soles
-        if (one.name, of_foot.sole.name) in feet and not _is_paw(of_foot.sole)
+        if (one.name, of_foot.sole.name) in feet and not _is_bare(of_foot.sole, pattern=SHOES)
     ]
     for name, sole in soles:
         of_sole = tread_map.from_underside(sole.underside, sole.length) if sole.underside is not None else None

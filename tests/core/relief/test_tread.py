@@ -172,7 +172,7 @@ def test_records_with_a_broken_map_are_refused(text):
         asked_of(inputs_of(tread_pattern="IMAGE", tread_image=text), ())
 
 
-def shod_after(feet, limbs=(), *, sole=None):
+def shod_after(feet, limbs=(), *, sole=None, pattern="HIKING"):
     """The soles of a walk in shoes, where it has limbs too; contacts as (first frame, last frame)."""
     step = steps_on("wet_sand")[0]
     if sole is not None:
@@ -184,7 +184,8 @@ def shod_after(feet, limbs=(), *, sole=None):
     ]
     soles = inputs_of()["characters"][0]["soles"]
     hands = [{"name": f"hand.{side}", "side": side, "bone": "hand", "limb": True} for side in "LR"]
-    return {name for _, name in shod_of(inputs_of(characters=[{"name": "A", "soles": soles + hands}]), walk)}
+    asked = inputs_of(characters=[{"name": "A", "soles": soles + hands}], tread_pattern=pattern)
+    return {name for _, name in shod_of(asked, walk)}
 
 
 STEPS = [(10 * number, 10 * number + 12) for number in range(6)]
@@ -199,6 +200,28 @@ def test_feet_of_those_who_walk_and_then_fall_and_lie_wear_shoes():
 def test_hind_feet_of_those_who_go_on_all_fours_are_bare_whatever_their_forefeet_are_called():
     assert shod_after(STEPS, [(first + 2, last + 2) for first, last in STEPS]) == set()  # diagonal pairs
     assert shod_after(STEPS, [(first + 7, last + 7) for first, last in STEPS]) == set()
+
+
+def outline_of(*toes):
+    """A sole whose front parts into toes: how far back each gap reaches and how wide it is, over the length of 1."""
+    points = [(-0.5, -0.25), (0.5, -0.25)]
+    for number, (reach, width) in enumerate(toes):
+        middle = -0.25 + 0.5 * (number + 1) / (len(toes) + 1)
+        points += [(0.5, middle - width / 2), (0.5 - reach, middle), (0.5, middle + width / 2)]
+    return np.array([*points, (0.5, 0.25), (-0.5, 0.25)])
+
+
+def test_feet_whose_toes_are_apart_are_bare_and_toe_caps_with_a_notch_are_not():
+    sole = box_sole(0.5, 0.25)
+    for toes, worn in (
+        ((), {"foot.L", "foot.R"}),
+        (((0.05, 0.05),), {"foot.L", "foot.R"}),
+        (((0.3, 0.05), (0.3, 0.05)), set()),
+        (((0.25, 0.03),), set()),
+    ):
+        bare = replace(sole, outline=0.5 * outline_of(*toes))
+        assert shod_after(STEPS, sole=bare) == worn
+        assert shod_after(STEPS, sole=bare, pattern="BARE") == {"foot.L", "foot.R"}  # whose toes it shows
 
 
 def test_paws_and_hooves_are_bare_also_of_those_who_go_on_two():
