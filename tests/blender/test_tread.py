@@ -60,7 +60,9 @@ def test_the_tread_goes_with_the_bake_and_where_it_is_not_asked_for(ground, scen
     assert own_data.SOLE not in ground.data.attributes
 
 
-def test_a_dog_wears_no_shoes_whatever_the_bones_of_its_forelegs_are_called(scene):
+@pytest.fixture
+def prints_of_a_dog(scene):
+    """It walks along -y, on feet and on limbs."""
     body = Dog()
     dog = create_character("Dog", body, scene.collection)
     write_action(dog, go_on_four_legs(body, WALK, 30, scene.render.fps), "Walk")
@@ -71,7 +73,16 @@ def test_a_dog_wears_no_shoes_whatever_the_bones_of_its_forelegs_are_called(scen
     bake(scene, cell_size=0.02)
     footprints, _ = baked_ground.load(scene.softground.ground)
     assert {step.sole for step in footprints} == {"foot.L", "foot.R", "hand.L", "hand.R"}
+    return footprints
+
+
+def test_a_dog_wears_no_shoes_whatever_the_bones_of_its_forelegs_are_called(prints_of_a_dog, scene):
     assert own_data.SOLE not in scene.softground.ground.data.attributes
+
+
+def test_prints_of_all_paws_head_where_their_toes_point(prints_of_a_dog):
+    off = np.array([step.heading + np.pi / 2 for step in prints_of_a_dog])
+    assert np.cos(off).min() > np.cos(np.radians(5.0))
 
 
 @pytest.mark.parametrize("pattern", ["BARE", "IMAGE", "SHOES"])

@@ -119,8 +119,10 @@ class PropLayout(ContactLayout):
         )
 
     def _toward(self, step: int) -> Array:
-        """The way that the body moves; of one that stands, its own x axis."""
+        """The way that the body moves; of one that stands, and of a limb, its own x axis."""
         pose = self.steps.poses[step, 0]
+        if self.prop.give:
+            return np.asarray(pose[:2, 0])
         before = np.concatenate([self.steps.approach[-1:], self.steps.poses])[max(0, step)]
         travel: Array = pose[:2, 3] - before[0, :2, 3]
         return travel if np.linalg.norm(travel) > STANDSTILL * self.prop.size else pose[:2, 0]

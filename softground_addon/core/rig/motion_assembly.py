@@ -153,12 +153,23 @@ def _limb_motions(
         else:
             length = float(np.linalg.norm(tail - head))
             vertices, triangles = capsule(head, tail, LIMB_THICKNESS * length)
-        middle = vertices.mean(axis=0)
-        sole = prop_sole(vertices - middle, triangles, name=source.name, side=source.side, give=GIVE)
-        transforms = _rigid_motion(recording.bone(source.bone), rest.matrix(source.bone))
-        transforms[:, :3, 3] += transforms[:, :3, :3] @ middle
+        frame = _limb_frame(tail - head, vertices.mean(axis=0))
+        sole = prop_sole(
+            (vertices - frame[:3, 3]) @ frame[:3, :3], triangles, name=source.name, side=source.side, give=GIVE
+        )
+        transforms = _rigid_motion(recording.bone(source.bone), rest.matrix(source.bone)) @ frame
         motions[source.name] = SoleMotion(sole, transforms[:, None])
     return motions
+
+
+def _limb_frame(along: Array, middle: Array) -> Array:
+    """The frame of a limb in the rest pose, (4, 4): its middle at the origin, x along its bone."""
+    x = unit(along) if along.any() else np.array((1.0, 0.0, 0.0))
+    y = np.cross(UP, x)
+    y = unit(y) if np.linalg.norm(y) > 1e-6 else np.array((0.0, 1.0, 0.0))
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = np.column_stack([x, y, np.cross(x, y)]), middle
+    return frame
 
 
 def _at_its_skin(motion: SoleMotion, low: Array | None) -> SoleMotion:
