@@ -16,11 +16,12 @@ from sample_scenes.character import create_character
 from sample_scenes.keys import write_action
 from sample_scenes.run import Run, run
 from softground_addon.blender import compat, jobs, mesh_arrays, node_graph
-from softground_addon.blender.after import debris_object
+from softground_addon.blender.after import debris_object, debris_shapes
 from softground_addon.blender.baking import bake_job, step_edits
 from softground_addon.blender.ground import baked_ground
 from softground_addon.blender.output import debris_points, exports, image_exports
 from softground_addon.core.after import flight
+from softground_addon.core.ground.presets import SURFACES
 from softground_addon.core.record import record
 from softground_addon.core.record.edits import StepEdit, step_id
 from tests.blender import fingerprints, shots
@@ -363,6 +364,16 @@ def test_only_the_largest_have_a_shape_and_the_rest_are_round(scene):
         born = values(obj, "softground_birth") <= 24
         assert len(shapes) == (values(obj, "softground_rank")[born] < count).sum()
         assert np.abs(shown(obj) - everything).max() < 1e-6
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_light_goes_through_pieces_in_cycles_alone_as_eevee_draws_it_dark(scene, surface):
+    tree = debris_shapes.material_of(debris_shapes.collection_of(surface)).node_tree
+    shown = {
+        engine: tree.get_output_node(engine).inputs["Surface"].links[0].from_node.type for engine in ("CYCLES", "EEVEE")
+    }
+    assert shown["EEVEE"] == "BSDF_PRINCIPLED"
+    assert (shown["CYCLES"] == "MIX_SHADER") == (surface in debris_shapes.THROUGH)
 
 
 def test_points_lie_where_they_come_to_rest(scene):

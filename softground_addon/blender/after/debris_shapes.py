@@ -77,4 +77,8 @@ def _material(surface: str) -> bpy.types.Material:
         for number, one in enumerate((shader, through), 1):
             links.new(one.outputs[0], mixed.inputs[number])
         links.new(mixed.outputs[0], material.node_tree.get_output_node("ALL").inputs["Surface"])
+        # EEVEE lets no light through closed pieces that lie in their own shadow, and draws that share of them dark.
+        solid = nodes.new("ShaderNodeOutputMaterial")
+        solid.target = "EEVEE"
+        links.new(shader.outputs[0], solid.inputs["Surface"])
     return material
