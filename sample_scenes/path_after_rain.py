@@ -36,6 +36,9 @@ PUDDLES = np.array(
 )
 """Hollows beside the way: middle, half width, half length and depth [m]."""
 LEVEL = -0.016  # m, of the water in them
+REFRACTION = 1.33
+TURBID = 0.055
+"""Depth of water that hides the bed of a puddle [m]."""
 _HILLS = open_air.rolling(swell=0.22, hills=14.0, seed=8)
 
 
@@ -65,9 +68,19 @@ def _beside(way: float, bank: float) -> Callable[[Array, Array], Array]:
     return density
 
 
+def _swept(density: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Array]:
+    """A density of what boots sweep aside: nothing lies where the nearest of them went."""
+
+    def left(x: Array, y: Array) -> Array:
+        aside = np.clip((np.abs(x) - 0.30) / 0.25, 0.0, 1.0)
+        return density(x, y) * np.maximum(aside, 0.7 * np.clip((-1.2 - y) / 1.5, 0.0, 1.0))
+
+    return left
+
+
 PAINTED = {
-    "leaves": _beside(40.0, 170.0),
-    "needles": _beside(110.0, 480.0),
+    "leaves": _swept(_beside(40.0, 170.0)),
+    "needles": _swept(_beside(110.0, 480.0)),
     "crumbs": _beside(260.0, 160.0),
     "stones": _beside(70.0, 30.0),
     "twigs": _beside(5.0, 16.0),
@@ -106,17 +119,21 @@ def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
     """From the height of a knee, with the light from the side."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(30), radians(27), (1.0, 0.86, 0.68), 7.0, 0.24, (radians(24.0), 1.0))
+    stage.hide(bpy.data.objects["Hiker"])  # long out of sight
+    open_air.add_low_sun(scene, radians(30), radians(27), (1.0, 0.86, 0.68), 7.0, 0.30, (radians(24.0), 1.0))
     chance = np.random.default_rng(5)
     sides = np.where(chance.random(340) < 0.5, -1.0, 1.0)
     spots = np.column_stack([sides * (4.5 + chance.gamma(1.4, 9.0, 340)), -chance.uniform(13.0, 75.0, 340)])
+    end = np.column_stack([chance.normal(-1.0, 4.5, 34), -chance.uniform(34.0, 80.0, 34)])  # where the way bends off
+    spots = np.concatenate([spots, end])
     firs.add_firs(spots, chance.uniform(6.0, 16.0, len(spots)), height, NEEDLES)
     spots = np.array([(-2.6, -5.2), (2.9, -3.9), (-3.9, -9.0), (2.9, -9.5), (-2.9, -13.0), (4.6, -7.2), (5.2, -4.4)])
     firs.add_firs(spots, chance.uniform(13.0, 19.0, len(spots)), height, NEEDLES, seed=9, crown=0.26)
+    _soak(scene.softground.ground)
     _add_litter(scene.softground.ground, chance)
     _add_puddles(scene)
     _add_roots(scene, spots[:4], chance)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.45, 82
+    scene.view_settings.exposure, scene.render.image_settings.quality = 0.95, 82
     path = folder / "path_after_rain.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
@@ -125,15 +142,29 @@ def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
 NEEDLES = (0.030, 0.052, 0.026)
 
 
+def _soak(baked: bpy.types.Object) -> None:
+    """Rain darkens all of the ground and leaves it shining, in patches."""
+    for material in baked_ground.display_mesh_of(baked).data.materials:
+        tree, graph = material.node_tree, Graph(material.node_tree)
+        shine = graph.ramp(graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.30, 4.0, 0.6), 0.40, 0.62)
+        for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]:
+            colour = shader.inputs["Base Color"]
+            darker = graph.node("ShaderNodeVectorMath", {"Scale": graph.blend(shine, 0.38, 0.32)}, operation="SCALE")
+            tree.links.new(colour.links[0].from_socket, darker.inputs[0])
+            tree.links.new(darker.outputs[0], colour)
+            tree.links.new(graph.blend(shine, 0.75, 0.18).output, shader.inputs["Roughness"])
+            tree.links.new(graph.blend(shine, 0.15, 0.5).output, shader.inputs["Specular IOR Level"])
+
+
 def _add_litter(baked: bpy.types.Object, chance: np.random.Generator) -> None:
     """Leaves, needles, crumbs, stones, twigs and grass, which the boots have bent, buried and soiled."""
     ground = baked_ground.display_mesh_of(baked)
     grass = litter.blades(open_air.tufts(chance), (0.045, 0.060, 0.014), (0.115, 0.125, 0.040))
     crumbs = litter.stones((0.050, 0.030, 0.018), (0.120, 0.074, 0.044), 0.75)
     stones = litter.stones((0.13, 0.11, 0.09), (0.32, 0.28, 0.23), 0.5, rough=0.2)
-    brown, ochre = (0.060, 0.026, 0.010), (0.30, 0.135, 0.035)
-    flat = {"lean": 0.35, "bend": 0.15, "bury": 0.12}
-    litter.strew(ground, litter.leaves(brown, ochre), "leaves", smallest=0.045, largest=0.10, law=2.2, seed=1, **flat)
+    brown, ochre = (0.042, 0.018, 0.007), (0.20, 0.085, 0.022)
+    flat = {"lean": 0.18, "bend": 0.15, "bury": 0.12}
+    litter.strew(ground, litter.leaves(brown, ochre), "leaves", smallest=0.035, largest=0.075, law=2.2, seed=1, **flat)
     fallen = litter.needles((0.045, 0.022, 0.010), (0.17, 0.085, 0.034))
     litter.strew(ground, fallen, "needles", smallest=0.03, largest=0.07, seed=2, lean=0.05, bury=0.2)
     litter.strew(
@@ -168,19 +199,26 @@ def _where(chosen: Array) -> Array:
 
 
 def _puddle_water() -> bpy.types.Material:
-    """Still, turbid water."""
-    material = stage.plain_material("SoftGround Sample puddle", (0.10, 0.066, 0.038), 0.02)
-    graph = Graph(material.node_tree)
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["IOR"].default_value = 1.33
+    """Still water that mirrors the sky: clear over the shore, turbid where it is deep."""
+    material = stage.plain_material("SoftGround Sample puddle", (0.055, 0.036, 0.021), 0.02)
+    tree, graph = material.node_tree, Graph(material.node_tree)
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["IOR"].default_value = REFRACTION
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
-    ragged = graph.noise(place, 0.03, 4.0, 0.65) * 0.016
-    there = graph.ramp(graph.attribute("depth") + ragged + -0.008, -0.001, 0.003)
-    material.node_tree.links.new(there.output, shader.inputs["Alpha"])
     ripples = graph.node(
         "ShaderNodeBump", {"Height": graph.noise(place, 0.06, 1.0), "Distance": 0.001, "Strength": 0.15}
     )
-    material.node_tree.links.new(ripples.outputs[0], shader.inputs["Normal"])
+    tree.links.new(ripples.outputs[0], shader.inputs["Normal"])
+    depth = graph.attribute("depth") + graph.noise(place, 0.05, 4.0, 0.6) * 0.008 + -0.004
+    mirror = graph.out(graph.node("ShaderNodeFresnel", {"IOR": REFRACTION, "Normal": graph.out(ripples)}))
+    sky = graph.node("ShaderNodeBsdfGlossy", {"Roughness": 0.02, "Normal": graph.out(ripples)})
+    clear = graph.node("ShaderNodeBsdfTransparent", {"Color": (0.72, 0.62, 0.50, 1.0)})
+    thin = graph.node("ShaderNodeMixShader", {0: mirror, 1: graph.out(clear), 2: graph.out(sky)})
+    water = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, 0.0, TURBID), 1: graph.out(thin)})
+    tree.links.new(shader.outputs[0], water.inputs[2])
+    ashore = graph.out(graph.node("ShaderNodeBsdfTransparent"))
+    shown = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, -0.006, 0.004), 1: ashore, 2: graph.out(water)})
+    tree.links.new(shown.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
     return material
 
 
