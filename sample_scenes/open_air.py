@@ -19,7 +19,7 @@ from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Graph
+from softground_addon.blender.shader_graph import Graph, Socket
 
 NEAR, FAR = 9.0, 600.0
 """Half the width of the ground that is even, and of all of it [m]."""
@@ -139,6 +139,18 @@ def add_low_sun(
     nodes = {node.type: node for node in scene.world.node_tree.nodes}
     nodes["TEX_SKY"].sun_elevation, nodes["TEX_SKY"].ozone_density = of_sky
     nodes["BACKGROUND"].inputs[1].default_value = sky
+
+
+def darken(material: bpy.types.Material, share: Socket | float) -> list[bpy.types.Node]:
+    """Leave a share of the colour of a ground, as rain does; returns the shaders."""
+    tree, graph = material.node_tree, Graph(material.node_tree)
+    shaders = [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]
+    for shader in shaders:
+        colour = shader.inputs["Base Color"]
+        darker = graph.node("ShaderNodeVectorMath", {"Scale": share}, operation="SCALE")
+        tree.links.new(colour.links[0].from_socket, darker.inputs[0])
+        tree.links.new(darker.outputs[0], colour)
+    return shaders
 
 
 def add_camera(

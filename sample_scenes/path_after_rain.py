@@ -147,11 +147,7 @@ def _soak(baked: bpy.types.Object) -> None:
     for material in baked_ground.display_mesh_of(baked).data.materials:
         tree, graph = material.node_tree, Graph(material.node_tree)
         shine = graph.ramp(graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.30, 4.0, 0.6), 0.40, 0.62)
-        for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]:
-            colour = shader.inputs["Base Color"]
-            darker = graph.node("ShaderNodeVectorMath", {"Scale": graph.blend(shine, 0.38, 0.32)}, operation="SCALE")
-            tree.links.new(colour.links[0].from_socket, darker.inputs[0])
-            tree.links.new(darker.outputs[0], colour)
+        for shader in open_air.darken(material, graph.blend(shine, 0.38, 0.32)):
             tree.links.new(graph.blend(shine, 0.75, 0.18).output, shader.inputs["Roughness"])
             tree.links.new(graph.blend(shine, 0.15, 0.5).output, shader.inputs["Specular IOR Level"])
 

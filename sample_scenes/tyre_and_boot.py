@@ -15,7 +15,8 @@ from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.rolling_things import roll_along
 from sample_scenes.stage import Array
 from sample_scenes.tyre import RADIUS, create_tyre
-from softground_addon.blender.ground import baked_ground, weather
+from softground_addon.blender import compat
+from softground_addon.blender.ground import baked_ground, weather, weather_modifier
 
 CELL_SIZE = 0.006
 """Fine enough for lugs [m]."""
@@ -26,6 +27,9 @@ START = 2.6  # m along y; all go toward -y
 RUTS = (0.11, -1.30)  # m along x: left boots step into the first
 MASS = 680.0  # kg on both wheels
 SPEED = 2.6  # m/s: the car is out of sight when the picture is taken
+RAIN = 50.0  # mm/h: water stands in the ruts, between the lugs
+SOAKED = 0.55
+"""What is left of the colour of the ground."""
 PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.18, hills=18.0, seed=4)
 
@@ -36,7 +40,8 @@ def _growth(x: Array, y: Array) -> Array:
     apart = np.minimum(np.abs(x - RUTS[0] + edge), np.abs(x - RUTS[1] - edge))
     seen = (np.abs(x) < 30.0) * (y < 2.4) * np.clip((y + 60.0) / 12.0, 0.0, 1.0) / (1.0 + (0.12 * y) ** 2)
     patches = 0.75 + 0.5 * np.sin(1.9 * x + 0.7 * y) * np.sin(0.8 * y - 1.1 * x + 2.0)
-    return 300.0 * seen * patches * np.clip((apart - 0.44) / 0.40, 0.0, 1.0)
+    overgrown = np.clip((-10.0 - y) / 6.0, 0.0, 1.0) ** 2  # far away, so that nobody sees where the tracks end
+    return 300.0 * seen * patches * np.maximum(np.clip((apart - 0.44) / 0.40, 0.0, 1.0), overgrown)
 
 
 def _bare(x: Array, y: Array) -> Array:
@@ -57,7 +62,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     painted = {"growth": _growth, "bare": _bare}
     ground = open_air.add_ground(scene, "Track", (-20.0, START + 3.0), HEIGHT, "soil", painted)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.42, 1.62, 0.48), (-0.08, -1.4, 0.06), 28.0, (0.1, 0.2, 0.0), 9.0)
+    open_air.add_camera(scene, (0.46, 1.38, 0.44), (-0.04, -1.4, 0.05), 28.0, (0.1, 0.2, 0.0), 9.0)
     wheels = []
     for number, rut in enumerate(RUTS):
         wheel = create_tyre(f"Wheel {number + 1}", scene.collection)
@@ -67,7 +72,9 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
         wheels.append(wheel)
     car = [Walker(wheel, MASS / len(wheels)) for wheel in wheels]
     bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options, beside=car)
-    weather.set_preset(weather.add(bake.ground), "SHOWER")
+    modifier = weather.add(bake.ground)
+    weather.set_preset(modifier, "SHOWER")
+    compat.write_input(modifier, weather_modifier.inputs_of(modifier)["Rain"], RAIN)
     return TyreAndBoot({PRESET: bake})
 
 
@@ -87,13 +94,16 @@ def shoot(_built: TyreAndBoot, folder: Path, samples: int) -> list[Path]:
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
     for name in ("Wheel 1", "Wheel 2"):
-        bpy.data.objects[name].hide_render = True  # the car is long gone
+        bpy.data.objects[name].hide_render = True  # the car is long gone, and the walker out of sight
+    stage.hide(bpy.data.objects["Hiker"])
     open_air.add_low_sun(scene, radians(22), radians(17), (1.0, 0.80, 0.60), 6.5, 0.14, (radians(14.0), 1.2))
     chance = np.random.default_rng(5)
-    spots = np.column_stack([chance.normal(0.0, 70.0, 200), -chance.uniform(45.0, 140.0, 200)])
+    spots = np.column_stack([chance.normal(0.0, 70.0, 520), -chance.uniform(42.0, 130.0, 520)])
     spots = spots[np.abs(spots[:, 0]) > 4.0]
     firs.add_firs(spots, chance.uniform(5.0, 14.0, len(spots)), HEIGHT, (0.034, 0.056, 0.030))
     ground = baked_ground.display_mesh_of(scene.softground.ground)
+    for material in ground.data.materials:
+        open_air.darken(material, SOAKED)
     grass = litter.pieces_of("Grass", litter.blades(open_air.tufts(chance), (0.040, 0.062, 0.012), (0.13, 0.15, 0.045)))
     litter.strew(ground, grass, "growth", smallest=0.04, largest=0.22, law=1.4, lean=0.2, bend=1.4, bury=0.05, seed=6)
     crumbs = litter.stones((0.045, 0.028, 0.018), (0.125, 0.080, 0.050), 0.9)
