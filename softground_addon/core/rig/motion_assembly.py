@@ -165,8 +165,7 @@ def _limb_motions(
 def _limb_frame(along: Array, middle: Array) -> Array:
     """The frame of a limb in the rest pose, (4, 4): its middle at the origin, x along its bone."""
     x = unit(along) if along.any() else np.array((1.0, 0.0, 0.0))
-    y = np.cross(UP, x)
-    y = unit(y) if np.linalg.norm(y) > 1e-6 else np.array((0.0, 1.0, 0.0))
+    y = unit(np.cross(np.eye(3)[np.abs(x).argmin()], x))
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = np.column_stack([x, y, np.cross(x, y)]), middle
     return frame
