@@ -39,12 +39,12 @@ def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
         if prop is not None:
             limit = LONGEST_TRACK * prop.extent.max()
         else:
-            slide = float(np.abs(place[first:end] - place[first]).max())
+            slide = float(np.linalg.norm(place[first:end] - place[first], axis=1).max())
             pieces = min(np.ceil(slide / furthest), (end - first) // shortest)
             limit = slide / pieces if pieces > 1 else np.inf
         begin = int(first)
         for step in range(begin + 1, int(end)):
-            if np.abs(place[step] - place[begin]).max() > limit:
+            if np.linalg.norm(place[step] - place[begin]) > limit:
                 yield slice(begin, step)
                 begin = step
         yield slice(begin, int(end))

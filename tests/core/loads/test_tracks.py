@@ -1,0 +1,37 @@
+"""Where the prints of a sole that slides begin and end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softground_addon.core.loads.tracks import LONGEST_SLIDE, SHORTEST_SLIDE, tracks
+from softground_addon.core.motion.motion import LowSkin
+from tests.core.walkers import box_sole, loads_of, pose
+
+HEIGHT = 1.8
+
+
+def sliding(distance, heading, seconds=1.0):
+    """A foot of a body of 1.8 m that slides for a while."""
+    count = round(seconds * 120) + 1
+    path = np.linspace(0, distance, count)[:, None] * (np.cos(heading), np.sin(heading), 0.0)
+    one = np.ones((count, 1), dtype=bool)
+    loads = loads_of([box_sole(0.3, 0.1)], [pose(path, heading)[:, None]], 100.0 * one, one, 30.0)
+    up = np.ones((count, 1, 3))
+    skin = LowSkin(loads.motion.frames, up, up[..., 0], 0.3, HEIGHT)
+    return replace(loads, motion=replace(loads.motion, skin=skin))
+
+
+@pytest.mark.parametrize("heading", np.radians([0, 30, 45, 90, 200]))
+@pytest.mark.parametrize(("slides", "prints"), [(0.0, 1), (0.95, 1), (1.2, 2), (2.5, 3)])
+def test_a_foot_that_slides_prints_as_often_whichever_way_it_goes(slides, prints, heading):
+    pieces = list(tracks(sliding(slides * LONGEST_SLIDE * HEIGHT, heading), 0))
+    assert len(pieces) == prints
+    lengths = [piece.stop - piece.start for piece in pieces]
+    assert max(lengths) - min(lengths) <= 0.1 * max(lengths) + 2
+
+
+def test_a_foot_that_slides_fast_prints_no_shorter_than_it_may():
+    pieces = list(tracks(sliding(3.0, 0.5, seconds=0.3), 0))
+    assert len(pieces) == int(0.3 / SHORTEST_SLIDE)
