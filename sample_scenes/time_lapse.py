@@ -6,22 +6,24 @@ One bake each; only the weather's sliders act afterwards.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import pi, radians
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-from sample_scenes import litter, open_air, production, stage
+from sample_scenes import litter, open_air, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
 from sample_scenes.moving_picture import animate
 from sample_scenes.production import Bake, Claim, Options, Walker
+from sample_scenes.stage import Array
 from softground_addon.blender import compat
 from softground_addon.blender.ground import weather, weather_keys, weather_modifier
+from softground_addon.blender.ground.weather_nodes import WETNESS
 from softground_addon.core.record.footprints import Footprint
 
 CELL_SIZE: float | None = None
@@ -44,8 +46,10 @@ SUN = {"THAW": (30.0, 9.0), "WINDY_DUNES": (40.0, 14.0)}
 HIGH_SUN = (40.0, 22.0)
 EXPOSURE = {"SNOWFALL": -0.3, "THAW": 0.0, "WINDY_DUNES": -0.5, "DRYING_BEACH": -0.45}
 """In stops: these grounds are pale."""
-STRAW, ROOTS = 110, -0.26
-"""Tufts of dead grass below the snow that thaws, and how deep they are rooted [m]."""
+SOIL, HUMPS = -0.225, 0.10
+"""Mean height of the soil below the snow that thaws, and about how far its humps rise above it [m]."""
+STRAW, ROOTED = 900, -0.24
+"""Tufts of dead grass that are tried, and the height of soil from which on they grow [m]."""
 PICTURE = (480, 320)
 APART = 30.0
 """Distance of the tracks [m]."""
@@ -72,25 +76,40 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
     walker.location = (APART * number, 0.0, 0.0)
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"} | dict(options or {})
+    chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"}
+    if preset == "THAW":
+        chosen["debris"] = "false"  # thrown snow would be the first to melt
+    chosen |= options or {}
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
     modifier = weather.add(bake.ground)
     weather.set_preset(modifier, preset)
     if preset in AFTERWARDS:
         _set_in(modifier, FRAMES)
     if preset == "THAW":
-        _add_straw(walker.location.x)
+        _add_soil(walker.location.x)
     stage.hide(walker)
     return bake
 
 
-def _add_straw(middle: float) -> None:
-    """Dead grass beside a track along x = `middle` [m], which comes out of the snow as that melts."""
+def _add_soil(middle: float) -> None:
+    """Wet soil and dead grass below a track along x = `middle` [m], which come out of the snow as that melts."""
     chance = np.random.default_rng(4)
-    aside = chance.uniform(0.26, 1.6, STRAW) * chance.choice((-1.0, 1.0), STRAW)
-    spots = np.column_stack([middle + aside, chance.uniform(-4.2, -0.4, STRAW)])
+    waves = [(length, *chance.uniform(0.0, 2.0 * pi, 2)) for length in np.geomspace(1.5, 0.06, 14)]
+
+    def height(x: Array, y: Array) -> Array:
+        humps = sum(
+            length**0.8 * np.sin((x * np.cos(way) + y * np.sin(way)) * 2.0 * pi / length + phase)
+            for length, way, phase in waves
+        ) / np.linalg.norm([length**0.8 for length, *_ in waves])
+        return SOIL + HUMPS * (0.7 * humps - 0.5 * np.exp(-(((x - middle) / 0.3) ** 2)))
+
+    x, y = (terrain.spaced(low, high, 0.015) for low, high in ((middle - 2.6, middle + 2.4), (-5.5, 1.0)))
+    rained = {WETNESS: lambda x, _y: np.full_like(x, 0.6)}
+    terrain.add_terrain("Soil", x, y, height, "soil", bpy.context.scene.collection, rained)
+    spots = np.column_stack([middle + chance.uniform(-2.4, 1.6, STRAW), chance.uniform(-5.2, 0.0, STRAW)])
+    spots = spots[height(*spots.T) > ROOTED]
     blades = litter.blades(open_air.tufts(chance), *litter.STRAW)
-    open_air.add_grass(spots, chance.uniform(0.07, 0.27, STRAW), lambda x, _y: np.full_like(x, ROOTS), shapes=blades)
+    open_air.add_grass(spots, chance.uniform(0.03, 0.13, len(spots)), height, shapes=blades)
 
 
 def _set_in(modifier: Any, frame: int) -> None:
