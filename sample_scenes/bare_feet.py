@@ -18,8 +18,14 @@ CELL_SIZE = 0.003
 """Fine enough for toes [m]."""
 
 PRESET = "Wet Sand"
-SMOOTHED = {"material.blur_sigma": "0.0015", "material.poisson_ratio": "0.15", "debris": "false"}
-"""Sand that the swash has packed keeps the toes apart and hardly rises around a foot."""
+PACKED = {
+    "relief": "OFF",
+    "tread": "0",
+    "material.blur_sigma": "0.0015",
+    "material.poisson_ratio": "0.15",
+    "debris": "false",
+}
+"""Sand that the swash has packed and smoothed keeps the toes apart and hardly rises around a foot."""
 
 BODY = Body(foot=Foot(0.26, 0.098, bare=True))
 FRAMES = 260
@@ -53,7 +59,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     ground = open_air.add_ground(scene, "Beach", (-20.0, START + 3.0), height, "wet_sand")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (0.30, 1.76, 0.74), (-0.24, -1.5, 0.0), 28.0, (0.0, 0.1, 0.0), 8.0)
-    chosen = {"relief": "OFF", "tread": "0", **SMOOTHED} | dict(options or {})
+    chosen = PACKED | dict(options or {})
     bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, body=BODY)
     return BareFeet({PRESET: bake})
 

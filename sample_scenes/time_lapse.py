@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from sample_scenes import litter, open_air, production, stage, terrain
+from sample_scenes import bare_feet, litter, open_air, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
@@ -31,6 +31,8 @@ CELL_SIZE: float | None = None
 
 WEATHER = {"SNOWFALL": "Snow", "THAW": "Snow", "WINDY_DUNES": "Dry Sand", "DRYING_BEACH": "Wet Sand"}
 """Presets of weather, and the ground that each goes over."""
+BAREFOOT = "DRYING_BEACH"
+"""The preset under whose weather the walker wears no shoes."""
 
 FRAMES = 60
 LASTS = 264
@@ -71,7 +73,8 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
 
 def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options: Options | None) -> Bake:
     """The walk on the ground that a preset of weather goes over, and the weather."""
-    number, body = list(WEATHER).index(preset), Body()
+    number, barefoot = list(WEATHER).index(preset), preset == BAREFOOT
+    body = bare_feet.BODY if barefoot else Body()
     scene.frame_start, scene.frame_end = 1, FRAMES
     walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
     walker.location = (APART * number, 0.0, 0.0)
@@ -79,6 +82,9 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"}
     if preset == "THAW":
         chosen["debris"] = "false"  # thrown snow would be the first to melt
+    if barefoot:
+        chosen |= bare_feet.PACKED
+        cell_size = cell_size or bare_feet.CELL_SIZE
     chosen |= options or {}
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
     modifier = weather.add(bake.ground)
