@@ -40,6 +40,9 @@ WIDE = 5.0
 RIPPLE, RIPPLE_HEIGHT, LEE = 0.085, 0.0055, 0.68
 """From crest to crest of wind ripples, their height [m], and the part of a wave that faces the wind."""
 
+RUN_TOGETHER = 0.05
+"""Size of the patches of a print in which dry sand keeps a tread [m]."""
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -298,8 +301,9 @@ def _ripples(graph: Graph, ground: Ground) -> Socket:
 
 
 def _dry_sand(graph: Graph, ground: Ground) -> Look:
-    """Fine grains of several colours; nothing shines."""
-    relief, tint = _grains(graph, ground)
+    """Fine grains of several colours; nothing shines. Sand runs together over most of a tread."""
+    left = graph.ramp(graph.noise(ground.place, RUN_TOGETHER, 2.0, 0.6), 0.46, 0.66)
+    relief, tint = _grains(graph, replace(ground, tread=ground.tread * left))
     relief = relief + _ripples(graph, ground)
     patches = graph.noise(ground.place, 0.25, 3.0)
     colour = graph.mix(graph.ramp(tint, 0.0, 1.0), (0.50, 0.30, 0.13), (0.86, 0.62, 0.36))
