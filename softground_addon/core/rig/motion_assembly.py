@@ -134,6 +134,9 @@ def assemble_motion(
 LIMB_THICKNESS = 0.2
 """Radius of a limb without a skin over the length of its bone."""
 
+STEEP = 0.3
+"""Horizontal part of a bone over its length, up to which it points nowhere in plan."""
+
 GIVE = 0.04
 """How far flesh gives way where it touches, over the size of the limb: 3 mm for a hand, 1 cm for a trunk."""
 
@@ -163,11 +166,14 @@ def _limb_motions(
 
 
 def _limb_frame(along: Array, middle: Array) -> Array:
-    """The frame of a limb in the rest pose, (4, 4): its middle at the origin, x along its bone."""
-    x = unit(along) if along.any() else np.array((1.0, 0.0, 0.0))
-    y = unit(np.cross(np.eye(3)[np.abs(x).argmin()], x))
+    """The frame of a limb in the rest pose, (4, 4): upright, its middle at the origin, x where its bone points, if that
+    is not up or down."""
     frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = np.column_stack([x, y, np.cross(x, y)]), middle
+    frame[:3, 3] = middle
+    level = np.array((*along[:2], 0.0))
+    if np.linalg.norm(level) > STEEP * np.linalg.norm(along):
+        frame[:3, 0] = unit(level)
+        frame[:3, 1] = np.cross(UP, frame[:3, 0])
     return frame
 
 
