@@ -21,8 +21,8 @@ SHORTEST_SLIDE = 0.08
 def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
     """The steps of each print of a sole; the contacts of one that travels far are cut.
 
-    Those of a foot that slides, in a gait on the spot or on skates, are cut into even pieces of at most `LONGEST_SLIDE`
-    and on average at least `SHORTEST_SLIDE`.
+    Those of a foot or another limb that slides, in a gait on the spot or on skates, are cut into even pieces of at most
+    `LONGEST_SLIDE` and on average at least `SHORTEST_SLIDE`.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def tracks(character: CharacterLoads, index: int) -> Iterator[slice]:
     furthest = LONGEST_SLIDE * skin.height if skin else np.inf
     shortest = SHORTEST_SLIDE / motion.time_step
     for first, end in zip(*runs(character.contacts.touching[:, index]), strict=True):
-        if prop is not None:
+        if prop is not None and not prop.give:
             limit = LONGEST_TRACK * prop.extent.max()
         else:
             slide = float(np.linalg.norm(place[first:end] - place[first], axis=1).max())

@@ -7,17 +7,20 @@ import pytest
 
 from softground_addon.core.loads.tracks import LONGEST_SLIDE, SHORTEST_SLIDE, tracks
 from softground_addon.core.motion.motion import LowSkin
+from softground_addon.core.soles.soles import prop_sole
+from tests.core.prop_bodies import sphere
 from tests.core.walkers import box_sole, loads_of, pose
 
 HEIGHT = 1.8
 
 
-def sliding(distance, heading, seconds=1.0):
+def sliding(distance, heading, seconds=1.0, sole=None):
     """A foot of a body of 1.8 m that slides for a while."""
+    sole = sole or box_sole(0.3, 0.1)
     count = round(seconds * 120) + 1
     path = np.linspace(0, distance, count)[:, None] * (np.cos(heading), np.sin(heading), 0.0)
     one = np.ones((count, 1), dtype=bool)
-    loads = loads_of([box_sole(0.3, 0.1)], [pose(path, heading)[:, None]], 100.0 * one, one, 30.0)
+    loads = loads_of([sole], [pose(path, heading)[:, None]], 100.0 * one, one, 30.0)
     up = np.ones((count, 1, 3))
     skin = LowSkin(loads.motion.frames, up, up[..., 0], 0.3, HEIGHT)
     return replace(loads, motion=replace(loads.motion, skin=skin))
@@ -35,3 +38,9 @@ def test_a_foot_that_slides_prints_as_often_whichever_way_it_goes(slides, prints
 def test_a_foot_that_slides_fast_prints_no_shorter_than_it_may():
     pieces = list(tracks(sliding(3.0, 0.5, seconds=0.3), 0))
     assert len(pieces) == int(0.3 / SHORTEST_SLIDE)
+
+
+@pytest.mark.parametrize(("give", "prints"), [(0.04, 3), (0.0, 1)], ids=["limb", "ball"])
+def test_a_limb_that_slides_prints_as_a_foot_does_and_what_rolls_one_track(give, prints):
+    ball = prop_sole(*sphere(0.1), name="ball", give=give)
+    assert len(list(tracks(sliding(2.5 * LONGEST_SLIDE * HEIGHT, 0.0, sole=ball), 0))) == prints
