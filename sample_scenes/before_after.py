@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from sample_scenes import firs, open_air, production, stage
-from sample_scenes.character import crease_trousers
+from sample_scenes import firs, open_air, outfit, production, stage
+from sample_scenes.body import Body
 from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
@@ -70,7 +70,9 @@ def shoot(_built: BeforeAfter, folder: Path, samples: int) -> list[Path]:
     spots = np.column_stack([-chance.uniform(26.0, 110.0, FIRS), chance.normal(14.0, 45.0, FIRS)])
     firs.add_firs(spots, chance.uniform(5.0, 12.0, FIRS), HEIGHT, firs.WINTRY, snow=0.7)
     scene.frame_set(SHOWN)
-    crease_trousers(bpy.data.objects["Hiker"])
+    hiker = bpy.data.objects["Hiker"]
+    outfit.wear_boots(hiker, Body())
+    outfit.wear_creased(hiker, Body())
     pictures = []
     for name, strength in (("before", 0.0), ("after", 1.0)):
         scene.softground.characters[0].response_strength = strength

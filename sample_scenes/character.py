@@ -14,7 +14,6 @@ from sample_scenes.dog_figure import hound
 from sample_scenes.figure import PARTS, hiker
 from sample_scenes.motion import Skeleton
 from sample_scenes.stage import plain_material
-from softground_addon.blender.shader_graph import Graph
 
 TO_BLENDER = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 """Rotation from the body's frame (x forward) to Blender's custom (-Y forward, .L on +X)."""
@@ -64,7 +63,7 @@ def create_character(
     skin = bpy.data.objects.new(mesh.name, mesh)
     collection.objects.link(skin)
     skin.parent = armature
-    _assign_weights(skin, list(body.bones), figure.weights)
+    assign_weights(skin, list(body.bones), figure.weights)
     skin.modifiers.new("Armature", "ARMATURE").object = armature
     return armature
 
@@ -111,7 +110,7 @@ def _meshes(armature: bpy.types.Object) -> Iterable[bpy.types.Object]:
     return [child for child in armature.children if child.type == "MESH"]
 
 
-def _assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.ndarray) -> None:
+def assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.ndarray) -> None:
     """Write the weights (V, B), small ones dropped. Blender's call for it takes a hundred times longer than BMesh."""
     for bone in bones:
         skin.vertex_groups.new(name=bone)
@@ -130,36 +129,3 @@ def _assign_weights(skin: bpy.types.Object, bones: Sequence[str], weights: np.nd
 
 def _material(part: str) -> bpy.types.Material:
     return plain_material(f"SoftGround Sample {part}", *_LOOKS[part])
-
-
-def crease_trousers(armature: bpy.types.Object) -> None:
-    """Folds and a weave in the trousers of a person who is seen from near."""
-    figure = next(iter(_meshes(armature)))
-    slot = next(slot for slot in figure.material_slots if "trousers" in slot.material.name)
-    slot.link, slot.material = "OBJECT", _cloth(figure.data)
-
-
-_FOLD = 0.055
-"""Height of folds over that of the noise that makes them [m]."""
-
-
-def _cloth(mesh: bpy.types.Mesh) -> bpy.types.Material:
-    """Woven cloth, in folds that run more around a limb than along it, by the place in the resting figure."""
-    colour, roughness = _LOOKS["trousers"]
-    material = plain_material("SoftGround Sample cloth", colour, roughness)
-    material.displacement_method = "BOTH"
-    graph = Graph(material.node_tree)
-    corners = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", corners.ravel())
-    place = graph.out(graph.node("ShaderNodeTexCoord"))  # from 0 to 1 within the mesh's box
-    place = graph.out(graph.node("ShaderNodeVectorMath", {0: place, 1: np.ptp(corners, axis=0)}, operation="MULTIPLY"))
-    wide = graph.out(graph.node("ShaderNodeVectorMath", {0: place, 1: (0.7, 0.7, 1.6)}, operation="MULTIPLY"))
-    folds = graph.math("ABSOLUTE", graph.noise(wide, 0.10, 2.0) + -0.5, 0.0)
-    weave = graph.noise(place, 0.002, 2.0, 0.8)
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shade = graph.mix(weave, tuple(0.5 * part for part in colour), tuple(1.5 * part for part in colour))
-    material.node_tree.links.new(shade.output, shader.inputs["Base Color"])
-    height = folds * _FOLD + weave * 0.0006
-    moved = graph.node("ShaderNodeDisplacement", {"Height": height, "Midlevel": 0.0, "Scale": 1.0})
-    material.node_tree.links.new(moved.outputs[0], material.node_tree.get_output_node("ALL").inputs["Displacement"])
-    return material

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage
+from sample_scenes import open_air, outfit, production, stage
 from sample_scenes.body import Body
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.run import Run, run
@@ -20,8 +20,10 @@ CELL_SIZE: float | None = None
 PRESET = "Dry Sand"
 SPEED = 4.2  # m/s
 FRAMES = 76
-START = 9.5  # m along y; the run is toward -y, and toward the camera
-STEP, AFTER = -3, 3.0  # the step that is seen, and frames from its strike to the picture
+START = 9.5  # m along y; the run is toward -y
+STEP, AFTER = -3, 4.3  # the step that is seen, and frames from its strike to the picture
+SHUTTER = 0.06
+"""Frames that the picture is exposed for."""
 PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.35, hills=9.0, seed=11)
 
@@ -34,10 +36,10 @@ class DuneRunner:
 
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> DuneRunner:
-    """A wide ground, and a run toward the camera."""
+    """A wide ground, and a run away from the camera."""
     ground = open_air.add_ground(scene, "Dunes", (-7.0, START + 3.0), HEIGHT, "sand")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.15, -4.9, 0.42), (-0.05, -1.2, 0.62), 35.0, (0.0, -1.6, 0.3), 5.6)
+    open_air.add_camera(scene, (0.52, 0.18, 0.22), (-0.04, -0.66, 0.125), 34.0, (-0.04, -0.56, 0.0), 9.0)
     motion = run(Body(), Run(speed=SPEED), FRAMES, scene.render.fps)
     return DuneRunner({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options, motion)})
 
@@ -53,13 +55,16 @@ def claims(built: DuneRunner) -> list[Claim]:
 
 
 def shoot(built: DuneRunner, folder: Path, samples: int) -> list[Path]:
-    """From where a photographer would lie in the sand, just after a strike, with the sun behind the runner."""
+    """From where a photographer would lie in the sand, as the heel lifts, with the sun ahead."""
     scene = bpy.context.scene
-    step = built.bakes[PRESET].footprints[STEP]
+    step, runner = built.bakes[PRESET].footprints[STEP], bpy.data.objects["Hiker"]
+    outfit.wear_boots(runner, Body())
+    outfit.wear_creased(runner, Body())
     stage.go_to(scene, step.start_frame + AFTER)
-    stage.aim(scene.camera, step.position + np.array((0.60, -1.22, 0.28)), step.position + np.array((0.08, 0.2, 0.165)))
-    open_air.add_low_sun(scene, radians(-72), radians(12), (1.0, 0.76, 0.52), 6.5, 0.36)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.35, 85
+    stage.aim(scene.camera, step.position + np.array((0.56, 0.74, 0.22)), step.position + np.array((0, -0.1, 0.125)))
+    open_air.add_low_sun(scene, radians(44), radians(10), (1.0, 0.74, 0.52), 8.0, 0.26, (radians(9.0), 1.6))
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, SHUTTER
+    scene.view_settings.exposure, scene.render.image_settings.quality = -0.05, 85
     path = folder / "dune_runner.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]

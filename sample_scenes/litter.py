@@ -242,8 +242,8 @@ def _twig(chance: np.random.Generator, look: bpy.types.Material) -> bpy.types.Me
     return mesh_of("Twig", *tubes(lines), look)
 
 
-def tubes(lines: Sequence[tuple[Array, float]], around: int = 6) -> tuple[Array, Array]:
-    """Vertices and quads of tubes along lines (N, 3), each as thick as said at its start and a third at its end [m]."""
+def tubes(lines: Sequence[tuple[Array, float]], around: int = 6, taper: float = 0.35) -> tuple[Array, Array]:
+    """Vertices and quads of tubes on lines (N, 3), with a radius at their start [m] and `taper` times it at the end."""
     vertices, faces, first = [], [], 0
     for line, radius in lines:
         ahead = np.gradient(line, axis=0)
@@ -252,7 +252,7 @@ def tubes(lines: Sequence[tuple[Array, float]], around: int = 6) -> tuple[Array,
         aside /= np.linalg.norm(aside, axis=1, keepdims=True)
         turn = 2 * pi * np.arange(around) / around
         ring = np.cos(turn)[:, None] * aside[:, None] + np.sin(turn)[:, None] * np.cross(aside, ahead)[:, None]
-        thick = radius * np.linspace(1.0, 0.35, len(line))[:, None, None]
+        thick = radius * np.linspace(1.0, taper, len(line))[:, None, None]
         vertices.append((line[:, None] + thick * ring).reshape(-1, 3))
         row, column = np.meshgrid(np.arange(len(line) - 1), np.arange(around), indexing="ij")
         ahead_of = (column + 1) % around

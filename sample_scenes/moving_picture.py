@@ -31,7 +31,7 @@ SHOWN = range(8, FRAMES - 3, 2)
 LAST_HOLD = 1200
 """How long the last frame stays before the picture begins again [ms]."""
 
-PICTURE = (480, 270)
+PICTURE = (960, 540)
 LARGEST = 3_000_000
 """More than this a README should not make its readers load [bytes]."""
 

@@ -1,4 +1,4 @@
-"""A run in powder against the sun; also small, with what the steps throw and without."""
+"""A run in powder at evening: a boot leaves its print; also a strike, small, with what it throws and without."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import firs, open_air, production, stage
+from sample_scenes import firs, open_air, outfit, production, stage
 from sample_scenes.body import Body
-from sample_scenes.character import crease_trousers
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.run import Run, run
 from softground_addon.blender.after import debris_object
@@ -24,14 +23,19 @@ POWDER = {"material.youngs_modulus": "1.5e5"}
 """A runner sinks in to the ankles [Pa]."""
 SPEED = 4.2  # m/s
 FRAMES = 76
-START = 9.5  # m along y; the run is toward -y, and toward the camera
-STEP, AFTER = -3, 3.0  # the step that is seen, and frames from its strike to the picture
+START = 9.5  # m along y; the run is toward -y
+STEP = -3  # the step that is seen
+STRIKE, LEAVE = 2.5, 6.1  # frames from its strike to the pictures
 PICTURE = (1920, 1080)
 PAIR = (960, 540)
-FIRS = 170
+FIRS = 150
+SHUTTER = 0.06
+"""Frames that a picture is exposed for."""
 BOUNCES = 8
 """Of light, from one piece of snow to the next."""
 HEIGHT = open_air.rolling(swell=0.2, hills=14.0, seed=11)
+Place = tuple[float, float, float]
+"""Beside the step [m]."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,10 @@ class PowderRunner:
 
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PowderRunner:
-    """A snow field, and a run toward the camera."""
+    """A snow field, and a run away from the camera."""
     ground = open_air.add_ground(scene, "Powder", (-7.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.56, -1.65, 0.10), (0.04, -0.5, 0.17), 40.0, (0.0, -0.5, 0.1), 6.3)
+    open_air.add_camera(scene, (0.54, 0.24, 0.32), (-0.04, -0.72, 0.115), 34.0, (0.0, -0.5, 0.0), 9.0)
     motion = run(Body(), Run(speed=SPEED), FRAMES, scene.render.fps)
     chosen = POWDER | dict(options or {})
     return PowderRunner({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, motion)})
@@ -63,29 +67,39 @@ def claims(built: PowderRunner) -> list[Claim]:
 
 
 def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
-    """From just above the snow, against the sun; then small, with debris and without, above each other."""
+    """From behind, as a boot leaves the snow; then its strike from ahead, with debris and without, above each other."""
     scene = bpy.context.scene
     bake = built.bakes[PRESET]
-    step = bake.footprints[STEP]
-    crease_trousers(bpy.data.objects["Hiker"])
-    stage.go_to(scene, step.start_frame + AFTER)
-    stage.aim(scene.camera, step.position + np.array((0.60, -1.10, 0.10)), step.position + np.array((0.08, 0.05, 0.17)))
-    open_air.add_low_sun(scene, radians(-58), radians(8), (1.0, 0.74, 0.52), 8.0, 0.13, open_air.PALE_DUSK)
+    step, hiker = bake.footprints[STEP], bpy.data.objects["Hiker"]
+    outfit.wear_boots(hiker, Body())
+    outfit.wear_creased(hiker, Body())
     chance = np.random.default_rng(5)
-    spots = np.column_stack([chance.normal(-10.0, 40.0, FIRS), chance.uniform(28.0, 120.0, FIRS)])
+    away = chance.uniform(26.0, 130.0, 2 * FIRS) * np.repeat((-1.0, 1.0), FIRS)  # seen from either side
+    spots = np.column_stack([chance.normal(-10.0, 45.0, 2 * FIRS), away])
     spots = spots[np.abs(spots[:, 0]) > 5.0]
-    firs.add_firs(spots, chance.uniform(5.0, 12.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.7)
+    firs.add_firs(spots, chance.uniform(3.0, 13.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.7)
     scene.cycles.max_bounces = scene.cycles.transmission_bounces = BOUNCES
     scene.view_settings.exposure = 0.25
-    hero = folder / "powder_runner.jpg"
-    stage.render(scene, scene.camera, hero, PICTURE, samples)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, SHUTTER
+    light = {"elevation": radians(10), "colour": (1.0, 0.74, 0.52), "sun": 8.0, "of_sky": open_air.PALE_DUSK}
+
+    def take(after: float, eye: Place, target: Place, path: Path, size: tuple[int, int]) -> Path:
+        stage.go_to(scene, step.start_frame + after)
+        stage.aim(scene.camera, step.position + np.array(eye), step.position + np.array(target))
+        scene.camera.data.dof.focus_distance = float(np.linalg.norm(eye))
+        stage.render(scene, scene.camera, path, size, samples)
+        return path
+
+    open_air.add_low_sun(scene, radians(22), sky=0.2, **light)
+    hero = take(LEAVE, (0.58, 0.79, 0.32), (0.0, -0.17, 0.115), folder / "powder_runner.jpg", PICTURE)
+    open_air.add_low_sun(scene, radians(-150), sky=0.3, **light)
     debris = debris_object.of(bake.ground)
     assert debris is not None
     pair = []
     for name, hidden in (("with", False), ("without", True)):
         debris.hide_render = hidden
-        pair.append(folder / f"powder_runner_{name}.png")
-        stage.render(scene, scene.camera, pair[-1], PAIR, samples)
+        path = folder / f"powder_runner_{name}.png"
+        pair.append(take(STRIKE, (0.84, -0.47, 0.16), (0.01, 0.13, 0.15), path, PAIR))
     debris.hide_render = False
     return [hero, *pair, stage.contact_sheet(pair, 1, folder / "debris.jpg")]
 

@@ -60,17 +60,8 @@ def shoe_mesh(foot: Foot) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
     bevel = 0.004 * np.clip(1 - edge / 0.005, 0.0, 1.0) ** 2
     bottom_z = spring + bevel + _tread(foot, bottom_x, bottom_y, edge)
 
-    top = _upper_height(foot, x)[:, None]
-    wall = np.maximum(np.full_like(top, _SOLE_THICKNESS), spring + 0.012)
-    top = np.maximum(top, wall + 0.006)
-    angle = np.pi * over
-    middle, half = ((inner + outer) / 2)[:, None], ((inner - outer) / 2)[:, None]
-    lean = 0.12 * half * np.sin(angle) * (x[:, None] > 0)  # the instep is highest on the inner side
-    squareness = 0.72
-    over_y = middle + lean + 0.93 * half * np.sign(np.cos(angle)) * np.abs(np.cos(angle)) ** squareness
-    narrowing = 1 - 0.30 * np.clip((top - 0.05) / 0.07, 0, 1) * np.sin(angle) ** 2
-    over_y = middle + (over_y - middle) * narrowing
-    over_z = wall + (top - wall) * np.sin(angle) ** squareness
+    over_y, over_z = upper(foot, x[:, None], over)
+    wall = _wall(foot, x)[:, None]
     welt_in = np.concatenate([inner[:, None], wall], axis=1)
     welt_out = np.concatenate([outer[:, None], wall], axis=1)
 
@@ -91,6 +82,28 @@ def shoe_mesh(foot: Foot) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
     tip = np.stack([(n - 1) * m + (column + 1) % m, (n - 1) * m + column, *[np.full(m, n * m + 1)] * 2], axis=-1)
     parts = np.concatenate([is_sole.ravel(), *[(column <= _ACROSS) | (column == m - 1)] * 2]).astype(int)
     return vertices, np.concatenate([quads.reshape(-1, 4), heel, tip]), parts
+
+
+def upper(foot: Foot, x: Array, over: Array) -> tuple[Array, Array]:
+    """Across and height of the upper at stations x, `over` it from the inner welt (0) to the outer (1) [m].
+
+    Both broadcast against each other.
+    """
+    inner, outer = outline_width(foot, x)
+    wall = _wall(foot, x)
+    top = np.maximum(_upper_height(foot, x), wall + 0.006)
+    angle = np.pi * over
+    middle, half = (inner + outer) / 2, (inner - outer) / 2
+    lean = 0.12 * half * np.sin(angle) * (x > 0)  # the instep is highest on the inner side
+    squareness = 0.72
+    y = middle + lean + 0.93 * half * np.sign(np.cos(angle)) * np.abs(np.cos(angle)) ** squareness
+    narrowing = 1 - 0.30 * np.clip((top - 0.05) / 0.07, 0, 1) * np.sin(angle) ** 2
+    return middle + (y - middle) * narrowing, wall + (top - wall) * np.sin(angle) ** squareness
+
+
+def _wall(foot: Foot, x: Array) -> Array:
+    """Height at which the upper begins."""
+    return np.maximum(_SOLE_THICKNESS, _spring(foot, x) + 0.012)
 
 
 def _spring(foot: Foot, x: Array) -> Array:

@@ -9,7 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import firs, open_air, production, stage
+from sample_scenes import firs, open_air, outfit, production, stage
+from sample_scenes.body import Body
 from sample_scenes.production import Bake, Claim, Options
 
 CELL_SIZE: float | None = None
@@ -59,6 +60,9 @@ def shoot(_built: SnowAtDusk, folder: Path, samples: int) -> list[Path]:
     unseen = np.column_stack([chance.uniform(-60.0, -16.0, 9), chance.uniform(-26.0, -2.0, 9)])
     spots = np.concatenate([spots, unseen])  # which throw shadows into the picture
     firs.add_firs(spots, chance.uniform(4.0, 11.0, len(spots)), HEIGHT, firs.WINTRY, snow=0.7)
+    hiker = bpy.data.objects["Hiker"]
+    outfit.wear_creased(hiker, Body())
+    outfit.wear_rucksack(hiker, Body())
     open_air.add_snowfall(scene.camera, FLAKES, PICTURE[0] / PICTURE[1])
     scene.view_settings.exposure = 0.9
     path = folder / "snow_at_dusk.jpg"

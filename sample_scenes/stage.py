@@ -49,7 +49,12 @@ def set_up_rendering(scene: bpy.types.Scene) -> None:
 
 
 def add_sun(scene: bpy.types.Scene, toward: float, elevation: float = SUN_ELEVATION) -> None:
-    """A low warm sun with its sky. `toward` is the direction in the plane in which the light travels [rad]."""
+    """A low warm sun with its sky, in place of an earlier one.
+
+    `toward` is the direction in the plane in which the light travels [rad].
+    """
+    for earlier in [lamp for lamp in bpy.data.lights if lamp.type == "SUN"]:
+        bpy.data.lights.remove(earlier)  # and the object with it
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.color, light.angle = _SUN_STRENGTH, (1.0, 0.86, 0.70), radians(1.0)
     sun = bpy.data.objects.new("Sun", light)
@@ -195,6 +200,16 @@ def freeze(armature: bpy.types.Object, frames: Iterable[int], collection: bpy.ty
             copies.append(copy)
     hide(armature)
     return copies
+
+
+def mark_still(thing: bpy.types.Object) -> None:
+    """Let `put_back` remove a thing that is in pictures only."""
+    thing[_STILL] = True
+
+
+def figure_of(armature: bpy.types.Object) -> bpy.types.Object:
+    """The mesh of a character."""
+    return next(child for child in armature.children if child.type == "MESH" and _STILL not in child)
 
 
 def hide(armature: bpy.types.Object) -> None:
