@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from PIL import Image
 
-from sample_scenes import production, stage
+from sample_scenes import open_air, outfit, production, stage
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
@@ -27,6 +27,10 @@ PRESET = "Snow"
 FRAMES = 66
 SHOWN = range(8, FRAMES - 3, 2)
 """Every second frame: 12 a second."""
+
+EYE, TARGET = (0.66, 2.05, 0.62), (-0.02, 1.22, 0.03)
+"""Of the camera in the first frame [m]."""
+PACE = 0.0496  # m a frame: the camera goes with the walker
 
 LAST_HOLD = 1200
 """How long the last frame stays before the picture begins again [ms]."""
@@ -44,17 +48,20 @@ class MovingPicture:
 
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> MovingPicture:
-    """A walk away from the camera, which is there first: the ground reaches as far as it sees."""
+    """A walk, with the camera behind: the ground reaches as far as that sees."""
     body = Body()
     walker = create_character("Hiker", body, scene.collection)
     walker.location = (0.0, 1.0, 0.0)
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
     scene.frame_start, scene.frame_end = 1, FRAMES
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    scene.camera = stage.add_camera(scene, "Behind the Boots", lens=27.0)
-    stage.aim(scene.camera, (0.85, 0.50, 0.92), (-0.06, -0.64, 0.02))
-    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "400000"}
-    chosen |= {"sink_feet": "true", "ground_margin": "3.0"} | dict(options or {})
+    scene.camera = stage.add_camera(scene, "Behind the Boots", lens=28.0)
+    stage.aim(scene.camera, EYE, TARGET)
+    for frame in range(1, FRAMES + 1):  # relief is fine along its way
+        scene.camera.location.y = EYE[1] - PACE * (frame - 1)
+        scene.camera.keyframe_insert("location", index=1, frame=frame)
+    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "800000"}
+    chosen |= {"sink_feet": "true", "ground_margin": "5.0"} | dict(options or {})
     bake = production.bake(scene, [Walker(walker, body.mass)], PRESET, cell_size, options=chosen)
     return MovingPicture({PRESET: bake})
 
@@ -70,9 +77,11 @@ def claims(built: MovingPicture) -> list[Claim]:
 
 def shoot(_built: MovingPicture, folder: Path, samples: int) -> list[Path]:
     """The frames, and the picture that they make."""
-    scene = bpy.context.scene
-    stage.add_sun(scene, radians(30), radians(15))
-    scene.view_settings.exposure = -0.6
+    scene, hiker = bpy.context.scene, bpy.data.objects["Hiker"]
+    outfit.wear_boots(hiker, Body())
+    outfit.wear_creased(hiker, Body())
+    open_air.add_low_sun(scene, radians(160), radians(11), (1.0, 0.78, 0.58), 7.5, 0.2, open_air.PALE_DUSK)
+    scene.view_settings.exposure = 0.1
     frames = [folder / f"moving_picture_{frame:03d}.png" for frame in SHOWN]
     for frame, path in zip(SHOWN, frames, strict=True):
         scene.frame_set(frame)
