@@ -11,9 +11,9 @@ import numpy as np
 
 from sample_scenes import stage, terrain
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Colour, Graph
+from softground_addon.blender.shader_graph import Colour, Graph, Socket
 
-_SHAPES, _WHORLS, _BRANCHES, _TWIGS, _SIDES = 4, 21, 9, 12, 14
+_SHAPES, _WHORLS, _BRANCHES, _TWIGS, _SIDES = 4, 21, 9, 12, 40
 """How many trees are unlike, whorls of each, branches of a whorl, pairs of twigs on a branch, sides of a trunk."""
 _UP = np.array((0.0, 0.0, 1.0))
 
@@ -142,13 +142,22 @@ def _sprays(branches: _Branches, chance: np.random.Generator) -> tuple[Array, Ar
 
 def _wood(branches: _Branches) -> Array:
     """A trunk and the wood of branches as quads (Q, 4, 3)."""
-    around = np.linspace(0.0, 2 * pi, _SIDES, endpoint=False)
-    stem = 0.011 * np.column_stack([np.cos(around), np.sin(around), np.zeros(_SIDES)])
-    trunk = np.stack([stem, np.roll(stem, -1, axis=0), *[np.tile(_UP, (_SIDES, 1))] * 2], axis=1)
     boughs = branches.places(np.tile(np.linspace(0.0, 0.9, 5), (len(branches.level), 1)))
     thick = 0.006 * (1.0 - branches.level)[:, None, None] * _UP
     wood = np.stack([boughs[:, :-1], boughs[:, 1:], boughs[:, 1:] + 0.5 * thick, boughs[:, :-1] + thick], axis=2)
-    return np.concatenate([trunk, wood.reshape(-1, 4, 3)])
+    return np.concatenate([_trunk(), wood.reshape(-1, 4, 3)])
+
+
+def _trunk() -> Array:
+    """A stem that thins toward the tip, and widens to roots at the ground, as quads (Q, 4, 3)."""
+    turn = np.linspace(0.0, 2 * pi, _SIDES + 1)
+    level = np.concatenate([np.linspace(0.0, 0.05, 9), np.linspace(0.07, 0.4, 12), [0.6, 0.8, 1.0]])[:, None]
+    lobes = 1.0 + 0.45 * np.sin(5 * turn + 0.8 * np.sin(2 * turn)) + 0.3 * np.sin(3 * turn + 1.0)
+    uneven = 0.03 * np.sin(2 * turn + 40.0 * level) + 0.02 * np.sin(5 * turn - 90.0 * level)
+    radius = 0.0115 * (1.0 - level) * (1.0 + uneven + 0.75 * lobes * np.exp(-level / 0.012))
+    rings = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.broadcast_to(level, radius.shape)], axis=-1)
+    quads = [rings[:-1, :-1], rings[:-1, 1:], rings[1:, 1:], rings[1:, :-1]]
+    return np.stack(quads, axis=2).reshape(-1, 4, 3)
 
 
 def _pads(branches: _Branches, chance: np.random.Generator) -> Array:
@@ -178,20 +187,33 @@ def _needles(colour: Colour) -> bpy.types.Material:
 
 
 def _bark() -> bpy.types.Material:
-    """Scales of bark that are longer than wide, with dark cracks between them."""
+    """Long plates of bark between furrows that part and meet again, cracked across, with lichen and moss."""
     material = stage.plain_material("SoftGround Sample bark", (0.085, 0.058, 0.042), 0.9)
     graph = Graph(material.node_tree)
-    place = graph.node(
-        "ShaderNodeVectorMath",
-        {0: graph.out(graph.node("ShaderNodeNewGeometry")), 1: (1.0, 1.0, 0.35)},
-        operation="MULTIPLY",
-    )
-    scales = graph.node("ShaderNodeTexVoronoi", {"Vector": graph.out(place), "Scale": 22.0}, feature="DISTANCE_TO_EDGE")
-    crack = graph.ramp(graph.out(scales) + graph.noise(graph.out(place), 0.03, 4.0, 0.7) * 0.25, 0.10, 0.35)
-    tone = graph.noise(graph.out(place), 0.12, 3.0, 0.6)
-    colour = graph.mix(crack, (0.020, 0.014, 0.011), graph.mix(tone, (0.065, 0.044, 0.032), (0.17, 0.125, 0.095)))
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+
+    def along(share: float) -> Socket:
+        """The place, stretched along the stem."""
+        return graph.out(graph.node("ShaderNodeVectorMath", {0: place, 1: (1.0, 1.0, share)}, operation="MULTIPLY"))
+
+    def furrow(size: float, share: float, width: float) -> Socket:
+        """From 0 in a furrow to 1 on a plate."""
+        middle = graph.math("ABSOLUTE", graph.noise(along(share), size, 3.0, 0.55) + -0.5, 0.0)
+        return graph.ramp(middle, 0.0, width)
+
+    deep, fine = furrow(0.05, 0.12, 0.085), furrow(0.022, 0.16, 0.11)
+    across = graph.ramp(furrow(0.055, 1.1, 0.035), 0.0, 1.0, 0.55, 1.0)
+    plate = graph.math("MULTIPLY", deep * across, graph.ramp(fine, 0.0, 1.0, 0.55, 1.0))
+    grain = graph.noise(along(0.35), 0.008, 3.0, 0.7)
+    tone = graph.noise(along(0.4), 0.14, 3.0, 0.6)
+    colour = graph.mix(graph.ramp(tone, 0.3, 0.7), (0.060, 0.041, 0.030), (0.150, 0.112, 0.086))
+    colour = graph.mix(grain * 0.5, colour, (0.040, 0.028, 0.021))
+    colour = graph.mix(plate, (0.014, 0.010, 0.008), colour)
+    lichen = graph.ramp(graph.noise(place, 0.06, 4.0, 0.7), 0.58, 0.66) * plate
+    colour = graph.mix(lichen * 0.55, colour, (0.17, 0.18, 0.135))
+    relief = plate + grain * 0.25
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    bump = graph.node("ShaderNodeBump", {"Height": crack, "Distance": 0.02})
+    bump = graph.node("ShaderNodeBump", {"Height": relief, "Distance": 0.03})
     material.node_tree.links.new(colour.output, shader.inputs["Base Color"])
     material.node_tree.links.new(bump.outputs[0], shader.inputs["Normal"])
     return material

@@ -193,9 +193,11 @@ STRAW = (0.20, 0.135, 0.07), (0.40, 0.30, 0.17)
 """Dark and light colour of dead grass."""
 
 
-def blades(tufts: Sequence[bpy.types.Mesh], dark: Colour, light: Colour) -> Sequence[bpy.types.Mesh]:
-    """Tufts of grass, now of other colours and soiled where a foot has pressed them."""
-    look = material("blades", dark, light, 0.6, through=0.3)
+def blades(
+    tufts: Sequence[bpy.types.Mesh], dark: Colour, light: Colour, name: str = "blades"
+) -> Sequence[bpy.types.Mesh]:
+    """Tufts of grass, now of other colours and soiled where a foot has pressed them; a material for each name."""
+    look = material(name, dark, light, 0.6, through=0.3)
     for tuft in tufts:
         tuft.materials.clear()
         tuft.materials.append(look)
@@ -301,3 +303,23 @@ def _stone(chance: np.random.Generator, look: bpy.types.Material, rough: float) 
     corners = corners * (1.0 + rough * chance.uniform(-0.35, 0.35, (len(corners), 1)))
     corners = 0.5 * corners * (1.0, chance.uniform(0.65, 1.0), chance.uniform(0.55, 0.8))
     return mesh_of("Stone", corners, faces, look)
+
+
+def clods(dark: Colour, light: Colour, count: int = 6) -> bpy.types.Collection:
+    """Lumps of broken earth of diameter about 1, for the foreground: faces where they broke, grains all over."""
+    look = material("clod", dark, light, 0.95)
+    return pieces_of("Clods", [_clod(np.random.default_rng(number), look) for number in range(count)])
+
+
+def _clod(chance: np.random.Generator, look: bpy.types.Material) -> bpy.types.Mesh:
+    corners, faces = stage.ball(5)
+    plane = chance.normal(size=(7, 3))
+    plane /= np.linalg.norm(plane, axis=1, keepdims=True)
+    over = np.clip(corners @ plane.T - chance.uniform(0.35, 0.75, 7), 0.0, None)
+    rough = np.zeros(len(corners))
+    for wave in (2.5, 5.0, 9.0, 17.0):
+        way = wave * chance.normal(size=(6, 3))
+        rough += 0.55 / wave * np.sin(corners @ way.T + chance.uniform(0, 2 * pi, 6)).sum(axis=1) / 2.4
+    corners = (corners - 0.9 * over @ plane) * (1.0 + rough + chance.normal(0.0, 0.012, len(corners)))[:, None]
+    corners = 0.55 * corners * (1.0, chance.uniform(0.6, 1.0), chance.uniform(0.5, 0.8))
+    return mesh_of("Clod", corners, faces, look, smooth=False)

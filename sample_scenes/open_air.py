@@ -19,21 +19,22 @@ from sample_scenes.keys import write_action
 from sample_scenes.motion import BodyMotion
 from sample_scenes.production import Bake, Options, Walker
 from sample_scenes.stage import Array
-from softground_addon.blender.shader_graph import Graph, Socket
+from softground_addon.blender.shader_graph import Colour, Graph, Socket
 
 NEAR, FAR = 9.0, 600.0
 """Half the width of the ground that is even, and of all of it [m]."""
 
-_SPACING, _GROWTH = 0.15, 1.055  # m between vertices of the even part, and how much wider each further row is
+SPACING, _GROWTH = 0.15, 1.055
+"""Between vertices of the even part [m], and how much wider each further row is."""
 
 _CORRIDOR = 1.2  # m to either side of the way, as level as the walk is animated for
 
 
-def places(low: float, high: float) -> Array:
-    """Places along one axis, close together from low to high and ever wider apart to the horizon [m]."""
-    beyond = _SPACING * np.cumsum(_GROWTH ** np.arange(1, 120))
+def places(low: float, high: float, spacing: float = SPACING) -> Array:
+    """Places along one axis, `spacing` apart from low to high and ever wider apart to the horizon [m]."""
+    beyond = spacing * np.cumsum(_GROWTH ** np.arange(1, 140))
     beyond = beyond[beyond < FAR]
-    even = terrain.spaced(low, high, _SPACING)
+    even = terrain.spaced(low, high, spacing)
     return np.concatenate([even[0] - beyond[::-1], even, even[-1] + beyond])
 
 
@@ -66,6 +67,16 @@ def rolling(swell: float, hills: float, seed: int = 0) -> terrain.Field:
     return height
 
 
+def waves(x: Array, y: Array, size: float, seed: int) -> Array:
+    """Irregular waves about 0, mostly within 1, of about a length `size` [m]."""
+    chance = np.random.default_rng(seed)
+    total = np.zeros(np.broadcast(x, y).shape)
+    for _ in range(7):
+        way, length = chance.uniform(0, 2 * pi), size * chance.uniform(0.7, 1.6)
+        total += np.sin((x * np.cos(way) + y * np.sin(way)) * 2 * pi / length + chance.uniform(0, 2 * pi))
+    return total / 2.6
+
+
 def add_ground(
     scene: bpy.types.Scene,
     name: str,
@@ -73,9 +84,11 @@ def add_ground(
     height: terrain.Field,
     surface: str,
     painted: Mapping[str, terrain.Field] | None = None,
+    spacing: float = SPACING,
 ) -> bpy.types.Object:
-    """Ground to the horizon, even around the way and from one y to another `along` it [m]."""
-    return terrain.add_terrain(name, places(-NEAR, NEAR), places(*along), height, surface, scene.collection, painted)
+    """Ground to the horizon, with vertices `spacing` apart around the way and from one y to another `along` it [m]."""
+    x, y = places(-NEAR, NEAR, spacing), places(*along, spacing)
+    return terrain.add_terrain(name, x, y, height, surface, scene.collection, painted)
 
 
 def bake_walk(
@@ -151,6 +164,32 @@ def darken(material: bpy.types.Material, share: Socket | float) -> list[bpy.type
         tree.links.new(colour.links[0].from_socket, darker.inputs[0])
         tree.links.new(darker.outputs[0], colour)
     return shaders
+
+
+def overgrow(material: bpy.types.Material, share: str, dark: Colour, light: Colour) -> None:
+    """Tint a ground with what grows there, as far as the attribute `share` says."""
+    tree, graph = material.node_tree, Graph(material.node_tree)
+    place = graph.out(graph.node("ShaderNodeNewGeometry"))
+    tint = graph.ramp(graph.noise(place, 0.05, 4.0, 0.7), 0.3, 0.7)
+    patches = graph.noise(place, 1.7, 3.0, 0.6) * 0.8 + -0.4
+    cover = graph.ramp(graph.attribute(share) + patches, 0.2, 0.9)
+    for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]:
+        colour = shader.inputs["Base Color"]
+        grown = graph.mix(cover, dark, graph.mix(tint, dark, light))
+        bare = next(one for one in grown.output.node.inputs if one.identifier == "A_Color")
+        tree.links.new(colour.links[0].from_socket, bare)
+        tree.links.new(grown.output, colour)
+    dull(graph, tree, graph.blend(cover, 1.0, 0.0))
+
+
+def dull(graph: Graph, tree: bpy.types.NodeTree, share: Socket | float) -> None:
+    """Leave a share of the gloss of a ground: toward a low sun it makes concrete of earth."""
+    for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]:
+        gloss = shader.inputs["Specular IOR Level"]
+        less = graph.node("ShaderNodeMath", {0: gloss.default_value, 1: share}, operation="MULTIPLY")
+        if gloss.links:
+            tree.links.new(gloss.links[0].from_socket, less.inputs[0])
+        tree.links.new(less.outputs[0], gloss)
 
 
 def add_camera(
