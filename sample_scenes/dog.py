@@ -89,13 +89,21 @@ class Dog:
         Height at the shoulder blades [m].
     mass : float
         [kg].
-    brush : float
-        How many times thicker the tail is than a shepherd's.
+    brush, tail, ears, snout, paws : float
+        How many times thicker the tail is than a shepherd's, and longer; how many times longer the ears are, thicker
+        the snout and larger the paws.
+    toes_apart : bool
+        Whether pads and toes stand out below the paws, and print one by one.
     """
 
     withers: float = 0.66
     mass: float = 35.0
     brush: float = 1.0
+    tail: float = 1.0
+    ears: float = 1.0
+    snout: float = 1.0
+    paws: float = 1.0
+    toes_apart: bool = False
 
     @property
     def bones(self) -> Bones:
@@ -110,7 +118,7 @@ class Dog:
     @property
     def paw(self) -> Paw:
         """Any of the four."""
-        return Paw(0.135 * self.withers, 0.115 * self.withers)
+        return Paw(0.135 * self.paws * self.withers, 0.115 * self.paws * self.withers)
 
     @property
     def hip_height(self) -> float:
@@ -131,8 +139,8 @@ class Dog:
             "head": (0.62, 0.0, 1.17),
             "nose": (0.95, 0.0, 1.09),
             "tail": (hip_x - 0.14, 0.0, 0.88),
-            "tail_middle": (hip_x - 0.36, 0.0, 0.68),
-            "tail_tip": (hip_x - 0.55, 0.0, 0.52),
+            "tail_middle": (hip_x - 0.14 - 0.22 * self.tail, 0.0, 0.88 - 0.20 * self.tail),
+            "tail_tip": (hip_x - 0.14 - 0.41 * self.tail, 0.0, 0.88 - 0.36 * self.tail),
         }
         for side, sign in SIDES.items():
             hind, front = 0.115 * sign, 0.125 * sign

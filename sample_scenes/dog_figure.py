@@ -39,20 +39,28 @@ def _trunk(body: Dog) -> Piece:
     head = [
         ellipsoid(skull + 0.03 * W * ahead, W * np.array((0.125, 0.105, 0.100))),
         round_cone(
-            skull + 0.08 * W * ahead - W * np.array((0, 0, 0.02)), nose - 0.025 * W * ahead, 0.080 * W, 0.052 * W
+            skull + 0.08 * W * ahead - W * np.array((0, 0, 0.02)),
+            nose - 0.025 * W * ahead,
+            0.080 * W,
+            0.052 * W * body.snout,
         ),
     ]
     for y in SIDES.values():
         base = skull + W * np.array((-0.035, 0.065 * y, 0.075))
-        head.append(round_cone(base, base + W * np.array((-0.015, 0.030 * y, 0.125)), 0.042 * W, 0.010 * W))
+        head.append(
+            round_cone(
+                base, base + W * body.ears * np.array((-0.015, 0.030 * y, 0.125)), 0.042 * W * body.ears**0.7, 0.010 * W
+            )
+        )
     tail = [
         round_cone(j["tail"] + W * np.array((0.10, 0, 0)), j["tail_middle"], 0.055 * W, 0.050 * W * body.brush),
         round_cone(j["tail_middle"], j["tail_tip"], 0.050 * W * body.brush, 0.020 * W * body.brush),
     ]
     solid = union([union(trunk, 0.06 * W), union(head, 0.04 * W), union(tail, 0.02 * W)], 0.05 * W)
     wide = 0.26 * W * max(g, 1.0)
-    low = np.array((j["tail_tip"][0] - 0.08 * W * body.brush, -wide, 0.35 * W / max(g, 1.0)))
-    high = np.array((nose[0] + 0.08 * W, wide, 1.45 * W))
+    tip = j["tail_tip"] - 0.08 * W * body.brush
+    low = np.array((tip[0], -wide, min(0.35 * W / max(g, 1.0), tip[2])))
+    high = np.array((nose[0] + 0.08 * W, wide, (1.30 + 0.15 * body.ears) * W))
     return surface(
         body, "coat", solid, low, high, 0.017 * W, tuple(bone for bone in body.bones if "." not in bone[-2:])
     )
@@ -116,13 +124,20 @@ def _paw(body: Dog, bone: str) -> Piece:
     def at(along: float, across: float, up: float) -> Array:
         return ground + np.array((along * length, across * width, up * length))
 
+    if body.toes_apart:
+        above, pad, high, toe = 0.42, (-0.14, 0.15, 0.32), 0.16, (0.16, 0.125)
+        toes = ((-0.40, 0.13), (-0.145, 0.36), (0.145, 0.36), (0.40, 0.13))
+    else:
+        above, pad, high, toe = 0.24, (-0.08, 0.24, 0.40), 0.13, (0.185, 0.150)
+        toes = ((-0.36, 0.24), (-0.13, 0.38), (0.13, 0.38), (0.36, 0.24))
     parts = [
-        round_cone(joint, at(0.05, 0, 0.24), 0.27 * length, 0.30 * length),
-        ellipsoid(at(-0.08, 0, 0.13), np.array((0.24 * length, 0.40 * width, 0.20 * length))),
+        round_cone(joint, at(0.05, 0, above), 0.27 * length, 0.30 * length),
+        ellipsoid(at(pad[0], 0, high), np.array((pad[1] * length, pad[2] * width, (high + 0.07) * length))),
     ]
-    for across, ahead in ((-0.36, 0.24), (-0.13, 0.38), (0.13, 0.38), (0.36, 0.24)):
-        parts.append(ellipsoid(at(ahead, across, 0.13), np.array((0.185 * length, 0.150 * width, 0.19 * length))))
+    for across, ahead in toes:
+        thick = np.array((toe[0] * length, toe[1] * width, (high + 0.06) * length))
+        parts.append(ellipsoid(at(ahead, across, high), thick))
     solid = cut(union(parts, 0.035 * length), ground, (0.0, 0.0, -1.0), 0.01 * length)
     reach = np.array((0.75 * length, 0.75 * width, 0.0))
     low, high = ground - reach - (0, 0, 0.05 * length), ground + reach + (0, 0, 0.85 * length)
-    return surface(body, "coat", solid, low, high, 0.045 * length, (bone,))
+    return surface(body, "coat", solid, low, high, (0.030 if body.toes_apart else 0.045) * length, (bone,))

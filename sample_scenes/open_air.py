@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import atan, pi, radians
+from math import atan, e, pi, radians
 
 import bpy
 import numpy as np
@@ -190,6 +190,35 @@ def dull(graph: Graph, tree: bpy.types.NodeTree, share: Socket | float) -> None:
         if gloss.links:
             tree.links.new(gloss.links[0].from_socket, less.inputs[0])
         tree.links.new(less.outputs[0], gloss)
+
+
+_LOW = 0.05
+"""Sine of the height over the horizon up to which haze hides most of the sky."""
+
+
+def add_haze(world: bpy.types.World, colour: Colour, distance: float) -> None:
+    """Air before all that is there now: over a distance [m], 63 % of the light becomes that of the air."""
+    for material in bpy.data.materials:
+        shown = material.node_tree.get_output_node("ALL").inputs["Surface"] if material.node_tree else None
+        if shown and shown.links:
+            graph = Graph(material.node_tree)
+            away = graph.out(graph.node("ShaderNodeCameraData"), 2) * (-1.0 / distance)
+            _mix_air(graph, shown, graph.node("ShaderNodeEmission", {"Color": (*colour, 1.0)}), away)
+            material.cycles.emission_sampling = "NONE"
+    graph = Graph(world.node_tree)
+    ray = graph.node("ShaderNodeSeparateXYZ", {0: graph.out(graph.node("ShaderNodeTexCoord"))})
+    height = graph.math("MAXIMUM", graph.out(ray, 2), 0.0) * (1.0 / _LOW)
+    hidden = graph.math("LOGARITHM", graph.math("SUBTRACT", 1.0001, graph.math("EXPONENT", height * -1.0, 0.0)), e)
+    air = graph.node("ShaderNodeBackground", {"Color": (*colour, 1.0)})
+    _mix_air(graph, world.node_tree.get_output_node("ALL").inputs["Surface"], air, hidden)
+
+
+def _mix_air(graph: Graph, shown: bpy.types.NodeSocket, air: bpy.types.Node, exponent: Socket) -> None:
+    """Leave e to the `exponent` of what is shown, and add that much air as is missing."""
+    mixed = graph.node("ShaderNodeMixShader", {0: graph.math("EXPONENT", exponent, 0.0), 1: graph.out(air)})
+    links = shown.id_data.links
+    links.new(shown.links[0].from_socket, mixed.inputs[2])
+    links.new(mixed.outputs[0], shown)
 
 
 def add_camera(
