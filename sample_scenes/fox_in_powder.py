@@ -1,4 +1,4 @@
-"""A fox trots over powder in the morning: each hind paw lands in the print of the forepaw, all in one line."""
+"""A fox trots over powder in the morning: each hind paw lands in the print of a forepaw."""
 
 from __future__ import annotations
 
@@ -28,10 +28,13 @@ POWDER = {
     "debris": "false",
     "relief": "OFF",
 }
-"""A fox sinks in to the pasterns, and no deeper."""
+"""A fox sinks in no deeper than its paws are high, so that toes and pads are to be seen; they are of its mesh."""
 
 BODY = Dog(withers=0.38, mass=7.0, brush=1.7, tail=1.6, ears=1.55, snout=0.7, paws=1.2, toes_apart=True)
-HAIRS = 60000
+HAIRS, THICKNESS = 60000, 0.0011
+"""Hairs of its fur, and their thickness [m]: finer than a pixel."""
+TAIL, EARS = -0.70, 1.30
+"""Where the tail begins, ahead of the middle, and the ears, above the ground, over the height at the withers."""
 GAIT = replace(TROT, speed=1.68, step_width=0.05, lift=0.24, crouch=0.02, neck=46.0)
 """At this speed half a stride is as long as the trunk, so that hind paws land where the forepaws were."""
 FRAMES = 93
@@ -43,7 +46,6 @@ NEAR_FIRS = np.concatenate([NEAR_FIRS, [(3.9, -6.0, 0.8), (4.5, -6.8, 1.3), (-1.
 AIR = (0.56, 0.50, 0.51), 140.0
 """Colour of the haze, and how far one sees in it [m]."""
 _SKY = (radians(10.0), 2.2)
-
 
 _WAVES = np.random.default_rng(154)
 _DRIFTS = list(zip(np.geomspace(0.8, 3.2, 7), _WAVES.normal(0.0, 0.5, 7), _WAVES.uniform(0.0, 7.0, 7), strict=True))
@@ -74,7 +76,7 @@ class FoxInPowder:
 
 
 def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options | None = None) -> FoxInPowder:
-    """A snow field, and a fox that trots away from the camera."""
+    """A snow field, and a fox that trots away from the camera and then across its view."""
     ground = open_air.add_ground(scene, "Powder", (-14.0, START + 3.0), _height, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
     open_air.add_camera(scene, (-0.03, 1.56, 0.30), (-0.31, -0.44, -0.24), 26.0, (0.05, 0.72, 0.0), 32.0)
@@ -85,20 +87,20 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
 
 
 def claims(built: FoxInPowder) -> list[Claim]:
-    """Prints as deep as the pasterns, hind paws in those of forepaws."""
+    """Prints as deep as paws are high, hind paws in those of forepaws."""
     steps = built.bakes[PRESET].footprints
     hind = np.array([step.position[:2] for step in steps if step.sole.startswith("foot")])
     fore = np.array([step.position[:2] for step in steps if step.sole.startswith("hand")])
     apart = np.linalg.norm(hind[:, None] - fore, axis=-1).min(axis=1)
     return [
-        Claim("Steps in the snow", len(steps), 35, 100),
+        Claim("Steps in the snow", len(steps), 30, 60),
         Claim("Depth of the deepest [m]", max(step.max_depth_m for step in steps), 0.03, 0.15),
         Claim("From a hind paw to the next print of a forepaw [m]", float(np.median(apart)), 0.0, 0.03),
     ]
 
 
 def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
-    """From just above the snow, with the sun low ahead."""
+    """From just above the snow, with the sun low at the left."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
     open_air.add_low_sun(scene, radians(170), radians(9.5), (1.0, 0.80, 0.60), 12.5, 0.10, _SKY)
@@ -111,7 +113,7 @@ def shoot(_built: FoxInPowder, folder: Path, samples: int) -> list[Path]:
     open_air.add_haze(scene.world, *AIR)
     figure = next(child for child in bpy.data.objects["Animal"].children if child.type == "MESH")
     coat = next(number for number, one in enumerate(figure.material_slots) if "coat" in one.material.name.lower())
-    fur.add_fur(figure, HAIRS, _lie, _coat, 0.0011, coat)
+    fur.add_fur(figure, HAIRS, _lie, _coat, THICKNESS, coat)
     scene.view_settings.exposure = 0.35
     path = folder / "fox_in_powder.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
@@ -150,10 +152,6 @@ def _coat(place: Array, normal: Array, chance: np.random.Generator) -> Array:
     colour = _mix(colour, (0.020, 0.016, 0.014), _rise(0.50, 0.38, up + blurred[1]) * (ahead > TAIL))
     colour = _mix(colour, (0.025, 0.020, 0.018), (up > EARS + 0.02 + blurred[2]) * (normal[:, 1] > -0.3))
     return _mix(colour, (0.80, 0.77, 0.72), _rise(-1.12, -1.20, ahead + blurred[2]))
-
-
-TAIL, EARS = -0.70, 1.30
-"""Where the tail begins, ahead of the middle, and the ears, above the ground, over the height at the withers."""
 
 
 def _in_body(place: Array) -> Array:
