@@ -3,42 +3,46 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import pi, radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from sample_scenes import open_air, production, stage
+from sample_scenes import litter, open_air, production, seaside, stage
 from sample_scenes.body import Body, Foot
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.stage import Array
 
-CELL_SIZE = 0.003
+CELL_SIZE = 0.002
 """Fine enough for toes [m]."""
 
 PRESET = "Wet Sand"
 PACKED = {
-    "relief": "OFF",
+    "relief": "CLOSE_UP",
+    "relief_strength": "0.16",
     "tread": "0",
+    "material.youngs_modulus": "2.6e6",
     "material.blur_sigma": "0.0015",
-    "material.poisson_ratio": "0.15",
+    "material.poisson_ratio": "0.06",
+    "material.rim_reach": "0.012",
     "debris": "false",
 }
-"""Sand that the swash has packed and smoothed keeps the toes apart and hardly rises around a foot."""
+"""Sand that the swash has packed and smoothed keeps the toes apart, and its low rim ends close to the foot."""
 
 BODY = Body(foot=Foot(0.26, 0.098, bare=True))
 FRAMES = 260
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
-EDGE, LEVEL = -1.0, -0.05  # m; where the water stands, and how high
-_SKY = (radians(13.0), 1.0)  # as high as the sun: pale gold at the horizon, where a lower one makes it mustard
+EDGE, LEVEL = -0.85, -0.05  # m; where the water stands, and how high
+SUN = (radians(24.0), radians(9.0))
+"""Where the light goes, and how high it comes from: against it sand shines, and toes cast shadows."""
 _HILLS = open_air.rolling(swell=0.10, hills=16.0, seed=8)
 
 
 def height(x: Array, y: Array) -> Array:
     """Dunes on the left, which rise the slower the farther away, and on the right a slope into the sea [m]."""
-    land = np.clip((x + 1.2) / (6.0 + 0.2 * np.abs(y)), 0.0, 1.0) ** 2
+    land = np.clip((x - 3.0) / (6.0 + 0.2 * np.abs(y)), 0.0, 1.0) ** 2
     return land * _HILLS(x, y) - 0.06 * np.clip(-0.8 - x, 0.0, 30.0)
 
 
@@ -58,7 +62,7 @@ def build(scene: bpy.types.Scene, cell_size: float = CELL_SIZE, options: Options
     """A wide beach, and a walk along the water, away from the camera."""
     ground = open_air.add_ground(scene, "Beach", (-20.0, START + 3.0), height, "wet_sand")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.30, 1.76, 0.74), (-0.24, -1.5, 0.0), 28.0, (0.0, 0.1, 0.0), 8.0)
+    open_air.add_camera(scene, (0.14, 2.06, 0.52), (-0.15, -0.06, 0.0), 28.0, (0.0, 1.0, 0.0), 14.0)
     chosen = PACKED | dict(options or {})
     bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen, body=BODY)
     return BareFeet({PRESET: bake})
@@ -73,16 +77,30 @@ def claims(built: BareFeet) -> list[Claim]:
     ]
 
 
+def _add_pebbles() -> None:
+    """Pebbles beside the track."""
+    chance = np.random.default_rng(11)
+    shapes = litter.stones((0.20, 0.15, 0.11), (0.62, 0.55, 0.47), roughness=0.35, rough=0.25).objects
+    x, y = chance.uniform(-0.8, 1.6, 220), chance.uniform(-7.0, 1.9, 220)
+    for number in np.flatnonzero(np.abs(x) > 0.17):
+        size = 0.005 + 0.006 * chance.gamma(0.8)
+        pebble = bpy.data.objects.new("Pebble", shapes[number % len(shapes)].data)
+        pebble.location = (x[number], y[number], float(height(x[number], y[number])) + 0.15 * size)
+        pebble.rotation_euler.z, pebble.scale = chance.uniform(0.0, 2.0 * pi), (size, size, size)
+        bpy.context.scene.collection.objects.link(pebble)
+
+
 def shoot(_built: BareFeet, folder: Path, samples: int) -> list[Path]:
-    """From the height of a knee, with the sun over the sea."""
+    """Low over the sand, toward the sun over the sea."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
-    open_air.add_low_sun(scene, radians(-50), radians(21), (1.0, 0.72, 0.48), 6.5, 0.11, _SKY)
+    stage.hide(bpy.data.objects["Hiker"])
+    open_air.add_low_sun(scene, *SUN, (1.0, 0.70, 0.44), 7.5, 0.11)
+    seaside.add_sky(scene, *SUN, 0.5)
+    seaside.add_film(-0.05, 1.0)
+    _add_pebbles()
     open_air.add_sea(scene, shore, LEVEL, height)
-    chance = np.random.default_rng(5)
-    spots = np.column_stack([5.5 + chance.gamma(1.5, 5.0, 700), 1.0 - chance.uniform(0.0, 60.0, 700)])
-    open_air.add_grass(spots, 0.15 + chance.gamma(2.0, 0.12, len(spots)), height)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.85, 85
+    scene.view_settings.exposure, scene.render.image_settings.quality = 0.9, 85
     path = folder / "bare_feet.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]

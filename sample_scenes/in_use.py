@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
-from math import radians
 from pathlib import Path
 
 import bpy
 import numpy as np
 from PIL import Image, ImageDraw
 
-from sample_scenes import production, stage
+from sample_scenes import production
 from sample_scenes.moving_picture import put_together
 from sample_scenes.production import Claim, Options
-from sample_scenes.time_lapse import CELL_SIZE, TimeLapse, hollow_left, take, track
+from sample_scenes.time_lapse import CELL_SIZE, FLOWING, TimeLapse, hollow_left, light, take, track
 
 __all__ = ["CELL_SIZE", "build", "claims", "shoot"]
 
@@ -46,9 +45,9 @@ def claims(built: TimeLapse) -> list[Claim]:
 def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     """The window, and then the night."""
     shown = window(WINDOW)
-    stage.add_sun(bpy.context.scene, radians(40), radians(22))
+    light(WEATHER)
     width, height = shown[0].size
-    moments = take(built.bakes[WEATHER], WEATHER, (width // 2, height // 2), folder / "in_use", samples)
+    moments = take(built.bakes[WEATHER], FLOWING, (width // 2, height // 2), folder / "in_use", samples)
     pictures = [*shown, *flowing(moments, shown[0].size)]
     pause = round(1000 * PLAYED / bpy.context.scene.render.fps)
     return [put_together(pictures, pause, folder / "in_use.webp", LARGEST, (80, 70, 60, 50), effort=4)]

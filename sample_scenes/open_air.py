@@ -279,12 +279,20 @@ def _water() -> bpy.types.Material:
     graph = Graph(tree)
     place = graph.out(graph.node("ShaderNodeNewGeometry"))
     film, body, foam = (graph.attribute(name) for name in ("film", "body", "foam"))
-    ragged = graph.noise(place, 0.25, 3.0) * 0.9
-    wide, fine = (
-        graph.out(graph.node("ShaderNodeTexVoronoi", {"Vector": place, "Scale": scale}, feature="DISTANCE_TO_EDGE"))
-        for scale in (16.0, 47.0)
+    aside = graph.node("ShaderNodeVectorMath", {0: place, 1: (7.3, 1.9, 0.0)}, operation="ADD")
+    drift = graph.node(
+        "ShaderNodeCombineXYZ",
+        {0: graph.noise(place, 0.15, 4.0) * 0.22, 1: graph.noise(graph.out(aside), 0.15, 4.0) * 0.22},
     )
-    lace = graph.ramp(foam + ragged + wide * -1.3 + fine * -0.9, 0.35, 1.25) * 0.9
+    stirred = graph.out(graph.node("ShaderNodeVectorMath", {0: place, 1: graph.out(drift)}, operation="ADD"))
+    wide, middle, fine = (
+        graph.out(graph.node("ShaderNodeTexVoronoi", {"Vector": stirred, "Scale": scale}, feature="DISTANCE_TO_EDGE"))
+        for scale in (7.0, 24.0, 80.0)
+    )
+    patches = graph.ramp(graph.noise(place, 0.7, 4.0), 0.38, 0.62, 0.15, 1.0)
+    ragged = graph.noise(place, 0.2, 5.0, 0.6) * 0.9
+    holes = wide * -1.0 + middle * -0.9 + fine * -0.5
+    lace = graph.ramp(foam * patches + ragged + holes, 0.30, 1.05) * 0.9
     ripples = graph.node(
         "ShaderNodeBump", {"Height": graph.noise(place, 0.5, 3.0), "Distance": 0.05, "Strength": body * 0.6}
     )

@@ -1,10 +1,11 @@
-"""Tracks under weather: snowfall, thaw, wind on a dune, a drying beach, each as a sheet and as a moving picture.
+"""Tracks under weather: snowfall, thaw, wind on a dune, a drying beach, each as a sheet; the snow as a moving picture.
 
 One bake each; only the weather's sliders act afterwards.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
@@ -12,13 +13,14 @@ from typing import Any
 
 import bpy
 import numpy as np
+from PIL import Image
 
 from sample_scenes import bare_feet, litter, open_air, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.moving_picture import animate
+from sample_scenes.moving_picture import LAST_HOLD, put_together
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
@@ -37,26 +39,41 @@ BAREFOOT = "DRYING_BEACH"
 FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
-MOMENTS, COLUMNS = 12, 4
-PACE = {"SNOWFALL": 1.0}
-"""Power of the time over which the pictures are spread; `EARLY` elsewhere, as edges go first."""
-EARLY = 2.0
+MOMENTS = {
+    "SNOWFALL": (0.0, 0.36, 0.60, 0.80),
+    "THAW": (0.0, 0.09, 0.40, 1.0),
+    "WINDY_DUNES": (0.0, 0.06, 0.12, 0.9),
+    "DRYING_BEACH": (0.0, 0.22, 0.42, 1.0),
+}
+"""When the pictures of a sheet are taken, as shares of that time."""
+COLUMNS = 2
+MOVING = "SNOWFALL"
+FLOWING = tuple(number / 13 for number in range(14))
+"""The preset that is also shown as a moving picture, and its moments."""
 AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
 """Presets that set in when the walk is over; to the others, its steps are of different ages."""
-SUN = {"THAW": (30.0, 9.0), "WINDY_DUNES": (40.0, 14.0)}
-"""Where the light goes and how high it comes from [deg]: low, where little is left of prints; `HIGH_SUN` elsewhere."""
-HIGH_SUN = (40.0, 22.0)
-EXPOSURE = {"SNOWFALL": -0.3, "THAW": 0.0, "WINDY_DUNES": -0.5, "DRYING_BEACH": -0.45}
-"""In stops: these grounds are pale."""
+SUN = {"SNOWFALL": (8.0, 11.0), "THAW": (8.0, 10.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (12.0, 10.0)}
+"""Where the light goes and how high it comes from [deg]: low and across the prints."""
+SUNLIGHT, SKYLIGHT = 6.0, 0.10
+"""Strength of the sun [W/m²] and of the sky."""
+WARM = (1.0, 0.72, 0.46)
+EXPOSURE = {"SNOWFALL": 0.0, "THAW": 0.0, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.8}
+"""In stops."""
+LENS, F_STOP = 50.0, 8.0
+EYE, TARGET = (0.56, 0.92, 0.40), (-0.06, -0.14, 0.0)
+"""Where the camera is and where it looks, from a step on [m]."""
 SOIL, HUMPS = -0.225, 0.10
 """Mean height of the soil below the snow that thaws, and about how far its humps rise above it [m]."""
 STRAW, ROOTED = 900, -0.24
 """Tufts of dead grass that are tried, and the height of soil from which on they grow [m]."""
-PICTURE = (480, 320)
+PICTURE, SMALL = (960, 540), (800, 450)
+"""Size of each picture of a sheet, and of the moving one."""
 APART = 30.0
 """Distance of the tracks [m]."""
-PAUSE = 220
+PAUSE = 260
 """What each picture of the moving one takes [ms]."""
+LARGEST = 1_500_000
+"""Of the moving picture [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -162,40 +179,45 @@ def _hollow(bake: Bake, frame: int) -> float:
 
 
 def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
-    """Twelve moments of each."""
+    """Four moments of each, and more of one."""
     made = []
     for preset, bake in built.bakes.items():
-        _light(preset)
-        moments = take(bake, preset, PICTURE, folder / f"time_lapse_{preset.lower()}", samples)
-        made.append(stage.contact_sheet(moments, COLUMNS, folder / f"time_lapse_{preset.lower()}.jpg"))
-        made.append(animate(moments, PAUSE, folder / f"time_lapse_{preset.lower()}.webp"))
+        light(preset)
+        path = folder / f"time_lapse_{preset.lower()}"
+        moments = take(bake, MOMENTS[preset], PICTURE, path, samples)
+        made.append(stage.contact_sheet(moments, COLUMNS, path.with_suffix(".jpg")))
+        if preset == MOVING:
+            moments = take(bake, FLOWING, SMALL, path.with_name(f"{path.name}_moving"), samples)
+            pictures = [Image.open(moment).convert("RGB") for moment in moments]
+            pauses = [PAUSE] * (len(FLOWING) - 1) + [LAST_HOLD]
+            qualities = (92, 86, 80, 70)
+            made.append(put_together(pictures, pauses, path.with_suffix(".webp"), LARGEST, qualities, effort=6))
     return made
 
 
-def _light(preset: str) -> None:
+def light(preset: str) -> None:
     """The sun and the exposure of a preset's pictures, in place of another's."""
     scene = bpy.context.scene
     scene.view_settings.exposure = EXPOSURE[preset]
-    for light in [one for one in bpy.data.objects if one.type == "LIGHT"]:
-        bpy.data.objects.remove(light)
-    toward, elevation = SUN.get(preset, HIGH_SUN)
-    stage.add_sun(scene, radians(toward), radians(elevation))
+    for lamp in [one for one in bpy.data.objects if one.type == "LIGHT"]:
+        bpy.data.objects.remove(lamp)
+    toward, elevation = SUN[preset]
+    open_air.add_low_sun(scene, radians(toward), radians(elevation), WARM, SUNLIGHT, SKYLIGHT, open_air.PALE_DUSK)
 
 
-def take(bake: Bake, preset: str, size: tuple[int, int], path: Path, samples: int) -> list[Path]:
-    """Twelve pictures of a track under its weather, low over a step; their names begin with a path."""
+def take(bake: Bake, moments: Sequence[float], size: tuple[int, int], path: Path, samples: int) -> list[Path]:
+    """Pictures of a track under its weather, low over a step; their names begin with a path."""
     scene = bpy.context.scene
-    camera = stage.add_camera(scene, "Over a Step", lens=45.0)
     step = np.array(_step(bake).position)
-    moments = []
-    part = np.linspace(0.0, 1.0, MOMENTS) ** PACE.get(preset, EARLY)
-    for number, frame in enumerate((FRAMES + LASTS * part).round().astype(int)):
+    pictures = []
+    camera = open_air.add_camera(scene, EYE, TARGET, LENS, (0.0, 0.0, 0.0), F_STOP)
+    for number, frame in enumerate((FRAMES + LASTS * np.asarray(moments)).round().astype(int)):
         scene.frame_set(int(frame))
-        level = _level(bake)
-        stage.aim(camera, (step[0] + 0.62, step[1] + 0.95, level + 0.52), (step[0] - 0.03, step[1] - 0.08, level))
-        moments.append(path.with_name(f"{path.name}_{number:02d}.png"))
-        stage.render(scene, camera, moments[-1], size, samples)
-    return moments
+        ground = np.array((step[0], step[1], _level(bake)))
+        stage.aim(camera, ground + EYE, ground + TARGET)
+        pictures.append(path.with_name(f"{path.name}_{number:02d}.png"))
+        stage.render(scene, camera, pictures[-1], size, samples)
+    return pictures
 
 
 def _level(bake: Bake) -> float:
