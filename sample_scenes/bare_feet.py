@@ -24,11 +24,11 @@ PACKED = {
     "tread": "0",
     "material.youngs_modulus": "2.6e6",
     "material.blur_sigma": "0.0015",
-    "material.poisson_ratio": "0.06",
+    "material.poisson_ratio": "0.02",
     "material.rim_reach": "0.012",
     "debris": "false",
 }
-"""Sand that the swash has packed and smoothed keeps the toes apart, and its low rim ends close to the foot."""
+"""Sand that the swash has packed and smoothed keeps the toes apart, and hardly rises around a foot."""
 
 BODY = Body(foot=Foot(0.26, 0.098, bare=True))
 FRAMES = 260

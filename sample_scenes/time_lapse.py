@@ -5,7 +5,7 @@ One bake each; only the weather's sliders act afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
@@ -40,10 +40,10 @@ FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
 MOMENTS = {
-    "SNOWFALL": (0.0, 0.36, 0.60, 0.80),
-    "THAW": (0.0, 0.09, 0.40, 1.0),
+    "SNOWFALL": (0.0, 0.5, 0.8, 1.0),
+    "THAW": (0.0, 0.3, 0.62, 0.9),
     "WINDY_DUNES": (0.0, 0.06, 0.12, 0.9),
-    "DRYING_BEACH": (0.0, 0.22, 0.42, 1.0),
+    "DRYING_BEACH": (0.0, 0.22, 0.36, 1.0),
 }
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
@@ -52,15 +52,18 @@ FLOWING = tuple(number / 13 for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
 AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
 """Presets that set in when the walk is over; to the others, its steps are of different ages."""
-SUN = {"SNOWFALL": (8.0, 11.0), "THAW": (8.0, 10.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (12.0, 10.0)}
+SUN = {"SNOWFALL": (6.0, 12.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (14.0, 10.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
-SUNLIGHT, SKYLIGHT = 6.0, 0.10
-"""Strength of the sun [W/m²] and of the sky."""
-WARM = (1.0, 0.72, 0.46)
-EXPOSURE = {"SNOWFALL": 0.0, "THAW": 0.0, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.8}
+SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
+"""Strength [W/m²] and colour of the sun."""
+SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.12, "DRYING_BEACH": 0.16}
+"""Strength of the sky, which fills shadows blue."""
+EXPOSURE = {"SNOWFALL": 0.45, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.55}
 """In stops."""
-LENS, F_STOP = 50.0, 8.0
-EYE, TARGET = (0.56, 0.92, 0.40), (-0.06, -0.14, 0.0)
+DUSK = (radians(8.0), 2.4)
+"""Sun and ozone of the sky."""
+LENS, F_STOP = 58.0, 8.0
+EYE, TARGET = (0.56, 0.92, 0.40), (-0.06, -0.20, 0.0)
 """Where the camera is and where it looks, from a step on [m]."""
 SOIL, HUMPS = -0.225, 0.10
 """Mean height of the soil below the snow that thaws, and about how far its humps rise above it [m]."""
@@ -100,7 +103,7 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     if preset == "THAW":
         chosen["debris"] = "false"  # thrown snow would be the first to melt
     if barefoot:
-        chosen |= bare_feet.PACKED
+        chosen |= bare_feet.PACKED | {"relief_strength": "0.35"}
         cell_size = cell_size or bare_feet.CELL_SIZE
     chosen |= options or {}
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
@@ -183,6 +186,7 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     made = []
     for preset, bake in built.bakes.items():
         light(preset)
+        _show(built, [bake])
         path = folder / f"time_lapse_{preset.lower()}"
         moments = take(bake, MOMENTS[preset], PICTURE, path, samples)
         made.append(stage.contact_sheet(moments, COLUMNS, path.with_suffix(".jpg")))
@@ -192,17 +196,25 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
             pauses = [PAUSE] * (len(FLOWING) - 1) + [LAST_HOLD]
             qualities = (92, 86, 80, 70)
             made.append(put_together(pictures, pauses, path.with_suffix(".webp"), LARGEST, qualities, effort=6))
+    _show(built, built.bakes.values())
     return made
+
+
+def _show(built: TimeLapse, shown: Iterable[Bake]) -> None:
+    """Only these tracks: the weather of the others need not be computed."""
+    shown = list(shown)
+    for bake in built.bakes.values():
+        bake.display_mesh.hide_viewport = bake.display_mesh.hide_render = bake not in shown
 
 
 def light(preset: str) -> None:
     """The sun and the exposure of a preset's pictures, in place of another's."""
     scene = bpy.context.scene
     scene.view_settings.exposure = EXPOSURE[preset]
-    for lamp in [one for one in bpy.data.objects if one.type == "LIGHT"]:
-        bpy.data.objects.remove(lamp)
+    for lamp in list(bpy.data.lights):
+        bpy.data.lights.remove(lamp)
     toward, elevation = SUN[preset]
-    open_air.add_low_sun(scene, radians(toward), radians(elevation), WARM, SUNLIGHT, SKYLIGHT, open_air.PALE_DUSK)
+    open_air.add_low_sun(scene, radians(toward), radians(elevation), WARM, SUNLIGHT, SKYLIGHT[preset], DUSK)
 
 
 def take(bake: Bake, moments: Sequence[float], size: tuple[int, int], path: Path, samples: int) -> list[Path]:
