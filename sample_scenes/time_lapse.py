@@ -5,7 +5,7 @@ One bake each; only the weather's sliders act afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
@@ -186,7 +186,7 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     made = []
     for preset, bake in built.bakes.items():
         light(preset)
-        _show(built, [bake])
+        _show(built, [preset])
         path = folder / f"time_lapse_{preset.lower()}"
         moments = take(bake, MOMENTS[preset], PICTURE, path, samples)
         made.append(stage.contact_sheet(moments, COLUMNS, path.with_suffix(".jpg")))
@@ -196,15 +196,14 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
             pauses = [PAUSE] * (len(FLOWING) - 1) + [LAST_HOLD]
             qualities = (92, 86, 80, 70)
             made.append(put_together(pictures, pauses, path.with_suffix(".webp"), LARGEST, qualities, effort=6))
-    _show(built, built.bakes.values())
+    _show(built, built.bakes)
     return made
 
 
-def _show(built: TimeLapse, shown: Iterable[Bake]) -> None:
-    """Only these tracks: the weather of the others need not be computed."""
-    shown = list(shown)
-    for bake in built.bakes.values():
-        bake.display_mesh.hide_viewport = bake.display_mesh.hide_render = bake not in shown
+def _show(built: TimeLapse, presets: Collection[str]) -> None:
+    """Only the tracks under these presets: the weather of the others need not be computed."""
+    for preset, bake in built.bakes.items():
+        bake.display_mesh.hide_viewport = bake.display_mesh.hide_render = preset not in presets
 
 
 def light(preset: str) -> None:
