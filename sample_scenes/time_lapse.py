@@ -42,7 +42,7 @@ LASTS = 264
 MOMENTS = {
     "SNOWFALL": (0.0, 0.5, 0.8, 1.0),
     "THAW": (0.0, 0.3, 0.62, 0.9),
-    "WINDY_DUNES": (0.0, 0.06, 0.12, 0.9),
+    "WINDY_DUNES": (0.0, 0.06, 0.105, 0.9),
     "DRYING_BEACH": (0.0, 0.22, 0.36, 1.0),
 }
 """When the pictures of a sheet are taken, as shares of that time."""
@@ -103,7 +103,7 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     if preset == "THAW":
         chosen["debris"] = "false"  # thrown snow would be the first to melt
     if barefoot:
-        chosen |= bare_feet.PACKED | {"relief_strength": "0.35"}
+        chosen |= bare_feet.PACKED | {"relief_strength": "0.45"}
         cell_size = cell_size or bare_feet.CELL_SIZE
     chosen |= options or {}
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
