@@ -29,7 +29,7 @@ CELL_SIZE: float | None = None
 
 FRAMES = 48  # 2 s: four steps
 SPACING, LENGTH = 1.2, 5.0  # m from ground to ground, and from row to row
-PICTURE = (640, 480)
+PICTURE = (960, 720)
 SUN_ELEVATION = radians(22)
 """Low, but the bottom of a print still sees the sun."""
 EXPOSURE = {"Snow": -0.6, "Dry Sand": -0.25, "Mud": 0.25, "Soil": 0.6}
