@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable, Iterator
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +121,16 @@ class Hand:
         space.region_3d.view_distance = 3.2
         space.region_3d.view_rotation = Euler((1.05, 0.0, 0.9)).to_quaternion()
         yield 0.7
+
+    def show_materials(self, sun: tuple[float, float]) -> None:
+        """Materials in the light of a low sun, as high and at such an angle about z [rad], and of little else."""
+        light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+        light.data.energy, light.data.color, light.data.angle = 5.0, (1.0, 0.84, 0.66), 0.02
+        light.rotation_euler = (pi / 2 - sun[0], 0.0, sun[1])
+        self.window.scene.collection.objects.link(light)
+        shading = self.area().spaces.active.shading
+        shading.type, shading.studio_light, shading.studiolight_intensity = "MATERIAL", "forest.exr", 0.6
+        shading.use_scene_lights, shading.use_studiolight_view_rotation = True, False
 
     def choose_in_menu(self, place: tuple[int, int], letter: str) -> Steps:
         """Open a menu and choose the entry that is underlined at a letter."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from mathutils import Euler
 
 from tests.blender import fingerprints
 from tests.gui.hand import Hand, Steps
@@ -10,7 +11,7 @@ from tests.gui.shot import open_walk
 
 FRAMES = 250
 
-CELLS = 0.01
+CELLS = 0.005
 SLOW_CELLS = 0.002
 """Cells of a bake that lasts until a hand has found its Cancel button, beside those of the bake that counts [m]."""
 
@@ -54,11 +55,11 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     facts["prints"] = summary()
     facts["deepest vertex"] = deepest()
     yield from hand.move(*hand.middle())
-    yield from hand.look_at_walk()
-    yield 1.5  # panels glide to their places
-    yield from hand.picture("two_clicks")
-
     baked = fingerprints.of_file()
+    yield from show_prints(hand)
+    yield from hand.picture("two_clicks")
+    hand.area().spaces.active.shading.type = "SOLID"
+
     yield from hand.move(*hand.middle())
     yield from hand.key("Z", ctrl=True)
     yield 0.5
@@ -84,6 +85,19 @@ def tell(hand: Hand, facts: dict) -> Steps:  # noqa: PLR0915  (a story is one af
     yield from hand.open_sidebar()
     yield from hand.press_button("softground.clear_bake")
     facts["cleared: deepest vertex"] = deepest()
+
+
+def show_prints(hand: Hand) -> Steps:
+    """The last prints and the feet in them, in low light."""
+    space, place = hand.area().spaces.active, scene().objects["Walker"].pose.bones["hips"].matrix.translation
+    over = space.overlay
+    over.show_outline_selected = over.show_floor = over.show_axis_x = over.show_axis_y = over.show_bones = False
+    hand.show_materials((0.21, 0.535))
+    view = space.region_3d
+    view.view_perspective, view.view_distance = "PERSP", 2.5
+    view.view_location = (place.x - 0.25, place.y + 0.85, 0.2)
+    view.view_rotation = Euler((1.05, 0.0, 2.55)).to_quaternion()
+    yield 25.0  # until its shaders are there
 
 
 def scene():
