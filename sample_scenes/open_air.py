@@ -154,9 +154,12 @@ def add_low_sun(
     nodes["BACKGROUND"].inputs[1].default_value = sky
 
 
-def darken(material: bpy.types.Material, share: Socket | float) -> list[bpy.types.Node]:
-    """Leave a share of the colour of a ground, as rain does; returns the shaders."""
-    tree, graph = material.node_tree, Graph(material.node_tree)
+def darken(material: bpy.types.Material, share: Socket | float, graph: Graph | None = None) -> list[bpy.types.Node]:
+    """Leave a share of the colour of a ground, as rain does; returns the shaders.
+
+    A share that is a socket needs the `graph` that it comes from.
+    """
+    tree, graph = material.node_tree, graph or Graph(material.node_tree)
     shaders = [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"]
     for shader in shaders:
         colour = shader.inputs["Base Color"]

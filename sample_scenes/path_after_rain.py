@@ -10,10 +10,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sample_scenes import firs, litter, open_air, production, stage
+from sample_scenes import broadleaf, firs, litter, open_air, production, stage
 from sample_scenes.production import Bake, Claim, Options
 from sample_scenes.stage import Array
-from softground_addon.blender.ground import baked_ground, weather
+from softground_addon.blender import compat
+from softground_addon.blender.ground import baked_ground, weather, weather_modifier
+from softground_addon.blender.ground.own_data import RIM
 from softground_addon.blender.shader_graph import Graph
 
 CELL_SIZE: float | None = None
@@ -23,29 +25,38 @@ PRESET = "Mud"
 FRAMES = 260
 START = 2.6  # m along y; the walk is toward -y
 PICTURE = (1920, 1080)
+SUN = radians(-48.0)
+"""Where the sun stands, from the way toward +x [rad]."""
+NEEDLES = (0.030, 0.052, 0.026)
+"""Colour of those on firs."""
+RAIN = 5.0  # mm/h: rounds edges, and leaves treads
+WATER_TABLE = 1.9  # cm below the brims: half of the floor of a print is under water
 PUDDLES = np.array(
     [
-        (0.78, 0.15, 0.34, 0.50, 0.045),
-        (-0.74, -1.30, 0.36, 0.75, 0.050),
-        (0.86, -2.60, 0.46, 0.90, 0.060),
-        (-0.80, -4.90, 0.40, 1.10, 0.055),
-        (0.80, -6.60, 0.42, 1.20, 0.060),
-        (-0.85, -9.40, 0.45, 1.40, 0.060),
-        (0.90, -12.5, 0.50, 1.80, 0.070),
+        (0.74, -0.55, 0.36, 0.62, 0.046),
+        (-0.95, -1.70, 0.42, 0.85, 0.048),
+        (0.70, -3.60, 0.50, 1.00, 0.052),
+        (-0.80, -5.60, 0.46, 1.20, 0.055),
+        (0.75, -8.20, 0.55, 1.50, 0.060),
+        (-0.60, -11.5, 0.60, 1.90, 0.060),
     ]
 )
 """Hollows beside the way: middle, half width, half length and depth [m]."""
 LEVEL = -0.016  # m, of the water in them
 REFRACTION = 1.33
-TURBID = 0.055
+TURBID = 0.05
 """Depth of water that hides the bed of a puddle [m]."""
+SPACING = 0.07  # m between vertices: shores are uneven
 _HILLS = open_air.rolling(swell=0.22, hills=14.0, seed=8)
 
 
 def height(x: Array, y: Array) -> Array:
-    """A trodden path between low banks, with hollows [m]."""
+    """A trodden path between low banks, uneven, with hollows [m]."""
     bank = np.clip((np.abs(x) - 1.0 - 0.15 * np.sin(0.9 * y) - 0.1 * np.sin(2.1 * y + 1.0)) / 0.7, 0.0, 1.0)
-    return _HILLS(x, y) + 0.11 * bank**2 * (3.0 - 2.0 * bank) - hollow(x, y)
+    near = np.clip((14.0 - np.hypot(x, y)) / 4.0, 0.0, 1.0)
+    beside = np.clip((np.abs(x) - 0.15) / 0.25, 0.3, 1.0)
+    uneven = near * beside * (0.008 * open_air.waves(x, y, 0.75, 3) + 0.004 * open_air.waves(x, y, 0.32, 4))
+    return _HILLS(x, y) + 0.11 * bank**2 * (3.0 - 2.0 * bank) - hollow(x, y) + uneven
 
 
 def hollow(x: Array, y: Array) -> Array:
@@ -53,8 +64,23 @@ def hollow(x: Array, y: Array) -> Array:
     depth = np.zeros(np.broadcast(x, y).shape)
     for middle, along, wide, long, deep in PUDDLES:
         bent = x - middle - 0.10 * np.sin(3.1 * (y - along) + 7.0 * middle) - 0.05 * np.sin(7.3 * y)
-        depth += deep * np.exp(-(((bent / wide) ** 2 + ((y - along) / long) ** 2) ** 1.5))
+        depth += deep * np.exp(-((bent / wide) ** 2) - ((y - along) / long) ** 2)
     return depth
+
+
+def _rim(x: Array, y: Array) -> Array:
+    """Mud that swells here, and tears or is carried off there."""
+    return np.clip(0.35 + 0.75 * open_air.waves(x, y, 0.24, 6), 0.0, 1.2)
+
+
+def _firmness(x: Array, y: Array) -> Array:
+    """Soft and hard places."""
+    return 1.45 * np.exp(0.3 * open_air.waves(x, y, 0.5, 7))
+
+
+def _damp(x: Array, y: Array) -> Array:
+    """How near the ground is to the water of the puddles: 1 under it, 0 on dry places."""
+    return np.clip((0.022 - (height(x, y) - LEVEL)) / 0.022, 0.0, 1.0) * (np.abs(x) < 1.8)
 
 
 def _beside(way: float, bank: float) -> Callable[[Array, Array], Array]:
@@ -63,7 +89,7 @@ def _beside(way: float, bank: float) -> Callable[[Array, Array], Array]:
     def density(x: Array, y: Array) -> Array:
         share = np.clip((np.abs(x) - 0.5) / 0.7, 0.0, 1.0)
         seen = np.clip((y + 26.0) / 16.0, 0.0, 1.0) ** 2 * (y < 2.5) * np.clip((9.0 - np.abs(x)) / 4.0, 0.0, 1.0)
-        return seen * (way + (bank - way) * share) * (hollow(x, y) < 0.01)
+        return seen * (way + (bank - way) * share) * (height(x, y) > LEVEL)
 
     return density
 
@@ -79,6 +105,9 @@ def _swept(density: Callable[[Array, Array], Array]) -> Callable[[Array, Array],
 
 
 PAINTED = {
+    "softground_rim_factor": _rim,
+    "softground_stiffness": _firmness,
+    "damp": _damp,
     "leaves": _swept(_beside(40.0, 170.0)),
     "needles": _swept(_beside(110.0, 480.0)),
     "crumbs": _beside(260.0, 160.0),
@@ -98,11 +127,15 @@ class PathAfterRain:
 
 def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: Options | None = None) -> PathAfterRain:
     """A wide ground, a walk away from the camera, and a shower on its prints."""
-    ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), height, "mud", PAINTED)
+    ground = open_air.add_ground(scene, "Path", (-20.0, START + 3.0), height, "mud", PAINTED, SPACING)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (0.36, 1.62, 0.56), (-0.10, -1.6, 0.12), 28.0, (0.0, 0.1, 0.0), 8.0)
-    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, options)
-    weather.set_preset(weather.add(bake.ground), "SHOWER")
+    open_air.add_camera(scene, (0.28, 1.38, 0.40), (-0.05, -1.2, 0.02), 28.0, (0.05, 0.2, 0.0), 9.0)
+    chosen = {"tread": "0.006", "relief_strength": "0.7"} | dict(options or {})
+    bake = open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)
+    modifier = weather.add(bake.ground)
+    weather.set_preset(modifier, "SHOWER")
+    for name, value in {"Rain": RAIN, "Water Table": WATER_TABLE}.items():
+        compat.write_input(modifier, weather_modifier.inputs_of(modifier)[name], value)
     return PathAfterRain({PRESET: bake})
 
 
@@ -116,45 +149,60 @@ def claims(built: PathAfterRain) -> list[Claim]:
 
 
 def shoot(_built: PathAfterRain, folder: Path, samples: int) -> list[Path]:
-    """From the height of a knee, with the light from the side."""
+    """From the height of a knee, toward the evening sun that comes through the trees at the side."""
     scene = bpy.context.scene
     scene.frame_set(scene.frame_end)
     stage.hide(bpy.data.objects["Hiker"])  # long out of sight
-    open_air.add_low_sun(scene, radians(30), radians(27), (1.0, 0.86, 0.68), 7.0, 0.30, (radians(24.0), 1.0))
+    open_air.add_low_sun(scene, SUN + pi / 2, radians(20), (1.0, 0.78, 0.54), 9.0, 0.34, (radians(16.0), 1.1))
     chance = np.random.default_rng(5)
-    sides = np.where(chance.random(340) < 0.5, -1.0, 1.0)
-    spots = np.column_stack([sides * (4.5 + chance.gamma(1.4, 9.0, 340)), -chance.uniform(13.0, 75.0, 340)])
-    end = np.column_stack([chance.normal(-1.0, 4.5, 34), -chance.uniform(34.0, 80.0, 34)])  # where the way bends off
-    spots = np.concatenate([spots, end])
-    firs.add_firs(spots, chance.uniform(6.0, 16.0, len(spots)), height, NEEDLES)
-    spots = np.array([(-2.6, -5.2), (2.9, -3.9), (-3.9, -9.0), (2.9, -9.5), (-2.9, -13.0), (4.6, -7.2), (5.2, -4.4)])
-    firs.add_firs(spots, chance.uniform(13.0, 19.0, len(spots)), height, NEEDLES, seed=9, crown=0.26)
-    _soak(scene.softground.ground)
-    _add_litter(scene.softground.ground, chance)
+    near = _add_trees(chance)
+    ground = baked_ground.display_mesh_of(scene.softground.ground)
+    _soak(ground)
+    _add_litter(ground, chance)
     _add_puddles(scene)
-    _add_roots(scene, spots[:4], chance)
-    scene.view_settings.exposure, scene.render.image_settings.quality = 0.95, 82
+    _add_roots(scene, near, chance)
+    scene.view_settings.exposure, scene.render.image_settings.quality = 1.15, 82
     path = folder / "path_after_rain.jpg"
     stage.render(scene, scene.camera, path, PICTURE, samples)
     return [path]
 
 
-NEEDLES = (0.030, 0.052, 0.026)
+def _add_trees(chance: np.random.Generator) -> Array:
+    """A forest that lets some sunlight through to the way; the places of the trees next to it, (N, 2) [m]."""
+    sides = np.where(chance.random(340) < 0.5, -1.0, 1.0)
+    spots = np.column_stack([sides * (4.5 + chance.gamma(1.4, 9.0, 340)), -chance.uniform(13.0, 75.0, 340)])
+    end = np.column_stack([chance.normal(-1.0, 6.0, 34), -chance.uniform(40.0, 80.0, 34)])  # where the way bends off
+    spots = np.concatenate([spots, end])
+    heights = 6.0 * chance.lognormal(0.45, 0.4, len(spots))
+    lit = np.abs(np.arctan2(spots[:, 0], -spots[:, 1]) - SUN) < radians(9.0)
+    firs.add_firs(spots[~lit], heights[~lit], height, NEEDLES)
+    bushes = np.column_stack([sides[:90] * (3.4 + chance.gamma(1.3, 2.0, 90)), -chance.uniform(7.0, 40.0, 90)])
+    leaves = (0.030, 0.045, 0.010), (0.12, 0.14, 0.035)
+    broadleaf.add_broadleaves(bushes, chance.uniform(0.4, 1.7, 90), height, *leaves, stem=0.02, seed=40)
+    near = np.array([(-2.6, -5.2), (2.9, -3.9), (-3.9, -9.0), (2.9, -9.5), (-2.9, -13.0), (4.6, -7.2), (5.2, -4.4)])
+    beyond = np.array([(-5.4, -3.6), (-7.0, -6.6), (-8.2, -5.4), (-6.3, -4.9)])  # trunks between the sun and the way
+    tall = np.concatenate([near, beyond])
+    firs.add_firs(tall, chance.uniform(14.0, 19.0, len(tall)), height, NEEDLES, seed=9, crown=0.32)
+    return near[:4]
 
 
-def _soak(baked: bpy.types.Object) -> None:
-    """Rain darkens all of the ground and leaves it shining, in patches."""
-    for material in baked_ground.display_mesh_of(baked).data.materials:
+def _soak(ground: bpy.types.Object) -> None:
+    """Rain darkens all of the ground and leaves it shining, in patches and around the puddles."""
+    for material in ground.data.materials:
         tree, graph = material.node_tree, Graph(material.node_tree)
-        shine = graph.ramp(graph.noise(graph.out(graph.node("ShaderNodeNewGeometry")), 0.30, 4.0, 0.6), 0.40, 0.62)
-        for shader in open_air.darken(material, graph.blend(shine, 0.38, 0.32)):
-            tree.links.new(graph.blend(shine, 0.75, 0.18).output, shader.inputs["Roughness"])
-            tree.links.new(graph.blend(shine, 0.15, 0.5).output, shader.inputs["Specular IOR Level"])
+        place = graph.out(graph.node("ShaderNodeNewGeometry"))
+        patches = graph.ramp(graph.noise(place, 0.30, 4.0, 0.6), 0.40, 0.62)
+        ragged = graph.attribute("damp") + graph.noise(place, 0.06, 4.0, 0.65) * 0.7 + -0.35
+        shore = graph.ramp(ragged, 0.05, 0.75)
+        torn = graph.ramp(graph.attribute(RIM), 0.0005, 0.004)
+        shine = graph.math("MAXIMUM", patches * 0.85, shore) * graph.math("SUBTRACT", 1.0, torn * 0.85)
+        for shader in open_air.darken(material, graph.blend(shore, graph.blend(patches, 0.46, 0.36), 0.24), graph):
+            tree.links.new(graph.blend(shine, 0.80, 0.20).output, shader.inputs["Roughness"])
+            tree.links.new(graph.blend(shine, 0.10, 0.5).output, shader.inputs["Specular IOR Level"])
 
 
-def _add_litter(baked: bpy.types.Object, chance: np.random.Generator) -> None:
+def _add_litter(ground: bpy.types.Object, chance: np.random.Generator) -> None:
     """Leaves, needles, crumbs, stones, twigs and grass, which the boots have bent, buried and soiled."""
-    ground = baked_ground.display_mesh_of(baked)
     grass = litter.blades(open_air.tufts(chance), (0.045, 0.060, 0.014), (0.115, 0.125, 0.040))
     crumbs = litter.stones((0.050, 0.030, 0.018), (0.120, 0.074, 0.044), 0.75)
     stones = litter.stones((0.13, 0.11, 0.09), (0.32, 0.28, 0.23), 0.5, rough=0.2)
@@ -171,19 +219,30 @@ def _add_litter(baked: bpy.types.Object, chance: np.random.Generator) -> None:
     )
     wood = litter.twigs((0.050, 0.034, 0.022), (0.15, 0.11, 0.075))
     litter.strew(ground, wood, "twigs", smallest=0.05, largest=0.45, law=1.4, lean=0.06, bury=0.03, seed=5)
+    torn = litter.clods((0.040, 0.025, 0.015), (0.085, 0.054, 0.033))
+    litter.strew(
+        ground, torn, 1.6e5, where=RIM, smallest=0.004, largest=0.028, law=1.8, lean=pi, bend=pi, depth=0.2, seed=11
+    )
     growth = litter.pieces_of("Grass", grass)
     litter.strew(ground, growth, "growth", smallest=0.05, largest=0.30, law=1.2, lean=0.2, bend=1.4, bury=0.05, seed=6)
 
 
 def _add_puddles(scene: bpy.types.Scene) -> None:
-    """Level water over the hollows, clear at its edge and turbid where it is deep."""
+    """Level water over the hollows, clear at its edge and turbid where it is deep, with leaves and needles afloat."""
     x, y = np.meshgrid(np.arange(-1.6, 1.6, 0.02), np.arange(-16.0, 1.6, 0.02))
     depth = LEVEL - height(x, y)
     mesh = litter.mesh_of(
-        "Puddles", np.stack([x, y, np.full_like(x, LEVEL)], -1).reshape(-1, 3), _where(depth > -0.012), _puddle_water()
+        "Puddles", np.stack([x, y, np.full_like(x, LEVEL)], -1).reshape(-1, 3), _where(depth > -0.014), _puddle_water()
     )
-    mesh.attributes.new("depth", "FLOAT", "POINT").data.foreach_set("value", depth.astype(np.float32).ravel())
-    scene.collection.objects.link(bpy.data.objects.new("Puddles", mesh))
+    drifted = np.clip(0.3 + 0.9 * open_air.waves(x, y, 0.5, 5), 0.0, 1.5)
+    afloat = (depth > 0.001) * drifted * (0.25 + np.exp(-(((depth - 0.004) / 0.006) ** 2)))
+    for name, values in {"depth": depth, "afloat": afloat}.items():
+        mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", values.astype(np.float32).ravel())
+    water = bpy.data.objects.new("Puddles", mesh)
+    scene.collection.objects.link(water)
+    leaves, fallen = (bpy.data.collections[name] for name in ("Leaves", "Needles"))
+    litter.strew(water, leaves, 55.0, where="afloat", smallest=0.03, largest=0.07, law=2.2, lean=0.06, seed=1)
+    litter.strew(water, fallen, 110.0, where="afloat", smallest=0.03, largest=0.07, lean=0.02, seed=2)
 
 
 def _where(chosen: Array) -> Array:
@@ -196,7 +255,7 @@ def _where(chosen: Array) -> Array:
 
 def _puddle_water() -> bpy.types.Material:
     """Still water that mirrors the sky: clear over the shore, turbid where it is deep."""
-    material = stage.plain_material("SoftGround Sample puddle", (0.055, 0.036, 0.021), 0.02)
+    material = stage.plain_material("SoftGround Sample puddle", (0.115, 0.078, 0.047), 0.02)
     tree, graph = material.node_tree, Graph(material.node_tree)
     shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["IOR"].default_value = REFRACTION
@@ -205,15 +264,19 @@ def _puddle_water() -> bpy.types.Material:
         "ShaderNodeBump", {"Height": graph.noise(place, 0.06, 1.0), "Distance": 0.001, "Strength": 0.15}
     )
     tree.links.new(ripples.outputs[0], shader.inputs["Normal"])
-    depth = graph.attribute("depth") + graph.noise(place, 0.05, 4.0, 0.6) * 0.008 + -0.004
+    ragged = graph.noise(place, 0.22, 3.0, 0.6) * 0.010 + graph.noise(place, 0.035, 4.0, 0.65) * 0.009 + -0.0095
+    depth = graph.attribute("depth") + ragged
     mirror = graph.out(graph.node("ShaderNodeFresnel", {"IOR": REFRACTION, "Normal": graph.out(ripples)}))
-    sky = graph.node("ShaderNodeBsdfGlossy", {"Roughness": 0.02, "Normal": graph.out(ripples)})
-    clear = graph.node("ShaderNodeBsdfTransparent", {"Color": (0.72, 0.62, 0.50, 1.0)})
+    sky = graph.node(
+        "ShaderNodeBsdfGlossy",
+        {"Roughness": graph.ramp(depth, -0.002, 0.006, 0.22, 0.02), "Normal": graph.out(ripples)},
+    )
+    clear = graph.node("ShaderNodeBsdfTransparent", {"Color": (0.80, 0.70, 0.58, 1.0)})
     thin = graph.node("ShaderNodeMixShader", {0: mirror, 1: graph.out(clear), 2: graph.out(sky)})
-    water = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, 0.0, TURBID), 1: graph.out(thin)})
+    water = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, 0.0, TURBID, 0.0, 0.85), 1: graph.out(thin)})
     tree.links.new(shader.outputs[0], water.inputs[2])
     ashore = graph.out(graph.node("ShaderNodeBsdfTransparent"))
-    shown = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, -0.006, 0.004), 1: ashore, 2: graph.out(water)})
+    shown = graph.node("ShaderNodeMixShader", {0: graph.ramp(depth, -0.006, 0.006), 1: ashore, 2: graph.out(water)})
     tree.links.new(shown.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
     return material
 
