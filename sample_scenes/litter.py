@@ -275,10 +275,10 @@ def needles(dark: Colour, light: Colour, count: int = 4) -> bpy.types.Collection
     shapes = []
     for number in range(count):
         chance = np.random.default_rng(number)
-        middle = np.column_stack([chance.normal(0.0, 0.45, (60, 2)), chance.uniform(0.0, 0.12, 60)])
+        middle = np.column_stack([chance.normal(0.0, 0.5, (60, 2)), chance.uniform(0.0, 0.10, 60)])
         turn, tilt = chance.uniform(0, 2 * pi, 60), chance.normal(0.0, 0.15, 60)
         ahead = 0.25 * np.column_stack([np.cos(turn), np.sin(turn), tilt])
-        aside = 0.02 * np.column_stack([-np.sin(turn), np.cos(turn), np.full(60, 0.3)])
+        aside = 0.009 * np.column_stack([-np.sin(turn), np.cos(turn), np.full(60, 0.3)])
         corners = np.stack(
             [middle - ahead - aside, middle + ahead - aside, middle + ahead + aside, middle - ahead + aside], 1
         )

@@ -205,7 +205,7 @@ def _add_litter(ground: bpy.types.Object, chance: np.random.Generator) -> None:
     """Leaves, needles, crumbs, stones, twigs and grass, which the boots have bent, buried and soiled."""
     grass = litter.blades(open_air.tufts(chance), (0.045, 0.060, 0.014), (0.115, 0.125, 0.040))
     crumbs = litter.stones((0.050, 0.030, 0.018), (0.120, 0.074, 0.044), 0.75)
-    stones = litter.stones((0.13, 0.11, 0.09), (0.32, 0.28, 0.23), 0.5, rough=0.2)
+    stones = litter.stones((0.09, 0.075, 0.06), (0.20, 0.175, 0.145), 0.5, rough=0.2)
     brown, ochre = (0.042, 0.018, 0.007), (0.20, 0.085, 0.022)
     flat = {"lean": 0.18, "bend": 0.15, "bury": 0.12}
     litter.strew(ground, litter.leaves(brown, ochre), "leaves", smallest=0.035, largest=0.075, law=2.2, seed=1, **flat)
@@ -294,7 +294,7 @@ def _add_roots(scene: bpy.types.Scene, spots: Array, chance: np.random.Generator
             up = thick * (0.55 - 1.3 * along**3 + 0.25 * np.sin(11 * along + chance.uniform(0, 6)))
             lines.append((np.column_stack([way, height(*way.T) + up]), thick))
     vertices, faces = litter.tubes(lines, 10)
-    look = litter.material("root", (0.055, 0.036, 0.022), (0.085, 0.058, 0.036), 0.8)
+    look = litter.material("root", (0.026, 0.018, 0.012), (0.042, 0.029, 0.019), 1.0)
     scene.collection.objects.link(bpy.data.objects.new("Roots", litter.mesh_of("Roots", vertices, faces, look)))
 
 
