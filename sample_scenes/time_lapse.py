@@ -43,7 +43,7 @@ MOMENTS = {
     "SNOWFALL": (0.0, 0.5, 0.8, 1.0),
     "THAW": (0.0, 0.3, 0.62, 0.9),
     "WINDY_DUNES": (0.0, 0.06, 0.105, 0.9),
-    "DRYING_BEACH": (0.0, 0.22, 0.36, 1.0),
+    "DRYING_BEACH": (0.0, 0.25, 0.38, 1.0),
 }
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
@@ -52,13 +52,13 @@ FLOWING = tuple(number / 13 for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
 AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
 """Presets that set in when the walk is over; to the others, its steps are of different ages."""
-SUN = {"SNOWFALL": (6.0, 12.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (14.0, 10.0)}
+SUN = {"SNOWFALL": (6.0, 12.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (-20.0, 11.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
 SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
 """Strength [W/m²] and colour of the sun."""
-SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.12, "DRYING_BEACH": 0.16}
+SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.12, "DRYING_BEACH": 0.09}
 """Strength of the sky, which fills shadows blue."""
-EXPOSURE = {"SNOWFALL": 0.45, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.55}
+EXPOSURE = {"SNOWFALL": 0.45, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
 """In stops."""
 DUSK = (radians(8.0), 2.4)
 """Sun and ozone of the sky."""
