@@ -300,7 +300,7 @@ def contact_sheet(pictures: Sequence[Path], columns: int, path: Path) -> Path:
     try:
         image.pixels.foreach_set(sheet.ravel())
         image.filepath_raw, image.file_format = str(path), "JPEG"
-        image.save(quality=78)
+        image.save(quality=80)
     finally:
         bpy.data.images.remove(image)
     return path
