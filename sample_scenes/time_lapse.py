@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from PIL import Image
 
-from sample_scenes import bare_feet, litter, open_air, production, stage, terrain
+from sample_scenes import litter, open_air, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
@@ -33,8 +33,6 @@ CELL_SIZE: float | None = None
 
 WEATHER = {"SNOWFALL": "Snow", "THAW": "Snow", "WINDY_DUNES": "Dry Sand", "DRYING_BEACH": "Wet Sand"}
 """Presets of weather, and the ground that each goes over."""
-BAREFOOT = "DRYING_BEACH"
-"""The preset under whose weather the walker wears no shoes."""
 
 FRAMES = 60
 LASTS = 264
@@ -50,9 +48,11 @@ COLUMNS = 2
 MOVING = "SNOWFALL"
 FLOWING = tuple(number / 13 for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
-AFTERWARDS = ("WINDY_DUNES", "DRYING_BEACH")
-"""Presets that set in when the walk is over; to the others, its steps are of different ages."""
-SUN = {"SNOWFALL": (6.0, 12.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (-20.0, 11.0)}
+AFTERWARDS = ("SNOWFALL", "WINDY_DUNES", "DRYING_BEACH")
+"""Presets that set in when the walk is over; to a thaw, its steps are of different ages."""
+BARE = ("THAW", "DRYING_BEACH")
+"""Presets without debris: what was thrown would melt or dry first."""
+SUN = {"SNOWFALL": (6.0, 19.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (-20.0, 13.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
 SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
 """Strength [W/m²] and colour of the sun."""
@@ -93,18 +93,14 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
 
 def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options: Options | None) -> Bake:
     """The walk on the ground that a preset of weather goes over, and the weather."""
-    number, barefoot = list(WEATHER).index(preset), preset == BAREFOOT
-    body = bare_feet.BODY if barefoot else Body()
+    number, body = list(WEATHER).index(preset), Body()
     scene.frame_start, scene.frame_end = 1, FRAMES
     walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
     walker.location = (APART * number, 0.0, 0.0)
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    chosen = {"shape_keys": "false", "relief": "FINE", "ground_margin": "2.0"}
-    if preset == "THAW":
-        chosen["debris"] = "false"  # thrown snow would be the first to melt
-    if barefoot:
-        chosen |= bare_feet.PACKED | {"relief_strength": "0.45"}
-        cell_size = cell_size or bare_feet.CELL_SIZE
+    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "600000", "ground_margin": "2.0"}
+    if preset in BARE:
+        chosen["debris"] = "false"
     chosen |= options or {}
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
     modifier = weather.add(bake.ground)
