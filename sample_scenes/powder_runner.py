@@ -25,7 +25,7 @@ SPEED = 4.2  # m/s
 FRAMES = 76
 START = 9.5  # m along y; the run is toward -y
 STEP = -3  # the step that is seen
-STRIKE, LEAVE = 2.5, 6.1  # frames from its strike to the pictures
+STRIKE, LEAVE = 2.5, 4.6  # frames from its strike to the pictures
 PICTURE = (1920, 1080)
 PAIR = (960, 540)
 FIRS = 150
@@ -90,8 +90,8 @@ def shoot(built: PowderRunner, folder: Path, samples: int) -> list[Path]:
         stage.render(scene, scene.camera, path, size, samples)
         return path
 
-    open_air.add_low_sun(scene, radians(22), sky=0.2, **light)
-    hero = take(LEAVE, (0.58, 0.79, 0.32), (0.0, -0.17, 0.115), folder / "powder_runner.jpg", PICTURE)
+    open_air.add_low_sun(scene, radians(34), sky=0.26, **light)
+    hero = take(LEAVE, (0.54, 0.72, 0.28), (0.0, -0.12, 0.115), folder / "powder_runner.jpg", PICTURE)
     open_air.add_low_sun(scene, radians(-150), sky=0.3, **light)
     debris = debris_object.of(bake.ground)
     assert debris is not None
