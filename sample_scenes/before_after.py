@@ -44,7 +44,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
     """A walk past the camera, which is there first."""
     ground = open_air.add_ground(scene, "Snow", (-8.0, START + 3.0), HEIGHT, "snow")
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
-    open_air.add_camera(scene, (1.34, -1.62, 0.42), (-0.06, -0.98, 0.20), 32.0, (0.0, -1.0, 0.1), 8.0)
+    open_air.add_camera(scene, (0.95, -1.80, 0.34), (0.02, -1.21, 0.10), 34.0, (0.06, -1.28, 0.0), 8.0)
     chosen = {"relief_vertices": "400000", "material.youngs_modulus": SOFTER} | dict(options or {})
     return BeforeAfter({PRESET: open_air.bake_walk(scene, ground, START, FRAMES, PRESET, cell_size, chosen)})
 
@@ -64,8 +64,8 @@ def claims(built: BeforeAfter) -> list[Claim]:
 def shoot(_built: BeforeAfter, folder: Path, samples: int) -> list[Path]:
     """The same frame without and with the layer, and the wipe between them."""
     scene = bpy.context.scene
-    open_air.add_low_sun(scene, radians(60), radians(13), (1.0, 0.82, 0.64), 6.5, 0.20, (radians(14.0), 1.2))
-    scene.view_settings.exposure = 0.55
+    open_air.add_low_sun(scene, radians(110), radians(11), (1.0, 0.80, 0.60), 7.0, 0.20, open_air.PALE_DUSK)
+    scene.view_settings.exposure = 0.45
     chance = np.random.default_rng(5)
     spots = np.column_stack([-chance.uniform(26.0, 110.0, FIRS), chance.normal(14.0, 45.0, FIRS)])
     firs.add_firs(spots, chance.uniform(5.0, 12.0, FIRS), HEIGHT, firs.WINTRY, snow=0.7)

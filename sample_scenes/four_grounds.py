@@ -30,6 +30,8 @@ CELL_SIZE: float | None = None
 FRAMES = 48  # 2 s: four steps
 SPACING, LENGTH = 1.2, 5.0  # m from ground to ground, and from row to row
 PICTURE = (960, 720)
+GRAINS = 24
+"""Samples below which grains of soil blur."""
 SUN_ELEVATION = radians(22)
 """Low, but the bottom of a print still sees the sun."""
 EXPOSURE = {"Snow": -0.6, "Dry Sand": -0.25, "Mud": 0.25, "Soil": 0.6}
@@ -122,7 +124,7 @@ def _rim_ahead(preset: str, built: FourGrounds) -> list[Claim]:
 def shoot(built: FourGrounds, folder: Path, samples: int) -> list[Path]:
     """One print on each ground under a low sun, and all of them on one sheet."""
     light(bpy.context.scene, close_up_of(built.bakes["Snow"].footprints))
-    pictures = close_ups(built, folder / "four_grounds", PICTURE, samples)
+    pictures = close_ups(built, folder / "four_grounds", PICTURE, max(samples, GRAINS))
     return [*pictures, stage.contact_sheet(pictures, 2, folder / "four_grounds.jpg")]
 
 

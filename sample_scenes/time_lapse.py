@@ -38,27 +38,25 @@ FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
 MOMENTS = {
-    "SNOWFALL": (0.0, 0.5, 0.8, 1.0),
-    "THAW": (0.0, 0.3, 0.62, 0.9),
+    "SNOWFALL": (0.0, 0.1, 0.42, 0.75),
+    "THAW": (0.0, 0.15, 0.62, 0.9),
     "WINDY_DUNES": (0.0, 0.06, 0.105, 0.9),
     "DRYING_BEACH": (0.0, 0.25, 0.38, 1.0),
 }
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
 MOVING = "SNOWFALL"
-FLOWING = tuple(number / 13 for number in range(14))
+FLOWING = tuple(0.06 * number for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
-AFTERWARDS = ("SNOWFALL", "WINDY_DUNES", "DRYING_BEACH")
-"""Presets that set in when the walk is over; to a thaw, its steps are of different ages."""
 BARE = ("THAW", "DRYING_BEACH")
 """Presets without debris: what was thrown would melt or dry first."""
-SUN = {"SNOWFALL": (6.0, 19.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 9.0), "DRYING_BEACH": (-20.0, 13.0)}
+SUN = {"SNOWFALL": (6.0, 19.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
 SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
 """Strength [W/m²] and colour of the sun."""
-SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.12, "DRYING_BEACH": 0.09}
+SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.25, "DRYING_BEACH": 0.09}
 """Strength of the sky, which fills shadows blue."""
-EXPOSURE = {"SNOWFALL": 0.45, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
+EXPOSURE = {"SNOWFALL": 0.65, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
 """In stops."""
 DUSK = (radians(8.0), 2.4)
 """Sun and ozone of the sky."""
@@ -105,7 +103,7 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     bake = production.bake(scene, [Walker(walker, body.mass)], WEATHER[preset], cell_size, options=chosen)
     modifier = weather.add(bake.ground)
     weather.set_preset(modifier, preset)
-    if preset in AFTERWARDS:
+    if preset != "THAW":  # to which steps of different ages are more to look at
         _set_in(modifier, FRAMES)
     if preset == "THAW":
         _add_soil(walker.location.x)
