@@ -65,7 +65,7 @@ def set_the_view(hand: Hand) -> None:
     hand.show_materials((0.21, 0.535))
     view = space.region_3d
     view.view_perspective = "PERSP"
-    view.view_location, view.view_distance = (-0.55, -2.15, 0.28), 3.0
+    view.view_location, view.view_distance = (-0.45, -1.95, 0.0), 2.9
     view.view_rotation = Euler((1.15, 0.0, 2.55)).to_quaternion()
 
 
