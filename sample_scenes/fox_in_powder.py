@@ -95,7 +95,7 @@ def claims(built: FoxInPowder) -> list[Claim]:
     return [
         Claim("Steps in the snow", len(steps), 30, 60),
         Claim("Depth of the deepest [m]", max(step.max_depth_m for step in steps), 0.03, 0.15),
-        Claim("From a hind paw to the next print of a forepaw [m]", float(np.median(apart)), 0.0, 0.03),
+        Claim("From a hind paw to the next print of a forepaw [m]", float(np.median(apart)), 0.0, 0.005),
     ]
 
 

@@ -28,7 +28,7 @@ FRAMES = 66
 SHOWN = range(8, FRAMES - 3, 2)
 """Every second frame: 12 a second."""
 
-EYE, TARGET = (0.66, 2.05, 0.62), (-0.02, 1.22, 0.03)
+EYE, TARGET = (0.68, 2.08, 0.66), (0.0, 1.28, 0.0)
 """Of the camera in the first frame [m]."""
 PACE = 0.0496  # m a frame: the camera goes with the walker
 
@@ -36,7 +36,7 @@ LAST_HOLD = 1200
 """How long the last frame stays before the picture begins again [ms]."""
 
 PICTURE = (960, 540)
-LARGEST = 3_000_000
+LARGEST = 1_800_000
 """More than this a README should not make its readers load [bytes]."""
 
 
@@ -61,7 +61,7 @@ def build(scene: bpy.types.Scene, cell_size: float | None = CELL_SIZE, options: 
         scene.camera.location.y = EYE[1] - PACE * (frame - 1)
         scene.camera.keyframe_insert("location", index=1, frame=frame)
     chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "800000"}
-    chosen |= {"sink_feet": "true", "ground_margin": "5.0"} | dict(options or {})
+    chosen |= {"sink_feet": "true", "ground_margin": "3.0"} | dict(options or {})
     bake = production.bake(scene, [Walker(walker, body.mass)], PRESET, cell_size, options=chosen)
     return MovingPicture({PRESET: bake})
 

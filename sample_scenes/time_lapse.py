@@ -38,7 +38,7 @@ FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
 MOMENTS = {
-    "SNOWFALL": (0.0, 0.1, 0.42, 0.75),
+    "SNOWFALL": (0.0, 0.06, 0.15, 0.5),
     "THAW": (0.0, 0.15, 0.62, 0.9),
     "WINDY_DUNES": (0.0, 0.06, 0.105, 0.9),
     "DRYING_BEACH": (0.0, 0.25, 0.38, 1.0),
@@ -46,17 +46,17 @@ MOMENTS = {
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
 MOVING = "SNOWFALL"
-FLOWING = tuple(0.06 * number for number in range(14))
+FLOWING = tuple(0.04 * number for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
 BARE = ("THAW", "DRYING_BEACH")
 """Presets without debris: what was thrown would melt or dry first."""
-SUN = {"SNOWFALL": (6.0, 19.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
+SUN = {"SNOWFALL": (-12.0, 25.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
 SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
 """Strength [W/m²] and colour of the sun."""
 SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.25, "DRYING_BEACH": 0.09}
 """Strength of the sky, which fills shadows blue."""
-EXPOSURE = {"SNOWFALL": 0.65, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
+EXPOSURE = {"SNOWFALL": 0.35, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
 """In stops."""
 DUSK = (radians(8.0), 2.4)
 """Sun and ozone of the sky."""
@@ -96,7 +96,8 @@ def track(scene: bpy.types.Scene, preset: str, cell_size: float | None, options:
     walker = create_character(f"Hiker {number + 1}", body, scene.collection, production.COARSENESS)
     walker.location = (APART * number, 0.0, 0.0)
     write_action(walker, walk(body, Gait(), FRAMES, scene.render.fps), "Walk")
-    chosen = {"shape_keys": "false", "relief": "CLOSE_UP", "relief_vertices": "600000", "ground_margin": "2.0"}
+    relief = "FINE" if preset == "DRYING_BEACH" else "CLOSE_UP"  # tread in wet sand is sharp, in low light
+    chosen = {"shape_keys": "false", "relief": relief, "relief_vertices": "600000", "ground_margin": "2.0"}
     if preset in BARE:
         chosen["debris"] = "false"
     chosen |= options or {}
