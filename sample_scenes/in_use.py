@@ -47,7 +47,7 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     shown = window(WINDOW)
     light(WEATHER)
     width, height = shown[0].size
-    moments = take(built.bakes[WEATHER], FLOWING, (width // 2, height // 2), folder / "in_use", samples)
+    moments = take(built.bakes[WEATHER], FLOWING, (width, height), folder / "in_use", samples, snow=True)
     pictures = [*shown, *flowing(moments, shown[0].size)]
     pause = round(1000 * PLAYED / bpy.context.scene.render.fps)
     return [put_together(pictures, pause, folder / "in_use.webp", LARGEST, (80, 70, 60, 50), effort=4)]

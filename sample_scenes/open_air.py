@@ -389,5 +389,6 @@ def add_snowfall(camera: bpy.types.Object, count: int, aspect: float, seed: int 
     shader.inputs["Emission Strength"].default_value = _GLOW
     mesh.materials.append(flake)
     flakes = bpy.data.objects.new("Snowfall", mesh)
+    flakes.visible_shadow = False  # a flake blurs its shadow as it falls
     bpy.context.scene.collection.objects.link(flakes)
     return flakes

@@ -38,7 +38,7 @@ FRAMES = 60
 LASTS = 264
 """Frames from the last step to the last picture: eleven seconds."""
 MOMENTS = {
-    "SNOWFALL": (0.0, 0.06, 0.15, 0.5),
+    "SNOWFALL": (0.0, 0.05, 0.11, 0.45),
     "THAW": (0.0, 0.15, 0.62, 0.9),
     "WINDY_DUNES": (0.0, 0.06, 0.105, 0.9),
     "DRYING_BEACH": (0.0, 0.25, 0.38, 1.0),
@@ -46,20 +46,22 @@ MOMENTS = {
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
 MOVING = "SNOWFALL"
-FLOWING = tuple(0.04 * number for number in range(14))
+FLOWING = tuple(0.035 * number for number in range(14))
 """The preset that is also shown as a moving picture, and its moments."""
 BARE = ("THAW", "DRYING_BEACH")
 """Presets without debris: what was thrown would melt or dry first."""
-SUN = {"SNOWFALL": (-12.0, 25.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
+SUN = {"SNOWFALL": (-12.0, 29.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
 """Where the light goes and how high it comes from [deg]: low and across the prints."""
 SUNLIGHT, WARM = 6.5, (1.0, 0.84, 0.66)
 """Strength [W/m²] and colour of the sun."""
 SKYLIGHT = {"SNOWFALL": 0.14, "THAW": 0.14, "WINDY_DUNES": 0.25, "DRYING_BEACH": 0.09}
 """Strength of the sky, which fills shadows blue."""
-EXPOSURE = {"SNOWFALL": 0.35, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
+EXPOSURE = {"SNOWFALL": 0.4, "THAW": 0.45, "WINDY_DUNES": 0.3, "DRYING_BEACH": 0.75}
 """In stops."""
 DUSK = (radians(8.0), 2.4)
 """Sun and ozone of the sky."""
+FLAKES = 9000
+"""In the air while it snows."""
 LENS, F_STOP = 58.0, 8.0
 EYE, TARGET = (0.56, 0.92, 0.40), (-0.06, -0.20, 0.0)
 """Where the camera is and where it looks, from a step on [m]."""
@@ -183,10 +185,10 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
         light(preset)
         _show(built, [preset])
         path = folder / f"time_lapse_{preset.lower()}"
-        moments = take(bake, MOMENTS[preset], PICTURE, path, samples)
+        moments = take(bake, MOMENTS[preset], PICTURE, path, samples, snow=preset == "SNOWFALL")
         made.append(stage.contact_sheet(moments, COLUMNS, path.with_suffix(".jpg")))
         if preset == MOVING:
-            moments = take(bake, FLOWING, SMALL, path.with_name(f"{path.name}_moving"), samples)
+            moments = take(bake, FLOWING, SMALL, path.with_name(f"{path.name}_moving"), samples, snow=True)
             pictures = [Image.open(moment).convert("RGB") for moment in moments]
             pauses = [PAUSE] * (len(FLOWING) - 1) + [LAST_HOLD]
             qualities = (92, 86, 80, 70)
@@ -211,8 +213,11 @@ def light(preset: str) -> None:
     open_air.add_low_sun(scene, radians(toward), radians(elevation), WARM, SUNLIGHT, SKYLIGHT[preset], DUSK)
 
 
-def take(bake: Bake, moments: Sequence[float], size: tuple[int, int], path: Path, samples: int) -> list[Path]:
-    """Pictures of a track under its weather, low over a step; their names begin with a path."""
+def take(
+    bake: Bake, moments: Sequence[float], size: tuple[int, int], path: Path, samples: int, *, snow: bool = False
+) -> list[Path]:
+    """Pictures of a track under its weather, low over a step; their names begin with a path. It may snow in all but
+    the first."""
     scene = bpy.context.scene
     step = np.array(_step(bake).position)
     pictures = []
@@ -222,7 +227,10 @@ def take(bake: Bake, moments: Sequence[float], size: tuple[int, int], path: Path
         ground = np.array((step[0], step[1], _level(bake)))
         stage.aim(camera, ground + EYE, ground + TARGET)
         pictures.append(path.with_name(f"{path.name}_{number:02d}.png"))
+        snowing = [open_air.add_snowfall(camera, FLAKES, size[0] / size[1], number)] if number and snow else []
         stage.render(scene, camera, pictures[-1], size, samples)
+        for flakes in snowing:
+            bpy.data.meshes.remove(flakes.data)  # and the object with it
     return pictures
 
 
