@@ -16,13 +16,15 @@ from PIL import Image, ImageDraw
 from sample_scenes import production
 from sample_scenes.moving_picture import put_together
 from sample_scenes.production import Claim, Options
-from sample_scenes.time_lapse import CELL_SIZE, FLOWING, TimeLapse, hollow_left, light, take, track
+from sample_scenes.time_lapse import CELL_SIZE, TimeLapse, hollow_left, light, take, track
 
 __all__ = ["CELL_SIZE", "build", "claims", "shoot"]
 
 WINDOW = Path("build/gui/trixie/filmed")
 """Where the test leaves its pictures."""
 WEATHER = "SNOWFALL"
+MOMENTS = 0.035 * np.arange(14)
+"""Of the night, as shares of what a time lapse lasts."""
 PLAYED = 2
 """Frames from one picture to the next, of what was played."""
 MIXED = 5
@@ -47,7 +49,7 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
     shown = window(WINDOW)
     light(WEATHER)
     width, height = shown[0].size
-    moments = take(built.bakes[WEATHER], FLOWING, (width, height), folder / "in_use", samples, snow=True)
+    moments = take(built.bakes[WEATHER], MOMENTS, (width, height), folder / "in_use", samples, snow=True)
     pictures = [*shown, *flowing(moments, shown[0].size)]
     pause = round(1000 * PLAYED / bpy.context.scene.render.fps)
     return [put_together(pictures, pause, folder / "in_use.webp", LARGEST, (80, 70, 60, 50), effort=4)]

@@ -1,4 +1,4 @@
-"""Tracks under weather: snowfall, thaw, wind on a dune, a drying beach, each as a sheet; the snow as a moving picture.
+"""Tracks under weather: snowfall, thaw, wind on a dune, a drying beach, each as a sheet of four moments.
 
 One bake each; only the weather's sliders act afterwards.
 """
@@ -13,14 +13,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from PIL import Image
 
 from sample_scenes import litter, open_air, production, stage, terrain
 from sample_scenes.body import Body
 from sample_scenes.character import create_character
 from sample_scenes.gait import Gait, walk
 from sample_scenes.keys import write_action
-from sample_scenes.moving_picture import LAST_HOLD, put_together
 from sample_scenes.production import Bake, Claim, Options, Walker
 from sample_scenes.stage import Array
 from softground_addon.blender import compat
@@ -45,9 +43,6 @@ MOMENTS = {
 }
 """When the pictures of a sheet are taken, as shares of that time."""
 COLUMNS = 2
-MOVING = "SNOWFALL"
-FLOWING = tuple(0.035 * number for number in range(14))
-"""The preset that is also shown as a moving picture, and its moments."""
 BARE = ("THAW", "DRYING_BEACH")
 """Presets without debris: what was thrown would melt or dry first."""
 SUN = {"SNOWFALL": (-12.0, 29.0), "THAW": (6.0, 12.0), "WINDY_DUNES": (8.0, 13.0), "DRYING_BEACH": (-20.0, 13.0)}
@@ -69,14 +64,10 @@ SOIL, HUMPS = -0.225, 0.10
 """Mean height of the soil below the snow that thaws, and about how far its humps rise above it [m]."""
 STRAW, ROOTED = 900, -0.24
 """Tufts of dead grass that are tried, and the height of soil from which on they grow [m]."""
-PICTURE, SMALL = (960, 540), (800, 450)
-"""Size of each picture of a sheet, and of the moving one."""
+PICTURE = (960, 540)
+"""Size of each picture of a sheet."""
 APART = 30.0
 """Distance of the tracks [m]."""
-PAUSE = 260
-"""What each picture of the moving one takes [ms]."""
-LARGEST = 1_500_000
-"""Of the moving picture [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +170,7 @@ def _hollow(bake: Bake, frame: int) -> float:
 
 
 def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
-    """Four moments of each, and more of one."""
+    """Four moments of each."""
     made = []
     for preset, bake in built.bakes.items():
         light(preset)
@@ -187,12 +178,6 @@ def shoot(built: TimeLapse, folder: Path, samples: int) -> list[Path]:
         path = folder / f"time_lapse_{preset.lower()}"
         moments = take(bake, MOMENTS[preset], PICTURE, path, samples, snow=preset == "SNOWFALL")
         made.append(stage.contact_sheet(moments, COLUMNS, path.with_suffix(".jpg")))
-        if preset == MOVING:
-            moments = take(bake, FLOWING, SMALL, path.with_name(f"{path.name}_moving"), samples, snow=True)
-            pictures = [Image.open(moment).convert("RGB") for moment in moments]
-            pauses = [PAUSE] * (len(FLOWING) - 1) + [LAST_HOLD]
-            qualities = (92, 86, 80, 70)
-            made.append(put_together(pictures, pauses, path.with_suffix(".webp"), LARGEST, qualities, effort=6))
     _show(built, built.bakes)
     return made
 
