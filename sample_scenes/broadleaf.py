@@ -7,12 +7,14 @@ from math import pi
 import bpy
 import numpy as np
 
-from sample_scenes import litter, stage, terrain
+from sample_scenes import firs, litter, stage, terrain
 from sample_scenes.stage import Array
 from softground_addon.blender.shader_graph import Colour
 
 _SHAPES, _CLUMPS, _LEAVES = 4, 34, 130
 """How many trees are unlike, clumps of a crown, leaves of a clump."""
+_WIDTH = (0.8, 1.25)
+"""Least and greatest width, in that of the shape."""
 
 
 def add_broadleaves(
@@ -35,13 +37,7 @@ def add_broadleaves(
     leaf = litter.material(f"foliage {seed}", dark, light, 0.6, through=0.3)
     bark = stage.plain_material("SoftGround Sample stem", (0.055, 0.042, 0.033), 0.9)
     shapes = [_tree(np.random.default_rng(seed + number), leaf, bark, stem) for number in range(_SHAPES)]
-    turn = np.random.default_rng(seed)
-    for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
-        tree = bpy.data.objects.new("Broadleaf", shapes[number % len(shapes)])
-        tree.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.02 * height)
-        tree.rotation_euler.z = turn.uniform(0, 2 * pi)
-        tree.scale = (height * turn.uniform(0.8, 1.25), height * turn.uniform(0.8, 1.25), height)
-        bpy.context.scene.collection.objects.link(tree)
+    firs.plant("Broadleaf", shapes, spots, heights, ground, seed, _WIDTH)
 
 
 def _tree(

@@ -49,12 +49,26 @@ def add_firs(
     """
     materials = _needles(colour), _bark(), stage.plain_material("SoftGround Sample laden", (0.86, 0.89, 0.93), 0.8)
     shapes = [_fir(np.random.default_rng(seed + number), materials, snow, crown) for number in range(_SHAPES)]
-    turn = np.random.default_rng(seed)
+    plant("Fir", shapes, spots, heights, ground, seed)
+
+
+def plant(
+    name: str,
+    shapes: Sequence[bpy.types.Mesh],
+    spots: Array,
+    heights: Array,
+    ground: terrain.Field,
+    seed: int,
+    width: tuple[float, float] | None = None,
+) -> None:
+    """Trees of height 1 as high as given on a ground, turned; each as wide over its height as drawn from `width`."""
+    chance = np.random.default_rng(seed)
     for number, ((x, y), height) in enumerate(zip(spots, heights, strict=True)):
-        tree = bpy.data.objects.new("Fir", shapes[number % len(shapes)])
+        tree = bpy.data.objects.new(name, shapes[number % len(shapes)])
         tree.location = (x, y, float(ground(np.array(x), np.array(y))) - 0.02 * height)
-        tree.rotation_euler.z = turn.uniform(0, 2 * pi)
-        tree.scale = (height, height, height)
+        tree.rotation_euler.z = chance.uniform(0, 2 * pi)
+        wide = [chance.uniform(*width) for _ in range(2)] if width else [1.0, 1.0]
+        tree.scale = (height * wide[0], height * wide[1], height)
         bpy.context.scene.collection.objects.link(tree)
 
 

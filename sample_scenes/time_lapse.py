@@ -192,8 +192,6 @@ def light(preset: str) -> None:
     """The sun and the exposure of a preset's pictures, in place of another's."""
     scene = bpy.context.scene
     scene.view_settings.exposure = EXPOSURE[preset]
-    for lamp in list(bpy.data.lights):
-        bpy.data.lights.remove(lamp)
     toward, elevation = SUN[preset]
     open_air.add_low_sun(scene, radians(toward), radians(elevation), WARM, SUNLIGHT, SKYLIGHT[preset], DUSK)
 

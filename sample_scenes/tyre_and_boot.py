@@ -41,8 +41,6 @@ PICTURE = (1920, 1080)
 HEIGHT = open_air.rolling(swell=0.18, hills=10.0, seed=4)
 _KNOTS = np.array([(0, 0), (1.5, 0.02), (3.5, 0.1), (5.5, 0.34), (8, 0.9), (11, 1.8), (15, 3.3), (20, 5.4), (26, 8)])
 """How far the bend leads along -y, and aside to +x [m]."""
-_FINE = np.linspace(0.0, 26.0, 261)
-_BEND = clamped_spline(_FINE, _KNOTS[:, 0], _KNOTS[:, 1], 0.0, 0.45)
 
 
 def aside(along: Array, wander: float = 0.0) -> Array:
